@@ -1,0 +1,33 @@
+//! Indentation: penalty contact of the top face with a rigid sphere or flat punch.
+//!
+//! Gap `g` along the outward normal `n` of the tool; `f = k <-g> n - 2 zeta sqrt(k m) v_n n`, never tensile.
+//! A bonded punch keeps the node at the place of its first touch by a spring of stiffness `k` in all
+//! directions. `k = stiffness_factor (K + 4/3 mu) h` with `h` the fine cell edge [m].
+
+use super::Effect;
+
+pub const EFFECT: Effect = Effect {
+    key: "indentation",
+    define: "INDENTATION",
+    summary: "contact of the top face with a rigid sphere or flat punch",
+    source: "Wriggers2006",
+    cost: "one dispatch and 96 B per top-face node near the tool",
+};
+
+/// Parameters in SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Penalty stiffness factor (dimensionless).
+    pub stiffness_factor: f64,
+    /// Fraction of critical damping in the normal direction (dimensionless).
+    pub contact_damping: f64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Params {
+            stiffness_factor: 2.35,
+            contact_damping: 0.2,
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Effects are chosen by the scene. `None` means absent: no define, no buffer, no binding, no code.
+
+pub mod friction;
+pub mod gravity;
+pub mod indentation;
+pub mod mass_scaling;
+pub mod puncture;
+
+/// The effects of one scene, one field per effect, in the order of [`EFFECTS`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EffectSet {
+    pub mass_scaling: Option<mass_scaling::Params>,
+    pub gravity: Option<gravity::Params>,
+    pub puncture: Option<puncture::Params>,
+    pub indentation: Option<indentation::Params>,
+    pub friction: Option<friction::Params>,
+}
+
+/// What the program knows about an effect without running it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effect {
+    /// Key in the scene's `effects` list and stem of its files.
+    pub key: &'static str,
+    /// Name tested by `#ifdef` in the shaders.
+    pub define: &'static str,
+    /// One line for `check` and README.
+    pub summary: &'static str,
+    /// Where the equations come from.
+    pub source: &'static str,
+    /// What it costs, one line.
+    pub cost: &'static str,
+}
+
+/// All effects. The order is the order of their blocks in the stages.
+pub const EFFECTS: [Effect; 5] = [
+    mass_scaling::EFFECT,
+    gravity::EFFECT,
+    puncture::EFFECT,
+    indentation::EFFECT,
+    friction::EFFECT,
+];
+
+impl EffectSet {
+    /// Which effects are on, in the order of [`EFFECTS`].
+    fn presence(&self) -> [bool; EFFECTS.len()] {
+        [
+            self.mass_scaling.is_some(),
+            self.gravity.is_some(),
+            self.puncture.is_some(),
+            self.indentation.is_some(),
+            self.friction.is_some(),
+        ]
+    }
+
+    /// The effects that are on, in the order of [`EFFECTS`].
+    pub fn active(&self) -> impl Iterator<Item = &'static Effect> + '_ {
+        EFFECTS
+            .iter()
+            .zip(self.presence())
+            .filter_map(|(effect, on)| on.then_some(effect))
+    }
+
+    /// Keys of the effects that are on.
+    pub fn keys(&self) -> Vec<&'static str> {
+        self.active().map(|e| e.key).collect()
+    }
+}

@@ -1,0 +1,67 @@
+//! The one error type. A message tells what is wrong, where it stands and the way out.
+
+use std::path::PathBuf;
+
+/// Result of every fallible call of the library.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Everything that can go wrong, grouped by who can mend it.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The scene file or a command-line value is wrong; the text is complete (file, line, excerpt,
+    /// way out) and already rendered.
+    #[error("{0}")]
+    Scene(String),
+    /// Another input (file, folder, option) is wrong.
+    #[error("{message}\n  way out: {way_out}")]
+    Input { message: String, way_out: String },
+    /// No adapter, wrong adapter name, or a device that could not be opened.
+    #[error("{message}\n  way out: {way_out}")]
+    Adapter { message: String, way_out: String },
+    /// A shader does not compose or does not validate: a broken internal promise.
+    #[error("shader {stage}: {message}")]
+    Shader { stage: String, message: String },
+    /// The device reported an error or was lost.
+    #[error("device: {0}")]
+    Device(String),
+    /// The simulation left the range in which its numbers mean something.
+    #[error("run stopped in frame {frame} (step {step}, t = {time_s:.6} s): {message}")]
+    Diverged {
+        frame: u64,
+        step: u64,
+        time_s: f64,
+        message: String,
+    },
+    /// A file could not be written or read.
+    #[error("{path}: {source}")]
+    File {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+}
+
+impl Error {
+    /// A wrong input with its way out.
+    pub fn input(message: impl Into<String>, way_out: impl Into<String>) -> Self {
+        Error::Input {
+            message: message.into(),
+            way_out: way_out.into(),
+        }
+    }
+
+    /// A file error with the path that it concerns.
+    pub fn file(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
+        Error::File {
+            path: path.into(),
+            source,
+        }
+    }
+
+    /// Exit code of the program: 2 where the user's input is wrong, 1 otherwise.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Scene(_) | Error::Input { .. } | Error::Adapter { .. } => 2,
+            _ => 1,
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Stylet: a needle goes into soft tissue, and a person sees and feels what happens.
+//!
+//! Reading order, which is also the straight line that data takes:
+//! [`scene`] -> [`mesh`] -> [`effects`] -> [`model`] -> [`solver`] (engines [`solver::cpu`] and
+//! [`gpu`]) -> [`observables`] -> [`output`] and [`render`].
+
+pub mod effects;
+pub mod error;
+pub mod gpu;
+pub mod material;
+pub mod mesh;
+pub mod model;
+pub mod needle;
+pub mod observables;
+pub mod output;
+pub mod render;
+pub mod scene;
+pub mod solver;
+
+pub use error::{Error, Result};

@@ -1,0 +1,128 @@
+//! What a run tells about itself: one record per display frame, fields on request.
+
+use glam::DVec3;
+
+/// Force that the tool exerts on the tissue, in parts [N]; positive along the insertion direction. Means over the frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ForceParts {
+    /// Axial sum of the parts [N].
+    pub axial: f64,
+    /// Tip law: puncture and cutting [N].
+    pub cutting: f64,
+    /// Contact normal on cone and shaft (or indenter) [N].
+    pub spreading: f64,
+    /// Friction [N].
+    pub friction: f64,
+    /// Lateral force on the tissue, world frame with the axial part removed [N].
+    pub lateral: DVec3,
+    /// Torque on the tissue about the tip, world frame [N m].
+    pub torque: DVec3,
+}
+
+/// Energies [J] at the end of a frame. Work and dissipation are totals since t = 0.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EnergyAccount {
+    /// Work of tool, moved faces, tractions and gravity.
+    pub external: f64,
+    /// Elastic strain energy.
+    pub elastic: f64,
+    pub kinetic: f64,
+    /// Hourglass energy (stored).
+    pub hourglass: f64,
+    /// Dissipated by mass damping and bulk viscosity.
+    pub damping: f64,
+    /// Dissipated by friction.
+    pub friction: f64,
+    /// Dissipated by the tip law and by the softening of the path.
+    pub cutting: f64,
+    /// Stored in contact, stick and tip springs, plus what contact damping dissipated.
+    pub contact: f64,
+    /// Largest |external| so far, the scale of the imbalance.
+    pub external_max: f64,
+}
+
+impl EnergyAccount {
+    /// Sum of everything that external work turned into [J].
+    pub fn accounted(&self) -> f64 {
+        self.elastic
+            + self.kinetic
+            + self.hourglass
+            + self.damping
+            + self.friction
+            + self.cutting
+            + self.contact
+    }
+
+    /// (external - accounted) / largest external work; 0 while nothing has happened.
+    pub fn imbalance(&self) -> f64 {
+        if self.external_max > 0.0 {
+            (self.external - self.accounted()) / self.external_max
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Signs of trouble within one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Health {
+    /// Smallest J at cell centres, and at cell corners.
+    pub min_j: f64,
+    pub min_corner_j: f64,
+    /// Cells with J <= 0 at the centre or a corner.
+    pub inverted_cells: u32,
+    /// Index of one of them.
+    pub inverted_cell: Option<u32>,
+    /// Nodes whose speed was clamped, summed over the steps of the frame.
+    pub clamped_nodes: u32,
+    /// Largest nodal speed [m/s].
+    pub max_speed: f64,
+    /// Steps times nodes on which the selective mass was above the scaled mass.
+    pub raised_mass: u32,
+    /// True where a displacement or velocity is not a finite number in range.
+    pub not_finite: bool,
+}
+
+/// One display frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FrameRecord {
+    /// Frame number, from 0; the record describes the state at its end.
+    pub frame: u64,
+    /// Steps since t = 0.
+    pub step: u64,
+    /// Time at the end of the frame [s].
+    pub time: f64,
+    /// Depth of the tool tip along the insertion direction, mean over the frame [m] (negative: outside).
+    pub depth: f64,
+    /// Index of the motion phase.
+    pub phase: usize,
+    pub force: ForceParts,
+    /// Material coordinate of the tip along its path, a [m].
+    pub tip_coordinate: f64,
+    pub energy: EnergyAccount,
+    pub health: Health,
+}
+
+/// Fields of one moment, for VTU files and pictures.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FieldSnapshot {
+    pub frame: u64,
+    /// Time [s].
+    pub time: f64,
+    /// Depth of the tool [m].
+    pub depth: f64,
+    /// Axial force of the frame [N].
+    pub axial_force: f64,
+    /// Tip position of the tool and its direction of insertion (unit), if there is a tool.
+    pub tool_pose: Option<(DVec3, DVec3)>,
+    /// Displacement per node [m], node order of the mesh.
+    pub displacement: Vec<DVec3>,
+    /// Von Mises stress per cell [Pa].
+    pub von_mises: Vec<f64>,
+    /// Jacobian J per cell.
+    pub jacobian: Vec<f64>,
+    /// Pressure, -trace(Cauchy)/3, per cell [Pa].
+    pub pressure: Vec<f64>,
+    /// Remaining stiffness per cell, 1 = intact; empty without the effect `puncture`.
+    pub stiffness: Vec<f64>,
+}

@@ -1,0 +1,205 @@
+//! A scene in SI units, as every later step of the program sees it.
+//!
+//! `file` holds the TOML form (units in the key names), `presets` the material and needle library;
+//! [`Scene::load`] reads, checks and converts. Nothing after this module knows about millimetres.
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+use crate::effects::EffectSet;
+use crate::material::MooneyRivlin;
+
+/// One simulation: what is there, what moves, what is simulated and what is written.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Short name: file stem, used for the output folder.
+    pub name: String,
+    /// One line for pictures and reports.
+    pub title: String,
+    /// File that the scene was read from.
+    pub path: PathBuf,
+    pub tissue: Tissue,
+    pub material: TissueMaterial,
+    /// Conditions on the six faces, indexed by [`Face`].
+    pub faces: [FaceCondition; 6],
+    pub tool: Option<Tool>,
+    /// Motion of the tool; empty exactly when there is no tool.
+    pub motion: Motion,
+    pub effects: EffectSet,
+    pub solver: SolverSettings,
+    pub outputs: Outputs,
+    /// Things that the user should know and that are no errors, one sentence each.
+    pub notices: Vec<String>,
+}
+
+/// The tissue block: `-size.x/2..size.x/2`, `-size.y/2..size.y/2`, `-size.z..0` [m]; the top face is z = 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tissue {
+    /// Edge lengths of the block [m].
+    pub size: DVec3,
+    /// Cell edge in the fine zone around the planned path [m].
+    pub cell_size: f64,
+    /// Half width of the fine zone around the path [m].
+    pub fine_radius: f64,
+    /// Ratio of neighbouring cell edges outside the fine zone, >= 1.
+    pub growth: f64,
+    /// Where the entry point lies between two grid lines, as a fraction of the cell (x, y); [0.0, 0.0] puts the axis
+    /// on grid lines, [0.5, 0.5] on cell centres.
+    pub axis_offset_cells: [f64; 2],
+}
+
+/// Material of the tissue with its origin.
+#[derive(Debug, Clone)]
+pub struct TissueMaterial {
+    /// Preset name, or `constants`.
+    pub name: String,
+    /// Where the constants come from, one line.
+    pub source: String,
+    pub law: MooneyRivlin,
+    /// Density [kg/m^3].
+    pub density: f64,
+}
+
+/// The six faces of the block. The discriminant is the index into [`Scene::faces`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(usize)]
+pub enum Face {
+    XMin = 0,
+    XMax = 1,
+    YMin = 2,
+    YMax = 3,
+    /// Bottom, z = -size.z.
+    ZMin = 4,
+    /// Top, z = 0.
+    ZMax = 5,
+}
+
+impl Face {
+    pub const ALL: [Face; 6] = [
+        Face::XMin,
+        Face::XMax,
+        Face::YMin,
+        Face::YMax,
+        Face::ZMin,
+        Face::ZMax,
+    ];
+
+    /// Key in the scene file.
+    pub fn key(self) -> &'static str {
+        ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"][self as usize]
+    }
+
+    /// Axis of the face normal: 0, 1 or 2.
+    pub fn axis(self) -> usize {
+        self as usize / 2
+    }
+
+    /// True for the face at the larger coordinate.
+    pub fn is_max(self) -> bool {
+        self as usize % 2 == 1
+    }
+}
+
+/// What holds, moves or loads one face.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FaceCondition {
+    /// Components of the displacement held at zero (or moved by `drive`): x, y, z.
+    pub fixed: [bool; 3],
+    /// Prescribed motion of the fixed components.
+    pub drive: Option<FaceDrive>,
+    /// Dead load per rest area [Pa], x, y, z, switched on at t = 0 and growing linearly over `traction_ramp` [s]
+    /// (0 = at once).
+    pub traction: Option<DVec3>,
+    pub traction_ramp: f64,
+}
+
+/// Prescribed motion of a face: a translation and a rotation about the outward axis through the face centre, both
+/// growing linearly over `duration` and then held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FaceDrive {
+    /// Final displacement [m].
+    pub displacement: DVec3,
+    /// Final rotation about the coordinate axis of the face normal [rad], right-handed about +axis.
+    pub rotation: f64,
+    /// Time over which both grow [s].
+    pub duration: f64,
+}
+
+/// A rigid tool.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Tool {
+    Needle(NeedleShape),
+    /// Sphere of the given radius [m].
+    Sphere { radius: f64 },
+    /// Flat cylindrical punch of the given radius [m]; `bonded` sticks to the tissue where it touches first.
+    FlatPunch { radius: f64, bonded: bool },
+}
+
+/// A rigid solid needle: a cylinder with a conical tip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NeedleShape {
+    /// What the user calls it, e.g. `16G`.
+    pub name: String,
+    /// Shaft radius R [m].
+    pub radius: f64,
+    /// Length Lc of the cone [m].
+    pub tip_length: f64,
+    /// Name of the needle material (rigid here; kept for reports).
+    pub material: String,
+}
+
+/// Motion of the tool along a straight line.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Motion {
+    /// Entry point on the top face [m] (z = 0).
+    pub entry: DVec3,
+    /// Unit vector of the insertion, into the tissue (z < 0).
+    pub direction: DVec3,
+    pub phases: Vec<Phase>,
+}
+
+/// One phase of the motion. Depth is measured along the direction from the entry point [m].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Phase {
+    /// Advance to `depth` at `speed` [m/s].
+    Insert { speed: f64, depth: f64 },
+    /// Stand still for `duration` [s].
+    Hold { duration: f64 },
+    /// Go back to `depth` (>= 0 or slightly negative: out of the tissue) at `speed` [m/s].
+    Withdraw { speed: f64, depth: f64 },
+}
+
+/// Numbers of the time integration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SolverSettings {
+    /// Fraction of the stable step that is used, 0..1.
+    pub safety: f64,
+    /// The scene's own time step [s]; `None`: computed.
+    pub time_step: Option<f64>,
+    /// Mass-proportional damping alpha [1/s].
+    pub mass_damping: f64,
+    /// Linear bulk viscosity factor (dimensionless): eta = factor * rho * c_p * h on the rate of F.
+    pub bulk_viscosity: f64,
+    /// Hourglass stiffness kappa (dimensionless).
+    pub hourglass_stiffness: f64,
+    /// Quartic hourglass factor c (dimensionless).
+    pub hourglass_quartic: f64,
+    /// Display frames per simulated second [1/s]; a frame is one submission.
+    pub frame_rate: f64,
+    /// Length of a run without a tool [s]; with a tool the phases decide.
+    pub duration: Option<f64>,
+}
+
+/// What is written, and when.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Outputs {
+    /// Depths on the way in at which a picture is drawn [m], or times [s] in a scene without a tool.
+    pub pictures_at: Vec<f64>,
+    /// Depths on the way in at which a VTU file is written [m], or times [s] in a scene without a tool.
+    pub fields_at: Vec<f64>,
+    /// Width of a picture in pixels.
+    pub picture_width: u32,
+    /// Upper end of the colour bar [Pa]; `None`: the largest value in the picture, rounded up.
+    pub stress_scale: Option<f64>,
+}
