@@ -126,3 +126,7 @@ pub struct FieldSnapshot {
     /// Remaining stiffness per cell, 1 = intact; empty without the effect `puncture`.
     pub stiffness: Vec<f64>,
 }
+
+mod recorder;
+
+pub use recorder::Recorder;

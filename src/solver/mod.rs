@@ -1,1 +1,6 @@
-//! (being built)
+//! The step: one list of stages, two engines.
+
+pub mod cpu;
+pub mod engine;
+pub mod stable_dt;
+pub mod step;

@@ -1,0 +1,66 @@
+//! Turns the sums of a frame into a record: totals since t = 0, means over the frame.
+
+use glam::DVec3;
+
+use super::{EnergyAccount, ForceParts, FrameRecord, Health};
+use crate::model::Model;
+use crate::solver::engine::FrameSums;
+
+/// Adds up what the frames deliver, in f64.
+#[derive(Debug, Clone, Default)]
+pub struct Recorder {
+    totals: EnergyAccount,
+    contact_dissipation: f64,
+    step: u64,
+}
+
+impl Recorder {
+    /// Books one frame whose steps lasted `dt` [s] each and returns its record.
+    pub fn record(&mut self, model: &Model, dt: f64, sums: &FrameSums) -> FrameRecord {
+        let duration = f64::from(sums.steps) * dt;
+        let begin = self.step as f64 * dt;
+        self.step += u64::from(sums.steps);
+        let end = self.step as f64 * dt;
+        let e = &mut self.totals;
+        e.external += sums.tool_work + sums.load_work;
+        e.external_max = e.external_max.max(e.external.abs());
+        e.elastic = sums.elastic;
+        e.kinetic = sums.kinetic;
+        e.hourglass = sums.hourglass;
+        e.damping += sums.damping_dissipation + sums.viscous_dissipation;
+        e.friction += sums.friction_dissipation;
+        e.cutting += sums.tip_dissipation + sums.softening_dissipation;
+        self.contact_dissipation += sums.contact_dissipation;
+        e.contact = sums.contact_energy + self.contact_dissipation;
+        let mean_pose = model.kinematics.as_ref().map(|k| k.pose(0.5 * (begin + end)));
+        let direction = mean_pose.map_or(DVec3::ZERO, |p| p.direction);
+        let force = sums.impulse / duration;
+        FrameRecord {
+            frame: sums.frame,
+            step: self.step,
+            time: end,
+            depth: mean_pose.map_or(0.0, |p| p.depth),
+            phase: mean_pose.map_or(0, |p| p.phase),
+            force: ForceParts {
+                axial: force.dot(direction),
+                cutting: sums.cutting_impulse / duration,
+                spreading: sums.spreading_impulse / duration,
+                friction: sums.friction_impulse / duration,
+                lateral: force - direction * force.dot(direction),
+                torque: sums.angular_impulse / duration,
+            },
+            tip_coordinate: sums.tip_coordinate,
+            energy: *e,
+            health: Health {
+                min_j: sums.min_j,
+                min_corner_j: sums.min_corner_j,
+                inverted_cells: sums.inverted_cells,
+                inverted_cell: sums.inverted_cell,
+                clamped_nodes: sums.clamped_nodes,
+                max_speed: sums.max_speed,
+                raised_mass: sums.raised_mass,
+                not_finite: sums.not_finite,
+            },
+        }
+    }
+}

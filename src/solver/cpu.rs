@@ -1,0 +1,789 @@
+//! The CPU engine: f64, rayon, written from the equations. Reference for the tests and fallback without an adapter.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
+use super::stable_dt::fixed_components;
+use crate::error::{Error, Result};
+use crate::material::MooneyRivlin;
+use crate::material::mooney_rivlin::{cofactor, jacobian_minus_one};
+use crate::mesh::BlockMesh;
+use crate::model::{Model, PuncturePlan};
+use crate::needle::ToolPose;
+use crate::scene::{Face, Tool};
+
+/// Hourglass coefficient of a linear elastic cube, [Joldes2008] via physics of the one-point hexahedron.
+const HOURGLASS_MODULUS: f64 = 3.11;
+
+/// Corner signs (xi, eta, zeta) in the node order of `BlockMesh::cell_nodes`.
+const CORNERS: [[f64; 3]; 8] = [
+    [-1.0, -1.0, -1.0],
+    [1.0, -1.0, -1.0],
+    [1.0, 1.0, -1.0],
+    [-1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [1.0, -1.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+];
+
+/// The four hourglass base vectors at a corner: eta zeta, zeta xi, xi eta, xi eta zeta.
+fn hourglass_signs([x, y, z]: [f64; 3]) -> [f64; 4] {
+    [y * z, z * x, x * y, x * y * z]
+}
+
+/// One-point hexahedra on a rectilinear block.
+///
+/// ```text
+/// H   = sum_i u_i (x) B_i,  B_i = (xi_i/(4 dx), eta_i/(4 dy), zeta_i/(4 dz))
+/// f_i = V P B_i + hourglass,  q_m = sum_i Gamma_mi u_i / 8,  q2 = sum_m |q_m|^2
+/// E_h = 1/2 kappa 3.11 mu0 V^(1/3) q2 (1 + c/2 q2 / V^(2/3))
+/// ```
+/// Source: Flanagan & Belytschko 1981; Joldes, Wittek & Miller 2008 (total Lagrangian); the quartic term is this
+/// project's (a linear hourglass force lets surface cells fold under a needle tip).
+#[derive(Debug, Clone)]
+pub struct Elements {
+    law: MooneyRivlin,
+    /// kappa 3.11 mu0 [Pa].
+    hourglass: f64,
+    /// c.
+    quartic: f64,
+    /// Viscosity per cell edge, eta = factor rho c_p h [Pa s] with h the smallest edge of the cell.
+    viscosity_per_edge: f64,
+}
+
+/// What one cell tells about itself.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CellMeasure {
+    pub elastic: f64,
+    pub hourglass: f64,
+    pub jacobian: f64,
+    pub corner_jacobian: f64,
+}
+
+impl Elements {
+    pub fn new(model: &Model) -> Self {
+        let solver = &model.scene.solver;
+        let law = model.scene.material.law;
+        Elements {
+            law,
+            hourglass: solver.hourglass_stiffness * HOURGLASS_MODULUS * law.shear_modulus(),
+            quartic: solver.hourglass_quartic,
+            viscosity_per_edge: solver.bulk_viscosity * model.scaled_density() * model.scaled_wave_speed(),
+        }
+    }
+
+    /// Gradient operator of a corner [1/m].
+    fn gradient(size: DVec3, corner: usize) -> DVec3 {
+        DVec3::from(CORNERS[corner]) / (4.0 * size)
+    }
+
+    /// H = F - I (or its rate) at the centre of a cell.
+    fn displacement_gradient(values: &[DVec3; 8], size: DVec3) -> DMat3 {
+        let mut h = DMat3::ZERO;
+        for (i, u) in values.iter().enumerate() {
+            let b = Self::gradient(size, i);
+            h += DMat3::from_cols(*u * b.x, *u * b.y, *u * b.z);
+        }
+        h
+    }
+
+    fn hourglass_modes(values: &[DVec3; 8]) -> [DVec3; 4] {
+        let mut q = [DVec3::ZERO; 4];
+        for (u, signs) in values.iter().zip(CORNERS) {
+            for (q, gamma) in q.iter_mut().zip(hourglass_signs(signs)) {
+                *q += *u * (gamma / 8.0);
+            }
+        }
+        q
+    }
+
+    /// Bound of the stiffness that a cell adds to each of its corners [N/m]:
+    /// `V (kappa |cof B|max sum|cof B| + 4/3 mu0 max(1, I1/3) |B| sum|B|)` and the hourglass stiffness.
+    pub fn stiffness_bound(
+        &self,
+        model: &Model,
+        cell: usize,
+        cof: DMat3,
+        bulk: f64,
+        i1_third: f64,
+        q2: f64,
+    ) -> f64 {
+        let size = model.mesh.cell_size(cell);
+        let volume = size.x * size.y * size.z;
+        let inv = 0.25 / size;
+        let columns = [cof.x_axis * inv.x, cof.y_axis * inv.y, cof.z_axis * inv.z];
+        let [a, b, c] = columns;
+        let cof_b = a.length_squared()
+            + b.length_squared()
+            + c.length_squared()
+            + 2.0 * (a.dot(b).abs() + b.dot(c).abs() + c.dot(a).abs());
+        let shear = 4.0 / 3.0 * self.law.shear_modulus() * i1_third.max(1.0) * inv.length_squared();
+        let edge = volume.cbrt();
+        let hourglass = self.hourglass * edge * (1.0 + 3.0 * self.quartic * q2 / (edge * edge)) / 8.0;
+        8.0 * volume * (bulk * cof_b + shear) + hourglass
+    }
+
+    /// Forces of the cell on its corners with the minus sign of the motion left out (f_int) and the stiffness bound.
+    /// `stiffness` scales elastic and hourglass parts. Returns also the viscous power [W].
+    fn corner_forces(
+        &self,
+        model: &Model,
+        cell: usize,
+        u: &[DVec3; 8],
+        v: &[DVec3; 8],
+        stiffness: f64,
+    ) -> ([DVec3; 8], f64, f64) {
+        let size = model.mesh.cell_size(cell);
+        let volume = size.x * size.y * size.z;
+        let h = Self::displacement_gradient(u, size);
+        let mut p = self.law.first_piola_kirchhoff(h) * stiffness;
+        let mut viscous_power = 0.0;
+        if self.viscosity_per_edge > 0.0 {
+            let rate = Self::displacement_gradient(v, size);
+            let eta = self.viscosity_per_edge * size.min_element();
+            p += rate * eta;
+            let square = rate.x_axis.length_squared() + rate.y_axis.length_squared() + rate.z_axis.length_squared();
+            viscous_power = volume * eta * square;
+        }
+        let q = Self::hourglass_modes(u);
+        let q2: f64 = q.iter().map(|q| q.length_squared()).sum();
+        let edge = volume.cbrt();
+        let kh = stiffness * self.hourglass * edge * (1.0 + self.quartic * q2 / (edge * edge));
+        let force = std::array::from_fn(|i| {
+            let mut f = p * Self::gradient(size, i) * volume;
+            for (q, gamma) in q.iter().zip(hourglass_signs(CORNERS[i])) {
+                f += *q * (kh * gamma / 8.0);
+            }
+            f
+        });
+        let f = DMat3::IDENTITY + h;
+        let i1 = f.x_axis.length_squared() + f.y_axis.length_squared() + f.z_axis.length_squared();
+        let bound = self.stiffness_bound(model, cell, cofactor(f), self.law.bulk_modulus, i1 / 3.0, q2);
+        (force, bound * stiffness, viscous_power)
+    }
+
+    /// Energies and Jacobians of one cell; `stiffness` scales the energies.
+    pub fn measure(&self, mesh: &BlockMesh, cell: usize, u: &[DVec3; 8], stiffness: f64) -> CellMeasure {
+        let size = mesh.cell_size(cell);
+        let volume = size.x * size.y * size.z;
+        let h = Self::displacement_gradient(u, size);
+        let q2: f64 = Self::hourglass_modes(u).iter().map(|q| q.length_squared()).sum();
+        let edge = volume.cbrt();
+        let e2 = edge * edge;
+        // Edges that meet in a corner, each along its axis: node order of `cell_nodes`.
+        const NEIGHBOURS: [[usize; 3]; 8] = [
+            [1, 3, 4],
+            [0, 2, 5],
+            [3, 1, 6],
+            [2, 0, 7],
+            [5, 7, 0],
+            [4, 6, 1],
+            [7, 5, 2],
+            [6, 4, 3],
+        ];
+        let corner_jacobian = (0..8)
+            .map(|i| {
+                let column = |a: usize| {
+                    let du = u[NEIGHBOURS[i][a]] - u[i];
+                    let mut unit = DVec3::ZERO;
+                    unit[a] = 1.0;
+                    unit - du * (CORNERS[i][a] / size[a])
+                };
+                DMat3::from_cols(column(0), column(1), column(2)).determinant()
+            })
+            .fold(f64::INFINITY, f64::min);
+        CellMeasure {
+            elastic: stiffness * volume * self.law.energy_density(h),
+            hourglass: stiffness * 0.5 * self.hourglass * edge * q2 * (1.0 + 0.5 * self.quartic * q2 / e2),
+            jacobian: 1.0 + jacobian_minus_one(h),
+            corner_jacobian,
+        }
+    }
+
+    /// Internal nodal forces f_int [N] of a displacement field; `stiffness` per cell, empty = all intact.
+    pub fn internal_forces(
+        &self,
+        model: &Model,
+        u: &[DVec3],
+        v: &[DVec3],
+        stiffness: &[f64],
+    ) -> Vec<DVec3> {
+        let mesh = &model.mesh;
+        let corner: Vec<[DVec3; 8]> = (0..mesh.cell_count())
+            .into_par_iter()
+            .map(|cell| {
+                let nodes = mesh.cell_nodes(cell);
+                let (f, _, _) = self.corner_forces(
+                    model,
+                    cell,
+                    &nodes.map(|n| u[n]),
+                    &nodes.map(|n| v[n]),
+                    stiffness.get(cell).copied().unwrap_or(1.0),
+                );
+                f
+            })
+            .collect();
+        let mut force = vec![DVec3::ZERO; mesh.node_count()];
+        for (cell, f) in corner.iter().enumerate() {
+            for (node, f) in mesh.cell_nodes(cell).into_iter().zip(f) {
+                force[node] += *f;
+            }
+        }
+        force
+    }
+}
+
+/// Per-cell result of the element stage.
+#[derive(Debug, Clone, Copy, Default)]
+struct CellForces {
+    force: [DVec3; 8],
+    bound: f64,
+    viscous_power: f64,
+}
+
+/// Sums of one contact node over one step.
+#[derive(Debug, Clone, Copy, Default)]
+struct ContactSums {
+    /// Forces on the tissue [N].
+    tip: DVec3,
+    normal: DVec3,
+    friction: DVec3,
+    /// Torque about the tip [N m].
+    torque: DVec3,
+    friction_work: f64,
+    damping_power: f64,
+    stored: f64,
+}
+
+/// The f64 engine.
+pub struct CpuEngine {
+    model: Arc<Model>,
+    elements: Elements,
+    dt: f64,
+    info: EngineInfo,
+    state: State,
+    cells: Vec<CellForces>,
+    external: Vec<DVec3>,
+    tip_forces: Vec<(f64, [usize; 8], [f64; 8])>,
+    tip_energy: f64,
+    contact_energy: f64,
+    finished: std::collections::VecDeque<FrameSums>,
+    sums: FrameSums,
+}
+
+impl CpuEngine {
+    /// A model at rest, advanced with steps of `dt` [s].
+    pub fn new(model: Arc<Model>, dt: f64) -> Self {
+        let nodes = model.mesh.node_count();
+        let cells = model.mesh.cell_count();
+        let state = State {
+            displacement: vec![DVec3::ZERO; nodes],
+            velocity: vec![DVec3::ZERO; nodes],
+            stiffness: if model.puncture.is_some() { vec![1.0; cells] } else { Vec::new() },
+            tip_coordinate: 0.0,
+            contact: vec![ContactState::default(); model.contact_nodes.len()],
+        };
+        let bytes = nodes * (3 * size_of::<DVec3>() + 8)
+            + cells * size_of::<CellForces>()
+            + state.stiffness.len() * 8
+            + state.contact.len() * (size_of::<ContactState>() + size_of::<ContactSums>());
+        CpuEngine {
+            elements: Elements::new(&model),
+            dt,
+            info: EngineInfo {
+                engine: "cpu".into(),
+                adapter: format!("{} CPU threads, f64", rayon::current_num_threads()),
+                driver: format!("stylet {}", env!("CARGO_PKG_VERSION")),
+                device_bytes: bytes as u64,
+                software: true,
+            },
+            state,
+            cells: vec![CellForces::default(); cells],
+            external: vec![DVec3::ZERO; nodes],
+            tip_forces: Vec::new(),
+            tip_energy: 0.0,
+            contact_energy: 0.0,
+            finished: Default::default(),
+            sums: FrameSums::default(),
+            model,
+        }
+    }
+
+    /// One step: the list of stages.
+    fn step(&mut self, input: &StepInput) {
+        let model = self.model.clone();
+        self.external.fill(DVec3::ZERO);
+        if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
+            self.advance_tip(plan, &pose);
+            self.soften_path(plan);
+        }
+        self.element_forces();
+        if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
+            self.needle_contact(plan, &pose);
+        }
+        if let (Some(_), Some(pose)) = (model.effects.indentation, input.pose) {
+            self.indenter_contact(&pose);
+        }
+        self.integrate_nodes(input);
+    }
+
+    /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction`.
+    fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> ([usize; 8], [f64; 8], [f64; 8]) {
+        let (mut c, mut xi, mut width) = ([0; 3], [0.0; 3], [0.0; 3]);
+        for a in 0..3 {
+            let lines = &mesh.lines[a];
+            let i = lines.partition_point(|l| *l <= x[a]).clamp(1, lines.len() - 1) - 1;
+            c[a] = i;
+            width[a] = lines[i + 1] - lines[i];
+            xi[a] = ((x[a] - lines[i]) / width[a]).clamp(0.0, 1.0);
+        }
+        let nodes = mesh.cell_nodes(mesh.cell_index(c[0], c[1], c[2]));
+        let (mut weight, mut slope) = ([0.0; 8], [0.0; 8]);
+        for (i, signs) in CORNERS.iter().enumerate() {
+            let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (xi[a] - 0.5));
+            let d: [f64; 3] = std::array::from_fn(|a| signs[a] * direction[a] / width[a]);
+            weight[i] = n[0] * n[1] * n[2];
+            slope[i] = d[0] * n[1] * n[2] + n[0] * d[1] * n[2] + n[0] * n[1] * d[2];
+        }
+        (nodes, weight, slope)
+    }
+
+    /// Stage `advance_tip`: each anchor k carries a spring between the tip plane and the material point at `a`.
+    ///
+    /// `g_k = max(0, (p_tip - x_k).t)`, `F = k_tip/N sum g_k`, threshold `F_c(a)` falls from F_pun to F_cut over l_p;
+    /// where F > F_c: `a += min((F - F_c) / (k_tip lambda), cap)`, `lambda = <dx_k/da . t>` clamped to 0.2..3.
+    fn advance_tip(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
+        let model = self.model.clone();
+        let mesh = &model.mesh;
+        let u = &self.state.displacement;
+        let t = pose.direction;
+        let spring = plan.params.tip_stiffness / plan.anchors.len() as f64;
+        let tip_axial = (pose.tip - plan.path.entry).dot(t);
+        let gaps = |a: f64| -> Vec<(f64, f64, [usize; 8], [f64; 8])> {
+            plan.anchors
+                .iter()
+                .map(|anchor| {
+                    let x = anchor.surface + t * a;
+                    let (nodes, weight, slope) = Self::locate(mesh, x, t);
+                    let (mut du, mut stretch) = (0.0, 1.0);
+                    for i in 0..8 {
+                        let along = u[nodes[i]].dot(t);
+                        du += weight[i] * along;
+                        stretch += slope[i] * along;
+                    }
+                    ((tip_axial - a - du).max(0.0), stretch, nodes, weight)
+                })
+                .collect()
+        };
+        let a = self.state.tip_coordinate;
+        let mut springs = gaps(a);
+        let force: f64 = springs.iter().map(|s| spring * s.0).sum();
+        let p = &plan.params;
+        let threshold = p.cutting_force
+            + (p.puncture_force - p.cutting_force) * (1.0 - a / p.transition_length).max(0.0);
+        if force > threshold {
+            let lambda = springs.iter().map(|s| s.1).sum::<f64>() / springs.len() as f64;
+            let speed = pose.velocity.length();
+            let cap = if a == 0.0 { 0.005e-3 } else { 0.013e-3 };
+            let cap = f64::min(cap, 4.0 * speed * self.dt);
+            let advance = ((force - threshold) / (p.tip_stiffness * lambda.clamp(0.2, 3.0))).min(cap);
+            self.state.tip_coordinate = a + advance;
+            let before = springs;
+            springs = gaps(a + advance);
+            // Force after the advance times the loss of stretch: with the force of the next step this closes the
+            // trapezoidal rule of the leapfrog work; the loss of spring energy would count half a step twice.
+            let lost = before.iter().zip(&springs).map(|(b, s)| spring * s.0 * (b.0 - s.0));
+            self.sums.tip_dissipation += lost.sum::<f64>();
+        }
+        self.tip_energy = springs.iter().map(|s| 0.5 * spring * s.0 * s.0).sum();
+        self.tip_forces = springs.into_iter().map(|s| (spring * s.0, s.2, s.3)).collect();
+    }
+
+    /// Stage `soften_path`: factor `max(residual, 1 - phi ramp(a))`; the energy that a cell loses is dissipated.
+    fn soften_path(&mut self, plan: &PuncturePlan) {
+        let a = self.state.tip_coordinate;
+        for path_cell in &plan.cells {
+            let cell = path_cell.cell as usize;
+            let length = path_cell.axial_end - path_cell.axial_start;
+            let ramp = ((a - path_cell.axial_start) / length.max(1e-9)).clamp(0.0, 1.0);
+            let factor = (1.0 - path_cell.fraction * ramp).max(plan.params.residual_stiffness);
+            let old = self.state.stiffness[cell];
+            if factor < old {
+                // Half a step back: the mean of the energies before and after the step, as the leapfrog work has it.
+                let half = 0.5 * self.dt;
+                let u = self.model.mesh.cell_nodes(cell).map(|n| {
+                    self.state.displacement[n] - self.state.velocity[n] * half
+                });
+                let m = self.elements.measure(&self.model.mesh, cell, &u, 1.0);
+                self.sums.softening_dissipation += (old - factor) * (m.elastic + m.hourglass);
+                self.state.stiffness[cell] = factor;
+            }
+        }
+    }
+
+    /// Stage `element_forces`.
+    fn element_forces(&mut self) {
+        let (model, elements, state) = (&self.model, &self.elements, &self.state);
+        self.cells.par_iter_mut().with_min_len(256).enumerate().for_each(|(cell, out)| {
+            let nodes = model.mesh.cell_nodes(cell);
+            let (force, bound, viscous_power) = elements.corner_forces(
+                model,
+                cell,
+                &nodes.map(|n| state.displacement[n]),
+                &nodes.map(|n| state.velocity[n]),
+                state.stiffness.get(cell).copied().unwrap_or(1.0),
+            );
+            *out = CellForces { force, bound, viscous_power };
+        });
+        self.sums.viscous_dissipation += self.dt * self.cells.iter().map(|c| c.viscous_power).sum::<f64>();
+    }
+
+    /// Stage `needle_contact`: nodes of the ring that the tip has passed keep `r >= r_e(s)`,
+    /// `r_e = sqrt(r0^2 + rc(s)^2) - overlap fade(s)`, `rc = R min(1, s/Lc)`; friction on the shaft; tip springs.
+    fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
+        let model = self.model.clone();
+        let d = -pose.direction;
+        let k = plan.contact_stiffness;
+        let a = self.state.tip_coordinate;
+        let (radius, cone) = (plan.needle.radius, plan.needle.tip_length);
+        let mut stored = self.tip_energy;
+        let mut tip_on_node: std::collections::HashMap<usize, f64> = Default::default();
+        for (force, nodes, weights) in &self.tip_forces {
+            for (n, w) in nodes.iter().zip(weights) {
+                *tip_on_node.entry(*n).or_default() += force * w;
+            }
+        }
+        for (contact, memory) in model.contact_nodes.iter().zip(&mut self.state.contact) {
+            let node = contact.node as usize;
+            let x = model.mesh.rest_position(node) + self.state.displacement[node];
+            let mut sums = ContactSums::default();
+            if let Some(f) = tip_on_node.get(&node) {
+                sums.tip = pose.direction * *f;
+            }
+            let relative = x - pose.tip;
+            let s = relative.dot(d);
+            if !(contact.pushed && contact.rest_axial < a && s > 0.0) {
+                *memory = ContactState::default();
+            } else {
+                let radial = relative - d * s;
+                let r = radial.length();
+                let e = if r > 1e-9 { radial / r } else { DVec3::ZERO };
+                let (rc, slope) = if s < cone { (radius * s / cone, radius / cone) } else { (radius, 0.0) };
+                let open = (contact.rest_radius.powi(2) + rc * rc).sqrt();
+                if !memory.touching {
+                    memory.touching = true;
+                    memory.overlap = (open - r).max(0.0);
+                    memory.axial_on = s;
+                }
+                let travel = (s - memory.axial_on) / plan.params.entry_fade;
+                let fade = (1.0 - travel).clamp(0.0, 1.0);
+                let target = open - memory.overlap * fade;
+                let fading = if travel > 0.0 && travel < 1.0 { memory.overlap / plan.params.entry_fade } else { 0.0 };
+                let m = rc * slope / open + fading;
+                let scale = 1.0 / (1.0 + m * m).sqrt();
+                let n = (e - d * m) * scale;
+                let depth = (target - r) * scale;
+                let v = self.state.velocity[node] - pose.velocity;
+                let vn = v.dot(n);
+                let mass = model.node_mass[node];
+                let damping = 2.0 * plan.params.contact_damping * (k * mass).sqrt();
+                let normal = if depth > 0.0 { (k * depth - damping * vn).max(0.0) } else { 0.0 };
+                sums.normal = n * normal;
+                if depth > 0.0 {
+                    sums.stored = 0.5 * k * depth * depth;
+                    sums.damping_power = (k * depth - normal) * vn;
+                }
+                memory.stick = match model.effects.friction {
+                    Some(friction) if normal > 0.0 => {
+                        let kt = friction.stiffness_ratio * k;
+                        let mu = friction.coefficient * ((s - cone) / friction.fade_length).clamp(0.0, 1.0);
+                        let trial = memory.stick + (v - n * vn) * self.dt;
+                        let trial = trial - n * trial.dot(n);
+                        let length = trial.length();
+                        let allowed = mu * normal / kt;
+                        let stretch = if length > allowed { trial * (allowed / length) } else { trial };
+                        sums.friction = stretch * -kt;
+                        // Friction force times slip.
+                        sums.friction_work = kt * stretch.dot(trial - stretch);
+                        sums.stored += 0.5 * kt * stretch.length_squared();
+                        stretch
+                    }
+                    _ => DVec3::ZERO,
+                };
+            }
+            let total = sums.tip + sums.normal + sums.friction;
+            sums.torque = relative.cross(total);
+            self.external[node] += total;
+            stored += sums.stored;
+            self.sums.book(&sums, pose, self.dt);
+        }
+        self.contact_energy = stored;
+    }
+
+    /// Stage `indenter_contact`: penalty contact of the top face with a sphere or a flat punch.
+    fn indenter_contact(&mut self, pose: &ToolPose) {
+        let model = self.model.clone();
+        let (Some(params), Some(tool)) = (model.effects.indentation, &model.scene.tool) else { return };
+        let k = model.tool_contact_stiffness();
+        let mut stored = 0.0;
+        for (contact, memory) in model.contact_nodes.iter().zip(&mut self.state.contact) {
+            let node = contact.node as usize;
+            let x = model.mesh.rest_position(node) + self.state.displacement[node];
+            let (depth, n, bonded) = match *tool {
+                Tool::Sphere { radius } => {
+                    let centre = pose.tip - pose.direction * radius;
+                    let to = x - centre;
+                    let length = to.length();
+                    (radius - length, to / length, false)
+                }
+                Tool::FlatPunch { radius, bonded } => {
+                    let s = (pose.tip - x).dot(pose.direction);
+                    let inside = contact.rest_radius <= radius;
+                    (if inside { s } else { -1.0 }, pose.direction, bonded)
+                }
+                Tool::Needle(_) => return,
+            };
+            let v = self.state.velocity[node] - pose.velocity;
+            let vn = v.dot(n);
+            let damping = 2.0 * params.contact_damping * (k * model.node_mass[node]).sqrt();
+            let mut sums = ContactSums::default();
+            if bonded && (memory.touching || depth > 0.0) {
+                memory.touching = true;
+                memory.stick += (v - n * vn) * self.dt;
+                sums.normal = n * (k * depth) - v * damping - memory.stick * k;
+                sums.damping_power = damping * v.length_squared();
+                sums.stored = 0.5 * k * (depth * depth + memory.stick.length_squared());
+            } else if depth > 0.0 {
+                memory.touching = true;
+                let normal = (k * depth - damping * vn).max(0.0);
+                sums.normal = n * normal;
+                sums.damping_power = (k * depth - normal) * vn;
+                sums.stored = 0.5 * k * depth * depth;
+                if let Some(friction) = model.effects.friction {
+                    let kt = friction.stiffness_ratio * k;
+                    let trial = memory.stick + (v - n * vn) * self.dt;
+                    let trial = trial - n * trial.dot(n);
+                    let length = trial.length();
+                    let allowed = friction.coefficient * normal / kt;
+                    memory.stick = if length > allowed { trial * (allowed / length) } else { trial };
+                    sums.friction = memory.stick * -kt;
+                    sums.friction_work = kt * memory.stick.dot(trial - memory.stick);
+                    sums.stored += 0.5 * kt * memory.stick.length_squared();
+                }
+            } else {
+                *memory = ContactState::default();
+            }
+            let total = sums.normal + sums.friction;
+            sums.torque = (x - pose.tip).cross(total);
+            self.external[node] += total;
+            stored += sums.stored;
+            self.sums.book(&sums, pose, self.dt);
+        }
+        self.contact_energy = stored;
+    }
+
+    /// Stage `integrate_nodes`: `v+ = ((1 - alpha dt/2) v + dt f/m) / (1 + alpha dt/2)`, `u+ = u + dt v+`.
+    fn integrate_nodes(&mut self, input: &StepInput) {
+        let model = self.model.clone();
+        let mesh = &model.mesh;
+        let dt = self.dt;
+        let alpha = model.scene.solver.mass_damping;
+        let limit = model.speed_limit(dt);
+        let selective = model.effects.mass_scaling.is_some();
+        let gravity = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling());
+        let [nx, ny, nz] = mesh.cells();
+        let cells = &self.cells;
+        let external = &self.external;
+        let result: (f64, f64, u32, u32) = self
+            .state
+            .displacement
+            .par_iter_mut()
+            .zip(self.state.velocity.par_iter_mut())
+            .enumerate()
+            .with_min_len(256)
+            .map(|(node, (u, v))| {
+                let [i, j, k] = mesh.node_coordinates(node);
+                let (mut force, mut bound) = (DVec3::ZERO, 0.0);
+                for (corner, signs) in CORNERS.iter().enumerate() {
+                    // The cell of which this node is `corner` lies on the other side of the sign.
+                    let at = |n: usize, s: f64, count: usize| {
+                        if s < 0.0 { (n < count).then_some(n) } else { n.checked_sub(1) }
+                    };
+                    if let (Some(i), Some(j), Some(k)) =
+                        (at(i, signs[0], nx), at(j, signs[1], ny), at(k, signs[2], nz))
+                    {
+                        let cell = &cells[mesh.cell_index(i, j, k)];
+                        force -= cell.force[corner];
+                        bound += cell.bound;
+                    }
+                }
+                let scaled = model.node_mass[node];
+                let mut load = gravity * scaled;
+                if let Some(f) = model.node_load.get(node) {
+                    load += *f * input.load_factor;
+                }
+                force += external[node] + load;
+                let mut mass = scaled;
+                let mut raised = 0;
+                if selective {
+                    let needed = bound * dt * dt / (4.0 * 0.81);
+                    if needed > scaled {
+                        mass = needed.min(100.0 * scaled);
+                        raised = 1;
+                    }
+                }
+                let old = *v;
+                let mut new = (old * (1.0 - 0.5 * alpha * dt) + force * (dt / mass)) / (1.0 + 0.5 * alpha * dt);
+                let speed = new.length();
+                let mut clamped = 0;
+                if speed > limit {
+                    new *= limit / speed;
+                    clamped = 1;
+                }
+                let mut free_mid = 0.5 * (old + new);
+                let mut work = 0.0;
+                let fixed = fixed_components(&model, node);
+                if fixed.contains(&true) {
+                    let prescribed = prescribed_velocity(&model, node, input, dt);
+                    for a in 0..3 {
+                        if fixed[a] {
+                            // Reaction: what the support must add to move the node as prescribed.
+                            let mid = 0.5 * (old[a] + prescribed[a]);
+                            let reaction = mass * (prescribed[a] - old[a]) / dt - force[a];
+                            work += reaction * mid * dt;
+                            new[a] = prescribed[a];
+                            free_mid[a] = 0.0;
+                        }
+                    }
+                }
+                let mid = 0.5 * (old + new);
+                work += load.dot(mid) * dt;
+                *v = new;
+                *u += new * dt;
+                (alpha * mass * free_mid.length_squared() * dt, work, clamped, raised)
+            })
+            .reduce(
+                || (0.0, 0.0, 0, 0),
+                |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3),
+            );
+        self.sums.damping_dissipation += result.0;
+        self.sums.load_work += result.1;
+        self.sums.clamped_nodes += result.2;
+        self.sums.raised_mass += result.3;
+    }
+
+    /// Stages `measure_cells`, `measure_nodes`, `measure_contact`.
+    fn measure(&mut self) {
+        let (model, elements, state) = (&self.model, &self.elements, &self.state);
+        let measures: Vec<CellMeasure> = (0..model.mesh.cell_count())
+            .into_par_iter()
+            .map(|cell| {
+                let u = model.mesh.cell_nodes(cell).map(|n| state.displacement[n]);
+                let stiffness = state.stiffness.get(cell).copied().unwrap_or(1.0);
+                elements.measure(&model.mesh, cell, &u, stiffness)
+            })
+            .collect();
+        let sums = &mut self.sums;
+        sums.elastic = measures.iter().map(|m| m.elastic).sum();
+        sums.hourglass = measures.iter().map(|m| m.hourglass).sum();
+        sums.min_j = measures.iter().map(|m| m.jacobian).fold(f64::INFINITY, f64::min);
+        sums.min_corner_j = measures.iter().map(|m| m.corner_jacobian).fold(f64::INFINITY, f64::min);
+        let inverted = |m: &CellMeasure| m.jacobian <= 0.0 || m.corner_jacobian <= 0.0;
+        sums.inverted_cells = measures.iter().filter(|m| inverted(m)).count() as u32;
+        sums.inverted_cell = measures.iter().position(inverted).map(|c| c as u32);
+        sums.kinetic = state
+            .velocity
+            .iter()
+            .zip(&model.node_mass)
+            .map(|(v, m)| 0.5 * m * v.length_squared())
+            .sum();
+        sums.max_speed = state.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
+        sums.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
+        sums.contact_energy = self.contact_energy;
+        sums.tip_coordinate = state.tip_coordinate;
+    }
+}
+
+impl FrameSums {
+    fn book(&mut self, c: &ContactSums, pose: &ToolPose, dt: f64) {
+        let total = c.tip + c.normal + c.friction;
+        self.cutting_impulse += c.tip.dot(pose.direction) * dt;
+        self.spreading_impulse += c.normal.dot(pose.direction) * dt;
+        self.friction_impulse += c.friction.dot(pose.direction) * dt;
+        self.impulse += total * dt;
+        self.angular_impulse += c.torque * dt;
+        self.tool_work += total.dot(pose.velocity) * dt;
+        self.friction_dissipation += c.friction_work;
+        self.contact_dissipation += c.damping_power * dt;
+    }
+}
+
+/// Velocity that the driven faces prescribe at a node (zero where a face only holds) [m/s].
+fn prescribed_velocity(model: &Model, node: usize, input: &StepInput, dt: f64) -> DVec3 {
+    let c = model.mesh.node_coordinates(node);
+    let n = model.mesh.nodes();
+    let mut velocity = DVec3::ZERO;
+    for face in Face::ALL {
+        let axis = face.axis();
+        if c[axis] != if face.is_max() { n[axis] - 1 } else { 0 }
+            || model.faces()[face as usize].drive.is_none()
+        {
+            continue;
+        }
+        let drive = input.drives[face as usize];
+        let arm = model.mesh.rest_position(node) - model.face_centre(face);
+        let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut du = drive.translation;
+        du[b] += drive.cosine * arm[b] - drive.sine * arm[c];
+        du[c] += drive.sine * arm[b] + drive.cosine * arm[c];
+        velocity += du / dt;
+    }
+    velocity
+}
+
+impl Engine for CpuEngine {
+    fn info(&self) -> &EngineInfo {
+        &self.info
+    }
+
+    fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {
+        self.sums = FrameSums {
+            frame: plan.frame,
+            steps: plan.steps.len() as u32,
+            ..Default::default()
+        };
+        for input in &plan.steps {
+            self.step(input);
+        }
+        self.measure();
+        self.finished.push_back(self.sums);
+        Ok(())
+    }
+
+    fn collect(&mut self, _wait: bool) -> Result<Option<FrameSums>> {
+        Ok(self.finished.pop_front())
+    }
+
+    fn read_state(&mut self) -> Result<State> {
+        Ok(self.state.clone())
+    }
+
+    fn write_state(&mut self, state: &State) -> Result<()> {
+        if state.displacement.len() != self.state.displacement.len() {
+            return Err(Error::Device("state of another mesh".into()));
+        }
+        self.state = state.clone();
+        Ok(())
+    }
+
+    fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
+        let zero = vec![DVec3::ZERO; self.state.displacement.len()];
+        Ok(self
+            .elements
+            .internal_forces(&self.model, &self.state.displacement, &zero, &self.state.stiffness))
+    }
+}

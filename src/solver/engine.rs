@@ -1,0 +1,166 @@
+//! What both engines offer, and what passes between them and the run.
+
+use glam::DVec3;
+
+use crate::error::Result;
+use crate::model::Model;
+use crate::needle::ToolPose;
+use crate::scene::Face;
+
+/// What is given to one step from outside: the only place where user input enters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepInput {
+    /// Tool pose at the beginning of the step, where forces are evaluated.
+    pub pose: Option<ToolPose>,
+    /// Increment of the ramped loads' factor: value at the beginning of the step, 0..1.
+    pub load_factor: f64,
+    /// Motion of the driven faces during the step.
+    pub drives: [DriveStep; 6],
+}
+
+/// Displacement increment of a driven face during one step: `du = translation + (R1 - R0)(X - c)`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DriveStep {
+    /// Translation increment [m].
+    pub translation: DVec3,
+    /// cos(theta1) - cos(theta0) and sin(theta1) - sin(theta0).
+    pub cosine: f64,
+    pub sine: f64,
+}
+
+/// One display frame of steps.
+#[derive(Debug, Clone)]
+pub struct FramePlan {
+    /// Frame number.
+    pub frame: u64,
+    /// Steps before this frame.
+    pub first_step: u64,
+    /// One entry per step.
+    pub steps: Vec<StepInput>,
+}
+
+impl StepInput {
+    /// Input of the step that begins at `time` [s] and lasts `dt` [s].
+    pub fn at(model: &Model, time: f64, dt: f64) -> Self {
+        let ramp = |t: f64, duration: f64| {
+            if duration > 0.0 { (t / duration).clamp(0.0, 1.0) } else { 1.0 }
+        };
+        let mut drives = [DriveStep::default(); 6];
+        for face in Face::ALL {
+            let Some(drive) = model.faces()[face as usize].drive else { continue };
+            let (s0, s1) = (ramp(time, drive.duration), ramp(time + dt, drive.duration));
+            let (t0, t1) = (drive.rotation * s0, drive.rotation * s1);
+            drives[face as usize] = DriveStep {
+                translation: drive.displacement * (s1 - s0),
+                cosine: t1.cos() - t0.cos(),
+                sine: t1.sin() - t0.sin(),
+            };
+        }
+        StepInput {
+            pose: model.kinematics.as_ref().map(|k| k.pose(time)),
+            load_factor: ramp(time, model.load_ramp),
+            drives,
+        }
+    }
+}
+
+/// Sums over one frame as an engine delivers them. "Total" fields are values at the end of the frame, the others
+/// sums over the steps of the frame. SI.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FrameSums {
+    pub frame: u64,
+    pub steps: u32,
+    /// Impulse on the tissue [N s]: tip springs, contact normals, friction, each along the insertion direction.
+    pub cutting_impulse: f64,
+    pub spreading_impulse: f64,
+    pub friction_impulse: f64,
+    /// Whole impulse [N s] and angular impulse about the tip [N m s], world frame.
+    pub impulse: DVec3,
+    pub angular_impulse: DVec3,
+    /// Work done by the tool [J].
+    pub tool_work: f64,
+    /// Dissipated by friction, by contact damping, by the tip law, by softening [J].
+    pub friction_dissipation: f64,
+    pub contact_dissipation: f64,
+    pub tip_dissipation: f64,
+    pub softening_dissipation: f64,
+    /// Total: stored in contact, stick and tip springs [J].
+    pub contact_energy: f64,
+    /// Total: material coordinate a of the tip [m].
+    pub tip_coordinate: f64,
+    /// Total: elastic and hourglass energy [J].
+    pub elastic: f64,
+    pub hourglass: f64,
+    /// Dissipated by bulk viscosity [J].
+    pub viscous_dissipation: f64,
+    /// Total: kinetic energy [J].
+    pub kinetic: f64,
+    /// Dissipated by mass damping [J].
+    pub damping_dissipation: f64,
+    /// Work of driven faces, tractions and gravity [J].
+    pub load_work: f64,
+    /// Health of the state at the end of the frame.
+    pub min_j: f64,
+    pub min_corner_j: f64,
+    pub inverted_cells: u32,
+    pub inverted_cell: Option<u32>,
+    pub clamped_nodes: u32,
+    pub raised_mass: u32,
+    pub max_speed: f64,
+    pub not_finite: bool,
+}
+
+/// The state that both engines can give and take, in f64 and SI, node order of the mesh.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct State {
+    /// Displacement u [m].
+    pub displacement: Vec<DVec3>,
+    /// Velocity v at the last half step [m/s].
+    pub velocity: Vec<DVec3>,
+    /// Remaining stiffness per cell; empty without `puncture`.
+    pub stiffness: Vec<f64>,
+    /// Material coordinate of the tip [m].
+    pub tip_coordinate: f64,
+    /// Memory per contact node: stretch of the stick spring [m], overlap at activation [m], axial position at
+    /// activation [m]; `touching` tells whether the last two are set.
+    pub contact: Vec<ContactState>,
+}
+
+/// Memory of one contact node.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ContactState {
+    pub stick: DVec3,
+    pub overlap: f64,
+    pub axial_on: f64,
+    pub touching: bool,
+}
+
+/// What an engine tells about itself.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EngineInfo {
+    /// `gpu` or `cpu`.
+    pub engine: String,
+    pub adapter: String,
+    pub driver: String,
+    /// Bytes of all buffers on the device (or of the arrays of the CPU engine).
+    pub device_bytes: u64,
+    /// True for a software adapter.
+    pub software: bool,
+}
+
+/// A solver that can advance a model. Frames are started in order; results come in the same order, possibly a
+/// frame or two later.
+pub trait Engine {
+    fn info(&self) -> &EngineInfo;
+    /// Starts one frame. Returns as soon as the work is submitted.
+    fn start_frame(&mut self, plan: &FramePlan) -> Result<()>;
+    /// The next finished frame. With `wait`, blocks until one is there; `None` when none is under way (or
+    /// finished, without `wait`).
+    fn collect(&mut self, wait: bool) -> Result<Option<FrameSums>>;
+    /// The present state (waits for all frames under way).
+    fn read_state(&mut self) -> Result<State>;
+    /// Replaces the state, for tests, resumed runs and bisecting.
+    fn write_state(&mut self, state: &State) -> Result<()>;
+    /// Internal nodal forces of the present displacement, `f_int` [N] (the tissue pushes the node with -f_int).
+    fn internal_forces(&mut self) -> Result<Vec<DVec3>>;
+}

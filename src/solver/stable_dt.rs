@@ -1,0 +1,104 @@
+//! The stable time step, computed before the run.
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use super::cpu::Elements;
+use crate::model::Model;
+
+/// Both bounds of the undamped central difference at rest [s].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StableStep {
+    /// From the Gershgorin bound of the nodal stiffness: `2 sqrt(m / k)`, a lower bound of the stable step. The
+    /// run takes this one times the safety factor, because squeezed cells stiffen (measured: README, Solver).
+    pub wave_speed: f64,
+    /// From power iteration on M^-1 K: `2 / omega_max`, converging to the true limit from above.
+    pub power_iteration: f64,
+}
+
+/// Computes both bounds for a model at rest.
+pub fn stable_step(model: &Model) -> StableStep {
+    let elements = Elements::new(model);
+    let law = &model.scene.material.law;
+    let mut bound = vec![0.0; model.mesh.node_count()];
+    for cell in 0..model.mesh.cell_count() {
+        let k = elements.stiffness_bound(model, cell, DMat3::IDENTITY, law.bulk_modulus, 1.0, 0.0);
+        for node in model.mesh.cell_nodes(cell) {
+            bound[node] += k;
+        }
+    }
+    let wave_speed = bound
+        .iter()
+        .zip(&model.node_mass)
+        .map(|(k, m)| 2.0 * (m / k).sqrt())
+        .fold(f64::INFINITY, f64::min);
+    StableStep {
+        wave_speed,
+        power_iteration: power_iteration(model, &elements),
+    }
+}
+
+/// Largest eigenfrequency of the linearised block by power iteration with central differences of the forces.
+fn power_iteration(model: &Model, elements: &Elements) -> f64 {
+    const ITERATIONS: usize = 60;
+    let count = model.mesh.node_count();
+    let smallest = model.smallest_edge();
+    // A checkerboard start is close to the highest mode; the perturbation breaks its symmetry.
+    let mut mode: Vec<DVec3> = (0..count)
+        .map(|n| {
+            let [i, j, k] = model.mesh.node_coordinates(n);
+            let sign = if (i + j + k) % 2 == 0 { 1.0 } else { -1.0 };
+            let ripple = ((n * 2654435761) % 1000) as f64 * 1e-3;
+            DVec3::new(sign, sign * (0.5 + 0.3 * ripple), 0.7 * sign - 0.2 * ripple)
+        })
+        .collect();
+    let mut omega_squared = 0.0;
+    let zero = vec![DVec3::ZERO; count];
+    for _ in 0..ITERATIONS {
+        for (node, value) in mode.iter_mut().enumerate() {
+            let fixed = fixed_components(model, node);
+            for a in 0..3 {
+                if fixed[a] {
+                    value[a] = 0.0;
+                }
+            }
+        }
+        let largest = mode.iter().map(|v| v.length()).fold(0.0, f64::max);
+        if largest == 0.0 {
+            return f64::INFINITY;
+        }
+        let scale = 1e-5 * smallest / largest;
+        let u: Vec<DVec3> = mode.iter().map(|v| *v * scale).collect();
+        let force = elements.internal_forces(model, &u, &zero, &[]);
+        let next: Vec<DVec3> = force
+            .par_iter()
+            .zip(&model.node_mass)
+            .map(|(f, m)| *f / (*m * scale))
+            .collect();
+        // Rayleigh quotient with the mass matrix.
+        let (mut top, mut bottom) = (0.0, 0.0);
+        for ((v, a), m) in mode.iter().zip(&next).zip(&model.node_mass) {
+            top += m * v.dot(*a);
+            bottom += m * v.length_squared();
+        }
+        omega_squared = top / bottom;
+        mode = next;
+    }
+    2.0 / omega_squared.sqrt()
+}
+
+/// Which displacement components of a node are held or driven by a face.
+pub fn fixed_components(model: &Model, node: usize) -> [bool; 3] {
+    let c = model.mesh.node_coordinates(node);
+    let n = model.mesh.nodes();
+    let mut fixed = [false; 3];
+    for face in crate::scene::Face::ALL {
+        let a = face.axis();
+        if c[a] == if face.is_max() { n[a] - 1 } else { 0 } {
+            for (f, g) in fixed.iter_mut().zip(model.faces()[face as usize].fixed) {
+                *f |= g;
+            }
+        }
+    }
+    fixed
+}

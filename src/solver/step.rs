@@ -1,0 +1,59 @@
+//! The list of stages of one step, and of the measurements at the end of a frame.
+
+/// One stage of the step. Name = file stem in `shaders/stages` = pipeline label = timing label.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Tip law: springs between tip and anchors, threshold, advance of the material tip coordinate.
+    AdvanceTip,
+    /// Cells that the tip has passed lose stiffness; their energy is booked as cutting.
+    SoftenPath,
+    /// Stress, hourglass force and stiffness bound of every cell, as forces on its corners.
+    ElementForces,
+    /// Contact of cone and shaft with the opened path, friction, and tip springs on the nodes.
+    NeedleContact,
+    /// Contact of a sphere or flat punch with the top face.
+    IndenterContact,
+    /// Gather, loads, damping, central difference, prescribed motion.
+    IntegrateNodes,
+    /// Energies, J, stress of every cell (once per frame).
+    MeasureCells,
+    /// Kinetic energy, speeds, counters of every node (once per frame).
+    MeasureNodes,
+    /// Sums over the contact nodes (once per frame).
+    MeasureContact,
+}
+
+impl Stage {
+    /// All stages in order.
+    pub const ALL: [Stage; 9] = [
+        Stage::AdvanceTip,
+        Stage::SoftenPath,
+        Stage::ElementForces,
+        Stage::NeedleContact,
+        Stage::IndenterContact,
+        Stage::IntegrateNodes,
+        Stage::MeasureCells,
+        Stage::MeasureNodes,
+        Stage::MeasureContact,
+    ];
+
+    /// File stem and label.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::AdvanceTip => "advance_tip",
+            Stage::SoftenPath => "soften_path",
+            Stage::ElementForces => "element_forces",
+            Stage::NeedleContact => "needle_contact",
+            Stage::IndenterContact => "indenter_contact",
+            Stage::IntegrateNodes => "integrate_nodes",
+            Stage::MeasureCells => "measure_cells",
+            Stage::MeasureNodes => "measure_nodes",
+            Stage::MeasureContact => "measure_contact",
+        }
+    }
+
+    /// True for the stages that run once per frame, after its last step.
+    pub fn once_per_frame(self) -> bool {
+        matches!(self, Stage::MeasureCells | Stage::MeasureNodes | Stage::MeasureContact)
+    }
+}
