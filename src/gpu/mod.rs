@@ -1,1 +1,10 @@
-//! (being built)
+//! The GPU engine: shaders composed from the chosen effects, one submission per display frame.
+
+pub mod compose;
+pub mod device;
+pub mod engine;
+pub mod kernel;
+pub mod structs;
+
+pub use device::Gpu;
+pub use engine::GpuEngine;

@@ -16,7 +16,7 @@ use crate::needle::ToolPose;
 use crate::scene::{Face, Tool};
 
 /// Hourglass coefficient of a linear elastic cube, [Joldes2008] via physics of the one-point hexahedron.
-const HOURGLASS_MODULUS: f64 = 3.11;
+pub const HOURGLASS_MODULUS: f64 = 3.11;
 
 /// Corner signs (xi, eta, zeta) in the node order of `BlockMesh::cell_nodes`.
 const CORNERS: [[f64; 3]; 8] = [

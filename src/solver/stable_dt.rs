@@ -82,7 +82,8 @@ fn power_iteration(model: &Model, elements: &Elements) -> f64 {
             bottom += m * v.length_squared();
         }
         omega_squared = top / bottom;
-        mode = next;
+        let largest = next.iter().map(|v| v.length()).fold(0.0, f64::max);
+        mode = next.into_iter().map(|v| v / largest).collect();
     }
     2.0 / omega_squared.sqrt()
 }

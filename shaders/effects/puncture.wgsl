@@ -1,0 +1,77 @@
+// Puncture: state and pure functions of the tip law and of the opened path. Equations: src/effects/puncture.rs.
+struct PunctureParams {
+    // Thresholds of the tip force [N] and the length over which one falls to the other [m].
+    puncture_force: f32,
+    cutting_force: f32,
+    transition_length: f32,
+    // Stiffness of all tip springs together [N/m].
+    tip_stiffness: f32,
+    // Elastic stiffness left in a softened cell.
+    residual_stiffness: f32,
+    // Normal stiffness of the shaft contact [N/m], fraction of critical damping, fading length of an overlap [m].
+    contact_stiffness: f32,
+    contact_damping: f32,
+    entry_fade: f32,
+    // Radius and cone length of the needle [m].
+    needle_radius: f32,
+    tip_length: f32,
+    path_cell_count: u32,
+    _pad: u32,
+}
+
+// Material line parallel to the path: where it enters the surface [m], w: unused.
+struct TipAnchor {
+    surface: vec4<f32>,
+}
+
+// Where an anchor sits now: cell (w unused), local coordinates 0..1, force along the path [N].
+struct TipAnchorLoad {
+    cell: vec4<u32>,
+    local: vec4<f32>,
+    force: f32,
+    _pad0: f32,
+    _pad1: f32,
+    _pad2: f32,
+}
+
+struct TipState {
+    // Material coordinate a of the tip [m].
+    coordinate: f32,
+    // Dissipated by the tip law in this frame [J]; stored in the tip springs now [J]; taken by softening [J].
+    dissipation: f32,
+    spring_energy: f32,
+    softening: f32,
+}
+
+// Cell that the path passes: fraction of its volume that opens, s0 range of that part [m].
+struct PathCell {
+    cell: u32,
+    fraction: f32,
+    axial_start: f32,
+    axial_end: f32,
+}
+
+@group(0) @binding(3) var<uniform> puncture: PunctureParams;
+@group(1) @binding(5) var<storage, read> tip_anchors: array<TipAnchor>;
+@group(1) @binding(6) var<storage, read> path_cells: array<PathCell>;
+// Remaining stiffness per cell, 1 = intact.
+@group(3) @binding(0) var<storage, read_write> cell_stiffness: array<f32>;
+@group(3) @binding(1) var<storage, read_write> tip_state: TipState;
+@group(3) @binding(2) var<storage, read_write> tip_anchor_loads: array<TipAnchorLoad>;
+// Energy that softening took in this frame, per path cell [J].
+@group(3) @binding(3) var<storage, read_write> softening_dissipation: array<f32>;
+
+const ANCHOR_COUNT: u32 = 19u;
+
+// Threshold of the tip force at material coordinate a [N].
+fn tip_threshold(a: f32) -> f32 {
+    let entry = max(0.0, 1.0 - a / puncture.transition_length);
+    return puncture.cutting_force + (puncture.puncture_force - puncture.cutting_force) * entry;
+}
+
+// Needle radius at distance s behind the tip and its slope.
+fn needle_profile(s: f32) -> vec2<f32> {
+    let on_cone = s < puncture.tip_length;
+    let slope = puncture.needle_radius / puncture.tip_length;
+    return vec2<f32>(select(puncture.needle_radius, slope * s, on_cone), select(0.0, slope, on_cone));
+}

@@ -1,0 +1,10 @@
+// One edge of the rectilinear grid: length d [m], d^(1/3) [m^(1/3)], 1/(4 d) [1/m].
+struct CellEdge {
+    length: f32,
+    cube_root: f32,
+    quarter_inverse: f32,
+    _pad: f32,
+}
+
+// Edges along x, then y, then z.
+@group(1) @binding(0) var<storage, read> cell_edges: array<CellEdge>;

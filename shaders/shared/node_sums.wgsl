@@ -1,0 +1,20 @@
+// Sums of one measuring thread over its nodes.
+struct NodeSums {
+    // Kinetic energy, energy taken by mass damping in this frame, work of supports and loads [J].
+    kinetic: f32,
+    damping: f32,
+    work: f32,
+    // Sum of mass times displacement [kg m], for the work of a uniform field.
+    moment_x: f32,
+    moment_y: f32,
+    moment_z: f32,
+    max_speed: f32,
+    // Steps times nodes with raised mass; nodes with a number out of range; nodes clamped (first thread only).
+    raised_mass: u32,
+    out_of_range: u32,
+    clamped_nodes: u32,
+    _pad0: u32,
+    _pad1: u32,
+}
+
+@group(2) @binding(6) var<storage, read_write> node_sums: array<NodeSums>;

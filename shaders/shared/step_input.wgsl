@@ -1,0 +1,25 @@
+// Motion of one driven face during one step: rates of the translation [m/s] and of cosine and sine of the angle [1/s].
+struct DriveStep {
+    translation_rate: vec4<f32>,
+    cosine_rate: f32,
+    sine_rate: f32,
+    _pad0: f32,
+    _pad1: f32,
+}
+
+// What one step is given from outside.
+struct StepInput {
+    // Tip of the tool [m], its velocity [m/s] and the unit vector of the insertion; w unused.
+    tip: vec4<f32>,
+    velocity: vec4<f32>,
+    direction: vec4<f32>,
+    // Depth of the tip from the entry point along the direction [m], magnitude of the velocity [m/s].
+    depth: f32,
+    speed: f32,
+    // Factor of the ramped loads, 0..1.
+    load_factor: f32,
+    _pad: f32,
+    drives: array<DriveStep, 6>,
+}
+
+@group(0) @binding(1) var<uniform> step_input: StepInput;

@@ -1,0 +1,135 @@
+// Stage element_forces: one-point hexahedra with quartic hourglass control, total Lagrangian.
+//
+// One thread walks up a strip of cells in one column. It keeps the plane of four nodes between two cells, so that
+// every cell loads four nodes and stores four forces instead of eight. On a rectilinear grid all gradients and the
+// four hourglass vectors are one 8-point Walsh-Hadamard transform: sums over xi, eta, zeta, eta zeta, zeta xi,
+// xi eta, xi eta zeta. The sums are formed in integers and are exact. Equations: src/solver/cpu.rs, Elements.
+#import shared/params
+#import shared/thread_index
+#import shared/displacement
+#import shared/cell_edge
+#import shared/mooney_rivlin
+#import shared/corner_force
+#ifdef PUNCTURE
+#import effects/puncture
+#endif
+
+@group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
+
+// Writes the forces of one plane from their transform: z (all corners alike), x, y, xy.
+fn store_plane(slot: u32, z: vec3<f32>, x: vec3<f32>, y: vec3<f32>, xy: vec3<f32>, bound: f32) {
+    let stride = params.padded_columns;
+    corner_force[slot] = vec4<f32>(x + y - z - xy, bound);
+    corner_force[slot + stride] = vec4<f32>(y + xy - z - x, bound);
+    corner_force[slot + 2u * stride] = vec4<f32>(x + xy - z - y, bound);
+    corner_force[slot + 3u * stride] = vec4<f32>(-(z + x + y + xy), bound);
+}
+
+@compute @workgroup_size(64)
+fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let thread = thread_index(id, groups);
+    if (thread >= params.column_count * params.strip_count) {
+        return;
+    }
+    let column = thread % params.column_count;
+    let strip = thread / params.column_count;
+    let i = column % params.cells_x;
+    let j = column / params.cells_x;
+    let first = strip * params.strip_layers;
+    let last = min(first + params.strip_layers, params.cells_z);
+
+    let edge_x = cell_edges[i];
+    let edge_y = cell_edges[params.cells_x + j];
+    let row = params.nodes_x;
+    let layer = params.nodes_x * params.nodes_y;
+    var node = first * layer + j * row + i;
+    var b0 = node_displacement[node].xyz;
+    var b1 = node_displacement[node + 1u].xyz;
+    var b2 = node_displacement[node + row].xyz;
+    var b3 = node_displacement[node + row + 1u].xyz;
+    var lower_x = (b1 - b0) + (b3 - b2);
+    var lower_y = (b2 - b0) + (b3 - b1);
+    var lower_xy = (b0 - b1) + (b3 - b2);
+    // What the cell below left on the plane.
+    var left_z = vec3<f32>(0.0);
+    var left_x = vec3<f32>(0.0);
+    var left_y = vec3<f32>(0.0);
+    var left_xy = vec3<f32>(0.0);
+    var left_bound = 0.0;
+    var slot = corner_slot(strip, 0u, 0u, padded_column(i, j));
+
+    for (var k = first; k < last; k++) {
+        let edge_z = cell_edges[params.cells_x + params.cells_y + k];
+        node += layer;
+        let t0 = node_displacement[node].xyz;
+        let t1 = node_displacement[node + 1u].xyz;
+        let t2 = node_displacement[node + row].xyz;
+        let t3 = node_displacement[node + row + 1u].xyz;
+        let upper_x = (t1 - t0) + (t3 - t2);
+        let upper_y = (t2 - t0) + (t3 - t1);
+        let upper_xy = (t0 - t1) + (t3 - t2);
+        let rise = (t0 - b0) + (t1 - b1) + (t2 - b2) + (t3 - b3);
+
+        let H = mat3x3<f32>(
+            vec3<f32>(upper_x + lower_x) * (DISPLACEMENT_UNIT * edge_x.quarter_inverse),
+            vec3<f32>(upper_y + lower_y) * (DISPLACEMENT_UNIT * edge_y.quarter_inverse),
+            vec3<f32>(rise) * (DISPLACEMENT_UNIT * edge_z.quarter_inverse),
+        );
+        var stress = first_piola_kirchhoff(H);
+        let volume = edge_x.length * edge_y.length * edge_z.length;
+        let size = edge_x.cube_root * edge_y.cube_root * edge_z.cube_root;
+
+        // Hourglass: E = 1/2 kappa 3.11 mu0 V^(1/3) q2 (1 + c/2 q2/V^(2/3)), q = Gamma.u/8.
+        let eighth = DISPLACEMENT_UNIT * 0.125;
+        let q_yz = vec3<f32>(upper_y - lower_y) * eighth;
+        let q_zx = vec3<f32>(upper_x - lower_x) * eighth;
+        let q_xy = vec3<f32>(upper_xy + lower_xy) * eighth;
+        let q_xyz = vec3<f32>(upper_xy - lower_xy) * eighth;
+        let q2 = (dot(q_yz, q_yz) + dot(q_zx, q_zx) + dot(q_xy, q_xy) + dot(q_xyz, q_xyz)) / (size * size);
+        var hourglass = params.hourglass * size * (1.0 + params.quartic * q2) * 0.125;
+
+        // Stiffness bound: V (K |cof B|max sum|cof B| + 4/3 mu0 max(1, I1/3) |B| sum|B|) + hourglass.
+        let cx = stress.cof[0] * edge_x.quarter_inverse;
+        let cy = stress.cof[1] * edge_y.quarter_inverse;
+        let cz = stress.cof[2] * edge_z.quarter_inverse;
+        let cof_b = dot(cx, cx) + dot(cy, cy) + dot(cz, cz)
+            + 2.0 * (abs(dot(cx, cy)) + abs(dot(cy, cz)) + abs(dot(cz, cx)));
+        let b = vec3<f32>(edge_x.quarter_inverse, edge_y.quarter_inverse, edge_z.quarter_inverse);
+        var bound = 8.0 * volume
+            * (params.bulk_modulus * cof_b + params.shear_bound * max(1.0, stress.i1 * 0.33333333) * dot(b, b))
+            + params.hourglass * size * (1.0 + 3.0 * params.quartic * q2) * 0.125;
+        var factor = volume;
+#ifdef PUNCTURE
+        // The path softens the whole elastic answer of a cell, so it comes after the law and before the forces.
+        let remaining = cell_stiffness[(k * params.cells_y + j) * params.cells_x + i];
+        factor *= remaining;
+        hourglass *= remaining;
+        bound *= remaining;
+#endif
+        let a_x = stress.P[0] * (factor * edge_x.quarter_inverse);
+        let a_y = stress.P[1] * (factor * edge_y.quarter_inverse);
+        let a_z = stress.P[2] * (factor * edge_z.quarter_inverse);
+        store_plane(
+            slot,
+            left_z - a_z,
+            left_x + a_x - q_zx * hourglass,
+            left_y + a_y - q_yz * hourglass,
+            left_xy + (q_xy - q_xyz) * hourglass,
+            left_bound + bound,
+        );
+        left_z = a_z;
+        left_x = a_x + q_zx * hourglass;
+        left_y = a_y + q_yz * hourglass;
+        left_xy = (q_xy + q_xyz) * hourglass;
+        left_bound = bound;
+        slot += 4u * params.padded_columns;
+        b0 = t0;
+        b1 = t1;
+        b2 = t2;
+        b3 = t3;
+        lower_x = upper_x;
+        lower_y = upper_y;
+        lower_xy = upper_xy;
+    }
+    store_plane(slot, left_z, left_x, left_y, left_xy, left_bound);
+}

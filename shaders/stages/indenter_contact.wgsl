@@ -1,0 +1,66 @@
+// Stage indenter_contact: penalty contact of the top face with a sphere or a flat punch; one thread per contact node.
+// Equations: src/effects/indentation.rs and CpuEngine::indenter_contact.
+#import shared/params
+#import shared/thread_index
+#import shared/step_input
+#import shared/displacement
+#import shared/corner_force
+#import shared/contact_node
+#import effects/indentation
+#ifdef FRICTION
+#import effects/friction
+#endif
+
+@group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
+@group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn indenter_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let index = thread_index(id, groups);
+    if (index >= arrayLength(&contact_nodes)) {
+        return;
+    }
+    let contact = contact_nodes[index];
+    let x = contact.rest.xyz + vec3<f32>(node_displacement[contact.node].xyz) * DISPLACEMENT_UNIT;
+    let lever = x - step_input.tip.xyz;
+    let penetration = tool_penetration(lever, step_input.direction.xyz, contact.rest_radius);
+    let n = penetration.xyz;
+    let depth = penetration.w;
+    let v = node_velocity[contact.node].xyz - step_input.velocity.xyz;
+    let vn = dot(v, n);
+    let k = indentation.contact_stiffness;
+    let damping = 2.0 * indentation.contact_damping * sqrt(k * contact.mass);
+    var memory = contact_memory[index];
+    var normal = vec3<f32>(0.0);
+    var tangential = vec3<f32>(0.0);
+    var stored = 0.0;
+    if (indentation.bonded == 1u && (memory.touching == 1.0 || depth > 0.0)) {
+        memory.touching = 1.0;
+        memory.stick += vec4<f32>((v - n * vn) * params.dt, 0.0);
+        normal = n * (k * depth) - v * damping - memory.stick.xyz * k;
+        contact_sums[index].damping_dissipation += damping * dot(v, v) * params.dt;
+        stored = 0.5 * k * (depth * depth + dot(memory.stick.xyz, memory.stick.xyz));
+    } else if (depth > 0.0) {
+        memory.touching = 1.0;
+        let pressure = max(0.0, k * depth - damping * vn);
+        normal = n * pressure;
+        contact_sums[index].damping_dissipation += (k * depth - pressure) * vn * params.dt;
+        stored = 0.5 * k * depth * depth;
+#ifdef FRICTION
+        let kt = friction.stiffness_ratio * k;
+        let trial = stick_trial(memory.stick.xyz, (v - n * vn) * params.dt, n);
+        let stretch = stick_return(trial, friction.coefficient * pressure / kt);
+        memory.stick = vec4<f32>(stretch, 0.0);
+        tangential = stretch * -kt;
+        contact_sums[index].sliding_dissipation += kt * dot(stretch, trial - stretch);
+        stored += 0.5 * kt * dot(stretch, stretch);
+#endif
+    } else {
+        memory.stick = vec4<f32>(0.0);
+        memory.touching = 0.0;
+    }
+    contact_memory[index] = memory;
+    contact_sums[index].stored = stored;
+    corner_force[contact.slot] += vec4<f32>(normal + tangential, 0.0);
+    book_contact(index, vec3<f32>(0.0), normal, tangential, lever);
+}

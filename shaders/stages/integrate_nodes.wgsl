@@ -1,0 +1,107 @@
+// Stage integrate_nodes: gather the corner forces, add loads, damp, advance by central differences.
+//
+// v+ = ((1 - alpha dt/2) v + dt f/m) / (1 + alpha dt/2), u+ = u + dt v+; held and driven components are prescribed.
+#import shared/params
+#import shared/thread_index
+#import shared/displacement
+#import shared/corner_force
+#ifdef STEP_INPUT
+#import shared/step_input
+#endif
+#ifdef MASS_SCALING
+#import effects/mass_scaling
+#endif
+#ifdef GRAVITY
+#import effects/gravity
+#endif
+#ifdef LOADED_FACES
+#import shared/node_load
+#endif
+#ifdef DRIVEN_FACES
+#import shared/driven_faces
+#endif
+#ifdef NODE_WORK
+#import shared/node_work
+#endif
+
+@group(1) @binding(1) var<storage, read> node_mass: array<f32>;
+// u in fixed point; w: steps of this frame in which the mass of the node was raised.
+@group(2) @binding(0) var<storage, read_write> node_displacement: array<vec4<i32>>;
+// v at the half step [m/s]; w: energy that mass damping took in this frame [J].
+@group(2) @binding(1) var<storage, read_write> node_velocity: array<vec4<f32>>;
+// Nodes whose speed was clamped in this frame, summed over the steps.
+@group(2) @binding(3) var<storage, read_write> clamped_nodes: atomic<u32>;
+
+@compute @workgroup_size(64)
+fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let node = thread_index(id, groups);
+    let layer = params.nodes_x * params.nodes_y;
+    if (node >= layer * params.nodes_z) {
+        return;
+    }
+    let k = node / layer;
+    let j = (node - k * layer) / params.nodes_x;
+    let i = node - k * layer - j * params.nodes_x;
+
+    // One strip, or two where the node lies on the plane between them.
+    let above = k / params.strip_layers;
+    let last = min(above, params.strip_count - 1u);
+    let first = select(last, above - 1u, k > 0u && above * params.strip_layers == k);
+    let stride = params.padded_columns;
+    let row = params.cells_x + 2u;
+    let column = padded_column(i, j);
+    var sum = vec4<f32>(0.0);
+    for (var strip = first; strip <= last; strip++) {
+        let slot = corner_slot(strip, k - strip * params.strip_layers, 0u, column);
+        sum += corner_force[slot] + corner_force[slot + stride - 1u]
+            + corner_force[slot + 2u * stride - row] + corner_force[slot + 3u * stride - row - 1u];
+    }
+    var force = sum.xyz;
+    let scaled_mass = node_mass[node];
+    var mass = scaled_mass;
+    var displacement = node_displacement[node];
+    let old = node_velocity[node];
+#ifdef MASS_SCALING
+    mass = stable_mass(scaled_mass, sum.w);
+    displacement.w += select(0, 1, mass > scaled_mass);
+#endif
+#ifdef GRAVITY
+    force += gravity.acceleration.xyz * scaled_mass;
+#endif
+#ifdef LOADED_FACES
+    let load = node_load[node].xyz * step_input.load_factor;
+    force += load;
+#endif
+    let half = 0.5 * params.mass_damping * params.dt;
+    var next = (old.xyz * (1.0 - half) + force * (params.dt / mass)) / (1.0 + half);
+    let speed = length(next);
+    if (speed > params.speed_limit) {
+        next *= params.speed_limit / speed;
+        atomicAdd(&clamped_nodes, 1u);
+    }
+    var held = select(0u, params.fixed_x_min, i == 0u) | select(0u, params.fixed_x_max, i + 1u == params.nodes_x);
+    held |= select(0u, params.fixed_y_min, j == 0u) | select(0u, params.fixed_y_max, j + 1u == params.nodes_y);
+    held |= select(0u, params.fixed_z_min, k == 0u) | select(0u, params.fixed_z_max, k + 1u == params.nodes_z);
+    let is_free = vec3<f32>((vec3<u32>(held) & vec3<u32>(1u, 2u, 4u)) == vec3<u32>(0u));
+    var prescribed = vec3<f32>(0.0);
+#ifdef DRIVEN_FACES
+    prescribed = prescribed_velocity(i, j, k) * (1.0 - is_free);
+#endif
+#ifdef NODE_WORK
+    // What the support adds so that the node moves as prescribed, times its velocity at mid step.
+    let middle = 0.5 * (old.xyz + prescribed);
+    let reaction = (mass / params.dt) * (prescribed - old.xyz) - force;
+    node_work[node] += params.dt * dot(reaction * (1.0 - is_free), middle);
+#endif
+    next = next * is_free + prescribed;
+#ifdef NODE_WORK
+#ifdef LOADED_FACES
+    node_work[node] += params.dt * 0.5 * dot(load, old.xyz + next);
+#endif
+#endif
+    let mid = 0.5 * (old.xyz + next) * is_free;
+    let damped = old.w + params.mass_damping * params.dt * mass * dot(mid, mid);
+    node_velocity[node] = vec4<f32>(next, damped);
+    let advance = vec3<i32>(round(next * (params.dt * UNITS_PER_METRE)));
+    node_displacement[node] = vec4<i32>(displacement.xyz + advance, displacement.w);
+}

@@ -1,0 +1,54 @@
+// Stage measure_nodes: kinetic energy, dissipation, speeds and counters; resets what is summed per frame.
+#import shared/params
+#import shared/thread_index
+#import shared/displacement
+#import shared/node_sums
+#ifdef NODE_WORK
+#import shared/node_work
+#endif
+
+@group(1) @binding(1) var<storage, read> node_mass: array<f32>;
+@group(2) @binding(0) var<storage, read_write> node_displacement: array<vec4<i32>>;
+@group(2) @binding(1) var<storage, read_write> node_velocity: array<vec4<f32>>;
+@group(2) @binding(3) var<storage, read_write> clamped_nodes: atomic<u32>;
+
+// True where a float has the exponent of Inf or NaN.
+fn not_finite(v: vec3<f32>) -> bool {
+    return any((bitcast<vec3<u32>>(v) & vec3<u32>(0x7f800000u)) == vec3<u32>(0x7f800000u));
+}
+
+@compute @workgroup_size(64)
+fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let thread = thread_index(id, groups);
+    if (thread >= params.measure_threads) {
+        return;
+    }
+    let count = params.nodes_x * params.nodes_y * params.nodes_z;
+    var sums: NodeSums;
+    for (var node = thread; node < count; node += params.measure_threads) {
+        let u = node_displacement[node];
+        let v = node_velocity[node];
+        let mass = node_mass[node];
+        sums.kinetic += 0.5 * mass * dot(v.xyz, v.xyz);
+        sums.damping += v.w;
+        let moment = vec3<f32>(u.xyz) * (DISPLACEMENT_UNIT * mass);
+        sums.moment_x += moment.x;
+        sums.moment_y += moment.y;
+        sums.moment_z += moment.z;
+        sums.max_speed = max(sums.max_speed, length(v.xyz));
+        sums.raised_mass += u32(u.w);
+        // +-30 mm of the +-31 mm that the fixed point holds.
+        let far = any(abs(u.xyz) > vec3<i32>(2061584302));
+        sums.out_of_range += select(0u, 1u, far || not_finite(v.xyz));
+#ifdef NODE_WORK
+        sums.work += node_work[node];
+        node_work[node] = 0.0;
+#endif
+        node_velocity[node] = vec4<f32>(v.xyz, 0.0);
+        node_displacement[node] = vec4<i32>(u.xyz, 0);
+    }
+    if (thread == 0u) {
+        sums.clamped_nodes = atomicExchange(&clamped_nodes, 0u);
+    }
+    node_sums[thread] = sums;
+}

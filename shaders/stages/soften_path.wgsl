@@ -1,0 +1,41 @@
+// Stage soften_path: a cell that the tip passes keeps max(residual, 1 - phi ramp(a)) of its stiffness; the energy
+// that it loses is booked. One thread per path cell.
+#import shared/params
+#import shared/thread_index
+#import shared/displacement
+#import shared/cell_edge
+#import shared/mooney_rivlin
+#import shared/cell_energy
+#import effects/puncture
+
+@group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
+@group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let index = thread_index(id, groups);
+    if (index >= puncture.path_cell_count) {
+        return;
+    }
+    let path = path_cells[index];
+    let ramp = clamp((tip_state.coordinate - path.axial_start) / max(path.axial_end - path.axial_start, 1e-9), 0.0, 1.0);
+    let remaining = max(1.0 - path.fraction * ramp, puncture.residual_stiffness);
+    let old = cell_stiffness[path.cell];
+    // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
+    for (var once = select(1u, 0u, remaining < old); once == 0u; once++) {
+        let layer = params.cells_x * params.cells_y;
+        let k = path.cell / layer;
+        let j = (path.cell - k * layer) / params.cells_x;
+        let cell = vec3<u32>(path.cell - k * layer - j * params.cells_x, j, k);
+        var u: array<vec3<f32>, 8>;
+        for (var corner = 0u; corner < 8u; corner++) {
+            let node = corner_node(cell, corner);
+            // Half a step back: the mean over the step, as the leapfrog work has it.
+            u[corner] = vec3<f32>(node_displacement[node].xyz) * DISPLACEMENT_UNIT
+                - node_velocity[node].xyz * (0.5 * params.dt);
+        }
+        let energy = cell_energy(cell, &u);
+        softening_dissipation[index] += (old - remaining) * (energy.elastic + energy.hourglass);
+        cell_stiffness[path.cell] = remaining;
+    }
+}

@@ -1,0 +1,179 @@
+//! The text composer of the shaders: `#import`, `#ifdef`, `#ifndef`, `#else`, `#endif`.
+//!
+//! A file is included once, where it is first imported. Unknown files, names and stray directives are errors.
+//! Compiler messages are mapped back to file and line.
+
+use std::collections::BTreeSet;
+
+use crate::error::{Error, Result};
+
+/// Every shader file by its path under `shaders/`, without extension.
+pub const SOURCES: &[(&str, &str)] = &[
+    ("effects/friction", include_str!("../../shaders/effects/friction.wgsl")),
+    ("effects/gravity", include_str!("../../shaders/effects/gravity.wgsl")),
+    ("effects/indentation", include_str!("../../shaders/effects/indentation.wgsl")),
+    ("effects/mass_scaling", include_str!("../../shaders/effects/mass_scaling.wgsl")),
+    ("effects/puncture", include_str!("../../shaders/effects/puncture.wgsl")),
+    ("shared/cell_edge", include_str!("../../shaders/shared/cell_edge.wgsl")),
+    ("shared/cell_energy", include_str!("../../shaders/shared/cell_energy.wgsl")),
+    ("shared/cell_sums", include_str!("../../shaders/shared/cell_sums.wgsl")),
+    ("shared/contact_node", include_str!("../../shaders/shared/contact_node.wgsl")),
+    ("shared/corner_force", include_str!("../../shaders/shared/corner_force.wgsl")),
+    ("shared/displacement", include_str!("../../shaders/shared/displacement.wgsl")),
+    ("shared/driven_faces", include_str!("../../shaders/shared/driven_faces.wgsl")),
+    ("shared/grid_lines", include_str!("../../shaders/shared/grid_lines.wgsl")),
+    ("shared/mooney_rivlin", include_str!("../../shaders/shared/mooney_rivlin.wgsl")),
+    ("shared/node_load", include_str!("../../shaders/shared/node_load.wgsl")),
+    ("shared/node_sums", include_str!("../../shaders/shared/node_sums.wgsl")),
+    ("shared/node_work", include_str!("../../shaders/shared/node_work.wgsl")),
+    ("shared/params", include_str!("../../shaders/shared/params.wgsl")),
+    ("shared/step_input", include_str!("../../shaders/shared/step_input.wgsl")),
+    ("shared/thread_index", include_str!("../../shaders/shared/thread_index.wgsl")),
+    ("stages/advance_tip", include_str!("../../shaders/stages/advance_tip.wgsl")),
+    ("stages/element_forces", include_str!("../../shaders/stages/element_forces.wgsl")),
+    ("stages/indenter_contact", include_str!("../../shaders/stages/indenter_contact.wgsl")),
+    ("stages/integrate_nodes", include_str!("../../shaders/stages/integrate_nodes.wgsl")),
+    ("stages/measure_cells", include_str!("../../shaders/stages/measure_cells.wgsl")),
+    ("stages/measure_contact", include_str!("../../shaders/stages/measure_contact.wgsl")),
+    ("stages/measure_nodes", include_str!("../../shaders/stages/measure_nodes.wgsl")),
+    ("stages/needle_contact", include_str!("../../shaders/stages/needle_contact.wgsl")),
+    ("stages/soften_path", include_str!("../../shaders/stages/soften_path.wgsl")),
+];
+
+/// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
+pub const SCENE_DEFINES: [&str; 4] = ["STEP_INPUT", "LOADED_FACES", "DRIVEN_FACES", "NODE_WORK"];
+
+/// A composed shader.
+#[derive(Debug, Clone)]
+pub struct Composed {
+    pub source: String,
+    /// File and line (from 1) of every line of `source`.
+    pub origin: Vec<(&'static str, usize)>,
+}
+
+impl Composed {
+    /// `shaders/<file>.wgsl:<line>` of a line (from 1) of the composed source.
+    pub fn place(&self, line: usize) -> String {
+        match self.origin.get(line.wrapping_sub(1)) {
+            Some((file, line)) => format!("shaders/{file}.wgsl:{line}"),
+            None => "end of the composed shader".into(),
+        }
+    }
+}
+
+/// Composes the file `root` (path under `shaders/`, no extension) with the given defines.
+pub fn compose(root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed> {
+    compose_from(SOURCES, root, defines)
+}
+
+fn compose_from(
+    files: &[(&'static str, &'static str)],
+    root: &str,
+    defines: &BTreeSet<&'static str>,
+) -> Result<Composed> {
+    let mut out = Composed { source: String::new(), origin: Vec::new() };
+    let mut included = BTreeSet::new();
+    include(files, root, root, 0, defines, &mut included, &mut out)?;
+    Ok(out)
+}
+
+fn include(
+    files: &[(&'static str, &'static str)],
+    name: &str,
+    from: &str,
+    from_line: usize,
+    defines: &BTreeSet<&'static str>,
+    included: &mut BTreeSet<&'static str>,
+    out: &mut Composed,
+) -> Result<()> {
+    let fail = |file: &str, line: usize, message: String| {
+        Err(Error::Shader { stage: format!("shaders/{file}.wgsl:{line}"), message })
+    };
+    let Some(&(file, text)) = files.iter().find(|(n, _)| *n == name) else {
+        let known: Vec<&str> = files.iter().map(|(n, _)| *n).collect();
+        return fail(from, from_line, format!("unknown import `{name}`; there are {}", known.join(", ")));
+    };
+    if !included.insert(file) {
+        return Ok(());
+    }
+    // One entry per open #ifdef: (active, seen #else, line).
+    let mut open: Vec<(bool, bool, usize)> = Vec::new();
+    for (number, line) in text.lines().enumerate().map(|(n, l)| (n + 1, l)) {
+        let active = open.iter().all(|o| o.0);
+        let Some(directive) = line.trim_start().strip_prefix('#') else {
+            if active {
+                out.source.push_str(line);
+                out.source.push('\n');
+                out.origin.push((file, number));
+            }
+            continue;
+        };
+        let (word, argument) = directive.split_once(' ').unwrap_or((directive, ""));
+        let argument = argument.trim();
+        match word.trim() {
+            "import" if active => include(files, argument, file, number, defines, included, out)?,
+            "import" => {}
+            "ifdef" | "ifndef" => {
+                let known = SCENE_DEFINES.contains(&argument)
+                    || crate::effects::EFFECTS.iter().any(|e| e.define == argument);
+                if !known {
+                    return fail(file, number, format!("unknown name `{argument}` in #{word}"));
+                }
+                open.push((defines.contains(argument) == (word == "ifdef"), false, number));
+            }
+            "else" => match open.last_mut() {
+                Some(o) if !o.1 => *o = (!o.0, true, o.2),
+                _ => return fail(file, number, "stray #else".into()),
+            },
+            "endif" => {
+                if open.pop().is_none() {
+                    return fail(file, number, "stray #endif".into());
+                }
+            }
+            other => return fail(file, number, format!("unknown directive #{other}")),
+        }
+    }
+    match open.pop() {
+        Some((_, _, line)) => fail(file, line, "#ifdef without #endif".into()),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILES: &[(&str, &str)] = &[
+        ("a", "#import b\n#import b\nlet a = 1;\n#ifdef PUNCTURE\nlet p = 1;\n#else\nlet q = 1;\n#endif\n"),
+        ("b", "let b = 1;\n"),
+        ("stray", "#endif\n"),
+        ("open", "#ifdef PUNCTURE\n"),
+        ("name", "#ifdef PUNCTUER\n#endif\n"),
+        ("word", "#include b\n"),
+        ("missing", "\n#import nowhere\n"),
+    ];
+
+    #[test]
+    fn imports_once_and_maps_lines() {
+        let composed = compose_from(FILES, "a", &BTreeSet::new()).unwrap();
+        assert_eq!(composed.source, "let b = 1;\nlet a = 1;\nlet q = 1;\n");
+        assert_eq!(composed.place(1), "shaders/b.wgsl:1");
+        assert_eq!(composed.place(3), "shaders/a.wgsl:7");
+        let composed = compose_from(FILES, "a", &BTreeSet::from(["PUNCTURE"])).unwrap();
+        assert!(composed.source.contains("let p") && !composed.source.contains("let q"));
+    }
+
+    #[test]
+    fn mistakes_name_file_and_line() {
+        for (root, expected) in [
+            ("stray", "stray #endif"),
+            ("open", "#ifdef without #endif"),
+            ("name", "unknown name `PUNCTUER`"),
+            ("word", "unknown directive #include"),
+            ("missing", "missing.wgsl:2: unknown import `nowhere`"),
+        ] {
+            let error = compose_from(FILES, root, &BTreeSet::new()).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Adapter choice and device. Our own selection, so that a wrong name lists the right ones.
+
+use std::sync::{Arc, Mutex};
+
+use crate::error::{Error, Result};
+
+/// An opened device and what is known about its adapter.
+#[derive(Clone)]
+pub struct Gpu {
+    pub device: wgpu::Device,
+    pub queue: wgpu::Queue,
+    pub info: wgpu::AdapterInfo,
+    /// First error that the device reported outside a call of ours, if any.
+    pub failure: Arc<Mutex<Option<String>>>,
+}
+
+/// One line about an adapter.
+pub fn describe(info: &wgpu::AdapterInfo) -> String {
+    format!("{} [{}, {:?}]", info.name, info.backend, info.device_type)
+}
+
+/// All adapters that wgpu finds under `WGPU_BACKEND` (all backends without it).
+pub fn adapters() -> Result<Vec<wgpu::Adapter>> {
+    let descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    let backends = descriptor.backends;
+    if let Ok(wanted) = std::env::var("WGPU_BACKEND") {
+        // wgpu skips names that it does not know; a mistyped one must not silently mean "all" or "none".
+        const KNOWN: [&str; 9] = ["vulkan", "vk", "metal", "mtl", "dx12", "d3d12", "gl", "opengl", "gles"];
+        let unknown: Vec<&str> = wanted
+            .split(',')
+            .map(str::trim)
+            .filter(|w| !KNOWN.contains(&w.to_lowercase().as_str()))
+            .collect();
+        if !unknown.is_empty() {
+            return Err(Error::Adapter {
+                message: format!("WGPU_BACKEND: there is no backend `{}`", unknown.join("`, `")),
+                way_out: "use one or several of vulkan, metal, dx12, gl, separated by commas".into(),
+            });
+        }
+    }
+    let instance = wgpu::Instance::new(descriptor);
+    let mut found = pollster::block_on(instance.enumerate_adapters(backends));
+    // Hardware first, software last; the order of wgpu otherwise.
+    found.sort_by_key(|a| match a.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    });
+    Ok(found)
+}
+
+impl Gpu {
+    /// Opens the adapter named by `WGPU_ADAPTER_NAME` (part of the name, any case), or the best one.
+    ///
+    /// # Errors
+    /// `Error::Adapter` where none is found or the name fits none; the message lists those that are there.
+    pub fn open() -> Result<Self> {
+        let found = adapters()?;
+        let list = |found: &[wgpu::Adapter]| {
+            found.iter().map(|a| format!("\n    {}", describe(&a.get_info()))).collect::<String>()
+        };
+        let wanted = std::env::var("WGPU_ADAPTER_NAME").ok().filter(|w| !w.is_empty());
+        let adapter = match &wanted {
+            None => found.first(),
+            Some(name) => found
+                .iter()
+                .find(|a| a.get_info().name.to_lowercase().contains(&name.to_lowercase())),
+        };
+        let Some(adapter) = adapter else {
+            return Err(match wanted {
+                Some(name) if !found.is_empty() => Error::Adapter {
+                    message: format!("WGPU_ADAPTER_NAME={name} fits none of the adapters here:{}", list(&found)),
+                    way_out: "use a part of one of these names, or unset the variable".into(),
+                },
+                _ => Error::Adapter {
+                    message: "no GPU adapter found, not even a software one".into(),
+                    way_out: "install a Vulkan driver (Debian/Ubuntu: libvulkan1 mesa-vulkan-drivers), unset \
+                              WGPU_BACKEND, or use --engine cpu"
+                        .into(),
+                },
+            });
+        };
+        let info = adapter.get_info();
+        // Exactly the default limits: what a software adapter offers beyond them must not be relied on.
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("stylet"),
+            required_limits: wgpu::Limits::default(),
+            ..Default::default()
+        }))
+        .map_err(|e| Error::Adapter {
+            message: format!("{} could not be opened: {e}", describe(&info)),
+            way_out: "choose another adapter with WGPU_ADAPTER_NAME (see `stylet adapters`), or use --engine cpu"
+                .into(),
+        })?;
+        let failure = Arc::new(Mutex::new(None));
+        let keep = |slot: Arc<Mutex<Option<String>>>| {
+            move |text: String| {
+                if let Ok(mut first) = slot.lock() {
+                    first.get_or_insert(text);
+                }
+            }
+        };
+        let note = keep(failure.clone());
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| note(e.to_string())));
+        let note = keep(failure.clone());
+        device.set_device_lost_callback(move |reason, text| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                note(format!("device lost ({reason:?}): {text}"));
+            }
+        });
+        Ok(Gpu { device, queue, info, failure })
+    }
+
+    /// True for a software adapter.
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Fails when the device has reported an error since it was opened.
+    pub fn check(&self) -> Result<()> {
+        let failure = self.failure.lock().map_or(None, |f| f.clone());
+        failure.map_or(Ok(()), |text| Err(Error::Device(text)))
+    }
+}

@@ -1,0 +1,839 @@
+//! The GPU engine: buffers and kernels of the chosen effects, one submission per frame, a ring of read-backs.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use bytemuck::Zeroable;
+use glam::DVec3;
+
+use super::device::Gpu;
+use super::kernel::{Kernel, Reflected, STEP_INPUT, reflect};
+use super::structs::*;
+use crate::effects::EffectSet;
+use crate::error::{Error, Result};
+use crate::model::{ANCHOR_COUNT, Model};
+use crate::scene::Tool;
+use crate::solver::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State};
+use crate::solver::step::Stage;
+
+/// One fixed-point unit of displacement, 2^-36 m.
+pub const DISPLACEMENT_UNIT: f64 = 1.0 / (1u64 << 36) as f64;
+
+/// Frames whose results may be under way.
+const RING: usize = 3;
+
+/// Partial sums of `measure_contact`.
+const CONTACT_PARTS: usize = 64;
+
+/// What decides which code a shader contains: the effects, and features of the scene that are no effects.
+pub fn defines(effects: &EffectSet, loaded_faces: bool, driven_faces: bool) -> BTreeSet<&'static str> {
+    let mut defines: BTreeSet<&'static str> = effects.active().map(|e| e.define).collect();
+    if loaded_faces {
+        defines.insert("LOADED_FACES");
+    }
+    if driven_faces {
+        defines.insert("DRIVEN_FACES");
+    }
+    if loaded_faces || driven_faces {
+        defines.extend(["STEP_INPUT", "NODE_WORK"]);
+    }
+    defines
+}
+
+/// The stages that a set of effects needs, in the order of the step.
+pub fn stages(effects: &EffectSet) -> Vec<Stage> {
+    let wanted = |stage: &Stage| match stage {
+        Stage::AdvanceTip | Stage::SoftenPath | Stage::NeedleContact => effects.puncture.is_some(),
+        Stage::IndenterContact => effects.indentation.is_some(),
+        Stage::MeasureContact => effects.puncture.is_some() || effects.indentation.is_some(),
+        _ => true,
+    };
+    Stage::ALL.into_iter().filter(wanted).collect()
+}
+
+/// Layout of strips and columns (see shaders/shared/corner_force.wgsl).
+#[derive(Debug, Clone, Copy)]
+struct Strips {
+    layers: u32,
+    count: u32,
+    columns: u32,
+    padded_columns: u32,
+    cells_x: u32,
+}
+
+impl Strips {
+    fn new(cells: [usize; 3], layers: u32) -> Self {
+        let [x, y, z] = cells.map(|c| c as u32);
+        let layers = layers.clamp(1, z);
+        Strips {
+            layers,
+            count: z.div_ceil(layers),
+            columns: x * y,
+            padded_columns: (x + 2) * (y + 2),
+            cells_x: x,
+        }
+    }
+
+    fn slots(&self) -> u64 {
+        u64::from(self.count) * u64::from(self.layers + 1) * 4 * u64::from(self.padded_columns)
+    }
+
+    /// Slot of corner `corner` of the column (i, j) on the node plane k, in the strip `strip`.
+    fn slot(&self, strip: u32, k: u32, corner: u32, i: u32, j: u32) -> u32 {
+        let column = (j + 1) * (self.cells_x + 2) + i + 1;
+        ((strip * (self.layers + 1) + k - strip * self.layers) * 4 + corner) * self.padded_columns + column
+    }
+
+    /// A slot of node (i, j, k) that the element stage writes in every step.
+    fn owned_slot(&self, [i, j, k]: [usize; 3], cells: [usize; 3]) -> u32 {
+        let strip = ((k as u32) / self.layers).min(self.count - 1);
+        let (right, back) = (u32::from(i == cells[0]), u32::from(j == cells[1]));
+        self.slot(strip, k as u32, right + 2 * back, i as u32 - right, j as u32 - back)
+    }
+}
+
+/// Results of one frame on their way to the host.
+struct InFlight {
+    slot: usize,
+    frame: u64,
+    steps: u32,
+    submission: wgpu::SubmissionIndex,
+    /// 0: not mapped yet, 1: mapped, 2: failed.
+    mapped: Arc<AtomicU8>,
+}
+
+/// Where the results of each measuring stage lie in a staging buffer.
+#[derive(Debug, Clone, Copy)]
+struct ResultRange {
+    name: &'static str,
+    offset: u64,
+    size: u64,
+}
+
+/// The engine.
+pub struct GpuEngine {
+    model: Arc<Model>,
+    gpu: Gpu,
+    info: EngineInfo,
+    strips: Strips,
+    dt: f64,
+    kernels: Vec<Kernel>,
+    buffers: BTreeMap<&'static str, wgpu::Buffer>,
+    results: Vec<ResultRange>,
+    staging: Vec<wgpu::Buffer>,
+    in_flight: VecDeque<InFlight>,
+    finished: VecDeque<FrameSums>,
+    max_steps: usize,
+    gravity_work: f64,
+}
+
+impl GpuEngine {
+    /// Prepares buffers and pipelines for a model at rest, steps of `dt` [s], at most `max_steps` steps per frame.
+    ///
+    /// # Errors
+    /// `Error::Input` where the mesh is too large for a portable device, `Error::Shader` for a broken shader.
+    pub fn new(model: Arc<Model>, gpu: Gpu, dt: f64, max_steps: usize) -> Result<Self> {
+        // Software adapters pay per buffer access: long strips share most planes. Hardware wants many threads.
+        let layers = if gpu.is_software() { 8 } else { 4 };
+        let strips = Strips::new(model.mesh.cells(), layers);
+        let defines = defines(&model.effects, !model.node_load.is_empty(), model.has_driven_faces());
+        let reflected = stages(&model.effects)
+            .into_iter()
+            .map(|stage| reflect(stage, &defines))
+            .collect::<Result<Vec<Reflected>>>()?;
+        let measure_threads = measure_threads(&model);
+        let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let mut buffers = BTreeMap::new();
+        let mut bytes = 0;
+        for binding in reflected.iter().flat_map(|r| &r.bindings) {
+            let Some(name) = BUFFERS.iter().find(|n| **n == binding.name) else {
+                return Err(Error::Shader {
+                    stage: "bindings".into(),
+                    message: format!("the engine knows no buffer `{}`", binding.name),
+                });
+            };
+            if buffers.contains_key(name) {
+                continue;
+            }
+            let contents = contents(name, &model, &strips, dt, measure_threads, max_steps);
+            let buffer = create_buffer(&gpu, name, &contents, binding.uniform)?;
+            bytes += buffer.size();
+            buffers.insert(*name, buffer);
+        }
+        let kernels = reflected
+            .into_iter()
+            .map(|r| {
+                let threads = threads(r.stage, &model, &strips, measure_threads);
+                Kernel::new(&gpu.device, r, &buffers, size_of::<StepInput>() as u64, threads)
+            })
+            .collect::<Result<Vec<Kernel>>>()?;
+        let mut offset = 0;
+        let results: Vec<ResultRange> = ["cell_sums", "node_sums", "contact_totals", "tip_result"]
+            .into_iter()
+            .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
+            .map(|(name, size)| {
+                offset += size;
+                ResultRange { name, offset: offset - size, size }
+            })
+            .collect();
+        let staging: Vec<wgpu::Buffer> = (0..RING)
+            .map(|_| {
+                gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("frame results"),
+                    size: offset,
+                    usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+                    mapped_at_creation: false,
+                })
+            })
+            .collect();
+        bytes += offset * RING as u64;
+        if let Some(error) = pollster::block_on(scope.pop()) {
+            return Err(Error::Device(error.to_string()));
+        }
+        let info = EngineInfo {
+            engine: "gpu".into(),
+            adapter: super::device::describe(&gpu.info),
+            driver: format!("{} {}", gpu.info.driver, gpu.info.driver_info).trim().into(),
+            device_bytes: bytes,
+            software: gpu.is_software(),
+        };
+        Ok(GpuEngine {
+            model,
+            gpu,
+            info,
+            strips,
+            dt,
+            kernels,
+            buffers,
+            results,
+            staging,
+            in_flight: VecDeque::new(),
+            finished: VecDeque::new(),
+            max_steps,
+            gravity_work: 0.0,
+        })
+    }
+
+    /// The opened device, for drawing on the same adapter.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Names and sizes of all device buffers [bytes].
+    pub fn buffer_sizes(&self) -> Vec<(&'static str, u64)> {
+        self.buffers.iter().map(|(n, b)| (*n, b.size())).collect()
+    }
+
+    fn collect_oldest(&mut self, wait: bool) -> Result<bool> {
+        let Some(front) = self.in_flight.front() else { return Ok(false) };
+        let poll = if wait {
+            wgpu::PollType::Wait { submission_index: Some(front.submission.clone()), timeout: None }
+        } else {
+            wgpu::PollType::Poll
+        };
+        self.gpu.device.poll(poll).map_err(|e| Error::Device(e.to_string()))?;
+        self.gpu.check()?;
+        match front.mapped.load(Ordering::Acquire) {
+            1 => {}
+            2 => return Err(Error::Device("results of a frame could not be mapped".into())),
+            _ if wait => return Err(Error::Device("results of a frame did not arrive".into())),
+            _ => return Ok(false),
+        }
+        let Some(done) = self.in_flight.pop_front() else { return Ok(false) };
+        let buffer = self.staging[done.slot].clone();
+        let sums = {
+            let view = buffer.get_mapped_range(..).map_err(|e| Error::Device(e.to_string()))?;
+            self.sum_up(&done, &view)
+        };
+        buffer.unmap();
+        self.finished.push_back(sums);
+        Ok(true)
+    }
+
+    /// Adds the partial sums of a frame in f64.
+    fn sum_up(&mut self, done: &InFlight, view: &[u8]) -> FrameSums {
+        let mut sums = FrameSums {
+            frame: done.frame,
+            steps: done.steps,
+            min_j: f64::INFINITY,
+            min_corner_j: f64::INFINITY,
+            ..Default::default()
+        };
+        let mut moment = DVec3::ZERO;
+        for range in &self.results {
+            let bytes = &view[range.offset as usize..(range.offset + range.size) as usize];
+            match range.name {
+                "cell_sums" => {
+                    for s in read_all::<CellSums>(bytes) {
+                        sums.elastic += f64::from(s.elastic);
+                        sums.hourglass += f64::from(s.hourglass);
+                        sums.min_j = sums.min_j.min(f64::from(s.min_jacobian));
+                        sums.min_corner_j = sums.min_corner_j.min(f64::from(s.min_corner_jacobian));
+                        sums.inverted_cells += s.inverted_cells;
+                        if s.inverted_cells > 0 {
+                            sums.inverted_cell.get_or_insert(s.inverted_cell);
+                        }
+                    }
+                }
+                "node_sums" => {
+                    for s in read_all::<NodeSums>(bytes) {
+                        sums.kinetic += f64::from(s.kinetic);
+                        sums.damping_dissipation += f64::from(s.damping);
+                        sums.load_work += f64::from(s.work);
+                        moment += DVec3::new(s.moment_x.into(), s.moment_y.into(), s.moment_z.into());
+                        sums.max_speed = sums.max_speed.max(f64::from(s.max_speed));
+                        sums.raised_mass += s.raised_mass;
+                        sums.clamped_nodes += s.clamped_nodes;
+                        sums.not_finite |= s.out_of_range > 0;
+                    }
+                }
+                "contact_totals" => {
+                    for s in read_all::<ContactSums>(bytes) {
+                        let vector = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
+                        sums.impulse += vector(s.impulse);
+                        sums.angular_impulse += vector(s.angular_impulse);
+                        sums.cutting_impulse += f64::from(s.cutting);
+                        sums.spreading_impulse += f64::from(s.spreading);
+                        sums.friction_impulse += f64::from(s.sliding);
+                        sums.tool_work += f64::from(s.work);
+                        sums.friction_dissipation += f64::from(s.sliding_dissipation);
+                        sums.contact_dissipation += f64::from(s.damping_dissipation);
+                        sums.contact_energy += f64::from(s.stored);
+                    }
+                }
+                _ => {
+                    for s in read_all::<TipState>(bytes) {
+                        sums.tip_coordinate = f64::from(s.coordinate);
+                        sums.tip_dissipation = f64::from(s.dissipation);
+                        sums.softening_dissipation = f64::from(s.softening);
+                        sums.contact_energy += f64::from(s.spring_energy);
+                    }
+                }
+            }
+        }
+        if let Some(gravity) = self.model.effects.gravity {
+            let total = moment.dot(gravity.acceleration) / self.model.mass_scaling();
+            sums.load_work += total - self.gravity_work;
+            self.gravity_work = total;
+        }
+        sums
+    }
+
+    /// Copies buffers to the host; waits for everything under way.
+    fn read_buffers(&mut self, names: &[&'static str]) -> Result<Vec<Vec<u8>>> {
+        while self.collect_oldest(true)? {}
+        let wanted: Vec<&wgpu::Buffer> = names.iter().map(|n| &self.buffers[n]).collect();
+        let total = wanted.iter().map(|b| b.size()).sum();
+        let staging = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("state"),
+            size: total,
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let mut offset = 0;
+        for buffer in &wanted {
+            encoder.copy_buffer_to_buffer(buffer, 0, &staging, offset, buffer.size());
+            offset += buffer.size();
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| Error::Device(e.to_string()))?;
+        self.gpu.check()?;
+        let view = staging.get_mapped_range(..).map_err(|e| Error::Device(e.to_string()))?;
+        let mut start = 0;
+        Ok(wanted
+            .iter()
+            .map(|b| {
+                let end = start + b.size() as usize;
+                let bytes = view[start..end].to_vec();
+                start = end;
+                bytes
+            })
+            .collect())
+    }
+
+    fn encode_step(&self, pass: &mut wgpu::ComputePass<'_>, step: usize) {
+        let offset = (step * size_of::<StepInput>()) as u32;
+        for kernel in self.kernels.iter().filter(|k| !k.stage.once_per_frame()) {
+            kernel.encode(pass, offset);
+        }
+    }
+}
+
+/// Values of a byte slice that need not be aligned.
+fn read_all<T: bytemuck::Pod>(bytes: &[u8]) -> impl Iterator<Item = T> + '_ {
+    bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned)
+}
+
+/// Threads of the measuring stages: enough to fill a device, few enough that the sums are a short read-back.
+fn measure_threads(model: &Model) -> u32 {
+    (model.mesh.cell_count() as u32 / 16).clamp(64, 8192).next_multiple_of(64)
+}
+
+/// Threads that a stage needs.
+fn threads(stage: Stage, model: &Model, strips: &Strips, measure_threads: u32) -> u32 {
+    match stage {
+        Stage::AdvanceTip => 32,
+        Stage::SoftenPath => model.puncture.as_ref().map_or(1, |p| p.cells.len() as u32),
+        Stage::ElementForces => strips.columns * strips.count,
+        Stage::NeedleContact | Stage::IndenterContact => model.contact_nodes.len() as u32,
+        Stage::IntegrateNodes => model.mesh.node_count() as u32,
+        Stage::MeasureCells | Stage::MeasureNodes => measure_threads,
+        Stage::MeasureContact => CONTACT_PARTS as u32,
+    }
+}
+
+/// All buffers by the name of their shader variable.
+const BUFFERS: [&str; 28] = [
+    "params",
+    STEP_INPUT,
+    "gravity",
+    "puncture",
+    "friction",
+    "indentation",
+    "cell_edges",
+    "node_mass",
+    "node_load",
+    "grid_lines",
+    "contact_nodes",
+    "tip_anchors",
+    "path_cells",
+    "node_displacement",
+    "node_velocity",
+    "corner_force",
+    "clamped_nodes",
+    "node_work",
+    "cell_sums",
+    "node_sums",
+    "cell_stiffness",
+    "tip_state",
+    "tip_anchor_loads",
+    "softening_dissipation",
+    "contact_memory",
+    "contact_sums",
+    "contact_totals",
+    "tip_result",
+];
+
+/// What a buffer holds at the start: bytes, or zeros of a size.
+enum Contents {
+    Bytes(Vec<u8>),
+    Zeros(u64),
+}
+
+fn bytes_of<T: bytemuck::NoUninit>(values: &[T]) -> Contents {
+    Contents::Bytes(bytemuck::cast_slice(values).to_vec())
+}
+
+fn vec4(v: DVec3) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, 0.0]
+}
+
+fn contents(
+    name: &str,
+    model: &Model,
+    strips: &Strips,
+    dt: f64,
+    measure_threads: u32,
+    max_steps: usize,
+) -> Contents {
+    let nodes = model.mesh.node_count() as u64;
+    let contacts = model.contact_nodes.len().max(1) as u64;
+    let zeros = |count: u64, size: usize| Contents::Zeros(count * size as u64);
+    match name {
+        "params" => bytes_of(&[params(model, strips, dt, measure_threads)]),
+        STEP_INPUT => zeros(max_steps.max(1) as u64, size_of::<StepInput>()),
+        "gravity" => {
+            let g = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration);
+            bytes_of(&[GravityParams { acceleration: vec4(g / model.mass_scaling()) }])
+        }
+        "puncture" => bytes_of(&[puncture_params(model)]),
+        "friction" => {
+            let p = model.effects.friction.unwrap_or_default();
+            bytes_of(&[FrictionParams {
+                coefficient: p.coefficient as f32,
+                stiffness_ratio: p.stiffness_ratio as f32,
+                fade_length: p.fade_length as f32,
+                _pad: 0.0,
+            }])
+        }
+        "indentation" => bytes_of(&[indentation_params(model)]),
+        "cell_edges" => {
+            let edges: Vec<CellEdge> = model
+                .mesh
+                .lines
+                .iter()
+                .flat_map(|l| l.windows(2).map(|w| w[1] - w[0]))
+                .map(|d| CellEdge {
+                    length: d as f32,
+                    cube_root: d.cbrt() as f32,
+                    quarter_inverse: (0.25 / d) as f32,
+                    _pad: 0.0,
+                })
+                .collect();
+            bytes_of(&edges)
+        }
+        "node_mass" => bytes_of(&model.node_mass.iter().map(|m| *m as f32).collect::<Vec<_>>()),
+        "node_load" => bytes_of(&model.node_load.iter().map(|f| vec4(*f)).collect::<Vec<_>>()),
+        "grid_lines" => bytes_of(&model.mesh.lines.iter().flatten().map(|x| *x as f32).collect::<Vec<_>>()),
+        "contact_nodes" => bytes_of(&contact_nodes(model, strips)),
+        "tip_anchors" => {
+            let plan = model.puncture.as_ref();
+            let anchors = plan.map_or(&[][..], |p| &p.anchors);
+            bytes_of(&anchors.iter().map(|a| TipAnchor { surface: vec4(a.surface) }).collect::<Vec<_>>())
+        }
+        "path_cells" => {
+            let plan = model.puncture.as_ref();
+            let mut cells: Vec<PathCell> = plan
+                .map_or(&[][..], |p| &p.cells)
+                .iter()
+                .map(|c| PathCell {
+                    cell: c.cell,
+                    fraction: c.fraction as f32,
+                    axial_start: c.axial_start as f32,
+                    axial_end: c.axial_end as f32,
+                })
+                .collect();
+            cells.resize(cells.len().max(1), PathCell::zeroed());
+            bytes_of(&cells)
+        }
+        "node_displacement" | "node_velocity" => zeros(nodes, 16),
+        "corner_force" => zeros(strips.slots(), 16),
+        "clamped_nodes" => zeros(1, 4),
+        "node_work" => zeros(nodes, 4),
+        "cell_sums" => zeros(measure_threads.into(), size_of::<CellSums>()),
+        "node_sums" => zeros(measure_threads.into(), size_of::<NodeSums>()),
+        "cell_stiffness" => bytes_of(&vec![1.0f32; model.mesh.cell_count()]),
+        "tip_state" | "tip_result" => zeros(1, size_of::<TipState>()),
+        "tip_anchor_loads" => zeros(ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
+        "softening_dissipation" => zeros(model.puncture.as_ref().map_or(1, |p| p.cells.len().max(1) as u64), 4),
+        "contact_memory" => zeros(contacts, size_of::<ContactMemory>()),
+        "contact_sums" => zeros(contacts, size_of::<ContactSums>()),
+        _ => zeros(CONTACT_PARTS as u64, size_of::<ContactSums>()),
+    }
+}
+
+fn create_buffer(gpu: &Gpu, name: &str, contents: &Contents, uniform: bool) -> Result<wgpu::Buffer> {
+    let size = match contents {
+        Contents::Bytes(bytes) => bytes.len() as u64,
+        Contents::Zeros(size) => *size,
+    }
+    .next_multiple_of(4)
+    .max(4);
+    let limit = gpu.device.limits().max_storage_buffer_binding_size;
+    if size > limit {
+        return Err(Error::input(
+            format!(
+                "the mesh is too fine: buffer `{name}` would need {:.0} MiB, a portable device binds {:.0} MiB",
+                size as f64 / 1048576.0,
+                limit as f64 / 1048576.0
+            ),
+            "choose a larger cell_size_mm or a smaller block, or --engine cpu",
+        ));
+    }
+    let kind = if uniform { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(name),
+        size,
+        usage: kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+        mapped_at_creation: false,
+    });
+    if let Contents::Bytes(bytes) = contents {
+        gpu.queue.write_buffer(&buffer, 0, bytes);
+    }
+    Ok(buffer)
+}
+
+fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Params {
+    let [cx, cy, cz] = model.mesh.cells().map(|c| c as u32);
+    let law = model.scene.material.law;
+    let solver = &model.scene.solver;
+    let fixed: Vec<u32> = model
+        .faces()
+        .iter()
+        .map(|f| (0..3).map(|a| u32::from(f.fixed[a]) << a).sum())
+        .collect();
+    Params {
+        cells_x: cx,
+        cells_y: cy,
+        cells_z: cz,
+        nodes_x: cx + 1,
+        nodes_y: cy + 1,
+        nodes_z: cz + 1,
+        column_count: strips.columns,
+        strip_layers: strips.layers,
+        strip_count: strips.count,
+        padded_columns: strips.padded_columns,
+        measure_threads,
+        fixed_x_min: fixed[0],
+        fixed_x_max: fixed[1],
+        fixed_y_min: fixed[2],
+        fixed_y_max: fixed[3],
+        fixed_z_min: fixed[4],
+        fixed_z_max: fixed[5],
+        c10: law.c10 as f32,
+        c01: law.c01 as f32,
+        bulk_modulus: law.bulk_modulus as f32,
+        shear_bound: (4.0 / 3.0 * law.shear_modulus()) as f32,
+        hourglass: (solver.hourglass_stiffness * crate::solver::cpu::HOURGLASS_MODULUS * law.shear_modulus()) as f32,
+        quartic: solver.hourglass_quartic as f32,
+        dt: dt as f32,
+        mass_damping: solver.mass_damping as f32,
+        speed_limit: model.speed_limit(dt) as f32,
+        _pad0: 0,
+        _pad1: 0,
+    }
+}
+
+fn puncture_params(model: &Model) -> PunctureParams {
+    model.puncture.as_ref().map_or(PunctureParams::zeroed(), |plan| {
+        let p = plan.params;
+        PunctureParams {
+            puncture_force: p.puncture_force as f32,
+            cutting_force: p.cutting_force as f32,
+            transition_length: p.transition_length as f32,
+            tip_stiffness: p.tip_stiffness as f32,
+            residual_stiffness: p.residual_stiffness as f32,
+            contact_stiffness: plan.contact_stiffness as f32,
+            contact_damping: p.contact_damping as f32,
+            entry_fade: p.entry_fade as f32,
+            needle_radius: plan.needle.radius as f32,
+            tip_length: plan.needle.tip_length as f32,
+            path_cell_count: plan.cells.len() as u32,
+            _pad: 0,
+        }
+    })
+}
+
+fn indentation_params(model: &Model) -> IndentationParams {
+    let p = model.effects.indentation.unwrap_or_default();
+    let (radius, flat, bonded) = match model.scene.tool {
+        Some(Tool::Sphere { radius }) => (radius, false, false),
+        Some(Tool::FlatPunch { radius, bonded }) => (radius, true, bonded),
+        _ => (0.0, false, false),
+    };
+    IndentationParams {
+        radius: radius as f32,
+        contact_stiffness: model.tool_contact_stiffness() as f32,
+        contact_damping: p.contact_damping as f32,
+        flat: flat.into(),
+        bonded: bonded.into(),
+        ..Zeroable::zeroed()
+    }
+}
+
+fn contact_nodes(model: &Model, strips: &Strips) -> Vec<ContactNode> {
+    let cells = model.mesh.cells();
+    let mut nodes: Vec<ContactNode> = model
+        .contact_nodes
+        .iter()
+        .map(|c| {
+            let node = c.node as usize;
+            let [i, j, k] = model.mesh.node_coordinates(node);
+            ContactNode {
+                rest: vec4(model.mesh.rest_position(node)),
+                grid: [i as u32, j as u32, k as u32, 0],
+                node: c.node,
+                slot: strips.owned_slot([i, j, k], cells),
+                pushed: c.pushed.into(),
+                rest_radius: c.rest_radius as f32,
+                rest_axial: c.rest_axial as f32,
+                mass: model.node_mass[node] as f32,
+                _pad0: 0,
+                _pad1: 0,
+            }
+        })
+        .collect();
+    nodes.resize(nodes.len().max(1), ContactNode::zeroed());
+    nodes
+}
+
+/// A step's input in the layout of the shader.
+fn step_input(input: &crate::solver::engine::StepInput, dt: f64) -> StepInput {
+    let mut out = StepInput { load_factor: input.load_factor as f32, ..StepInput::zeroed() };
+    if let Some(pose) = input.pose {
+        out.tip = vec4(pose.tip);
+        out.velocity = vec4(pose.velocity);
+        out.direction = vec4(pose.direction);
+        out.depth = pose.depth as f32;
+        out.speed = pose.velocity.length() as f32;
+    }
+    for (out, drive) in out.drives.iter_mut().zip(&input.drives) {
+        *out = DriveStep {
+            translation_rate: vec4(drive.translation / dt),
+            cosine_rate: (drive.cosine / dt) as f32,
+            sine_rate: (drive.sine / dt) as f32,
+            _pad0: 0.0,
+            _pad1: 0.0,
+        };
+    }
+    out
+}
+
+impl Engine for GpuEngine {
+    fn info(&self) -> &EngineInfo {
+        &self.info
+    }
+
+    fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {
+        if plan.steps.len() > self.max_steps {
+            return Err(Error::Device(format!(
+                "a frame of {} steps does not fit the {} that were planned",
+                plan.steps.len(),
+                self.max_steps
+            )));
+        }
+        if self.in_flight.len() == RING {
+            self.collect_oldest(true)?;
+        }
+        if let Some(buffer) = self.buffers.get(STEP_INPUT) {
+            let inputs: Vec<StepInput> = plan.steps.iter().map(|s| step_input(s, self.dt)).collect();
+            self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&inputs));
+        }
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            for step in 0..plan.steps.len() {
+                self.encode_step(&mut pass, step);
+            }
+            let last = (plan.steps.len().saturating_sub(1) * size_of::<StepInput>()) as u32;
+            for kernel in self.kernels.iter().filter(|k| k.stage.once_per_frame()) {
+                kernel.encode(&mut pass, last);
+            }
+        }
+        let slot = (0..RING).find(|s| self.in_flight.iter().all(|f| f.slot != *s)).unwrap_or(0);
+        for range in &self.results {
+            encoder.copy_buffer_to_buffer(&self.buffers[range.name], 0, &self.staging[slot], range.offset, range.size);
+        }
+        let submission = self.gpu.queue.submit([encoder.finish()]);
+        let mapped = Arc::new(AtomicU8::new(0));
+        let flag = mapped.clone();
+        self.staging[slot].map_async(wgpu::MapMode::Read, .., move |result| {
+            flag.store(if result.is_ok() { 1 } else { 2 }, Ordering::Release);
+        });
+        self.in_flight.push_back(InFlight {
+            slot,
+            frame: plan.frame,
+            steps: plan.steps.len() as u32,
+            submission,
+            mapped,
+        });
+        Ok(())
+    }
+
+    fn collect(&mut self, wait: bool) -> Result<Option<FrameSums>> {
+        if self.finished.is_empty() {
+            self.collect_oldest(wait)?;
+        }
+        Ok(self.finished.pop_front())
+    }
+
+    fn read_state(&mut self) -> Result<State> {
+        let mut names = vec!["node_displacement", "node_velocity"];
+        let puncture = self.buffers.contains_key("cell_stiffness");
+        let contact = self.buffers.contains_key("contact_memory");
+        if puncture {
+            names.extend(["cell_stiffness", "tip_state"]);
+        }
+        if contact {
+            names.push("contact_memory");
+        }
+        let bytes = self.read_buffers(&names)?;
+        let mut state = State {
+            displacement: read_all::<[i32; 4]>(&bytes[0])
+                .map(|u| DVec3::new(u[0].into(), u[1].into(), u[2].into()) * DISPLACEMENT_UNIT)
+                .collect(),
+            velocity: read_all::<[f32; 4]>(&bytes[1])
+                .map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into()))
+                .collect(),
+            ..Default::default()
+        };
+        if puncture {
+            state.stiffness = read_all::<f32>(&bytes[2]).map(f64::from).collect();
+            state.tip_coordinate = read_all::<TipState>(&bytes[3]).next().map_or(0.0, |t| t.coordinate.into());
+        }
+        if contact {
+            state.contact = read_all::<ContactMemory>(&bytes[names.len() - 1])
+                .map(|m| ContactState {
+                    stick: DVec3::new(m.stick[0].into(), m.stick[1].into(), m.stick[2].into()),
+                    overlap: m.overlap.into(),
+                    axial_on: m.axial_on.into(),
+                    touching: m.touching != 0.0,
+                })
+                .collect();
+        }
+        Ok(state)
+    }
+
+    fn write_state(&mut self, state: &State) -> Result<()> {
+        while self.collect_oldest(true)? {}
+        if state.displacement.len() != self.model.mesh.node_count() {
+            return Err(Error::Device("state of another mesh".into()));
+        }
+        let fixed = |x: f64| (x / DISPLACEMENT_UNIT).round() as i32;
+        let u: Vec<[i32; 4]> = state.displacement.iter().map(|u| [fixed(u.x), fixed(u.y), fixed(u.z), 0]).collect();
+        let v: Vec<[f32; 4]> = state.velocity.iter().map(|v| vec4(*v)).collect();
+        let write = |name: &str, bytes: &[u8]| {
+            if let Some(buffer) = self.buffers.get(name) {
+                self.gpu.queue.write_buffer(buffer, 0, bytes);
+            }
+        };
+        write("node_displacement", bytemuck::cast_slice(&u));
+        write("node_velocity", bytemuck::cast_slice(&v));
+        let stiffness: Vec<f32> = state.stiffness.iter().map(|s| *s as f32).collect();
+        write("cell_stiffness", bytemuck::cast_slice(&stiffness));
+        let tip = TipState { coordinate: state.tip_coordinate as f32, ..TipState::zeroed() };
+        write("tip_state", bytemuck::bytes_of(&tip));
+        let memory: Vec<ContactMemory> = state
+            .contact
+            .iter()
+            .map(|c| ContactMemory {
+                stick: vec4(c.stick),
+                overlap: c.overlap as f32,
+                axial_on: c.axial_on as f32,
+                touching: if c.touching { 1.0 } else { 0.0 },
+                _pad: 0.0,
+            })
+            .collect();
+        write("contact_memory", bytemuck::cast_slice(&memory));
+        if let Some(gravity) = self.model.effects.gravity {
+            let moment: DVec3 = state.displacement.iter().zip(&self.model.node_mass).map(|(u, m)| *u * *m).sum();
+            self.gravity_work = moment.dot(gravity.acceleration) / self.model.mass_scaling();
+        }
+        Ok(())
+    }
+
+    fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
+        while self.collect_oldest(true)? {}
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            for kernel in self.kernels.iter().filter(|k| k.stage == Stage::ElementForces) {
+                kernel.encode(&mut pass, 0);
+            }
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        let bytes = self.read_buffers(&["corner_force"])?;
+        let slots: Vec<[f32; 4]> = read_all(&bytes[0]).collect();
+        let strips = &self.strips;
+        let [nx, ny, nz] = self.model.mesh.cells();
+        let mut force = vec![DVec3::ZERO; self.model.mesh.node_count()];
+        for strip in 0..strips.count {
+            let first = strip * strips.layers;
+            for k in first..=(first + strips.layers).min(nz as u32) {
+                for (j, i, corner) in (0..ny).flat_map(|j| (0..nx).flat_map(move |i| (0..4).map(move |c| (j, i, c)))) {
+                    let f = slots[strips.slot(strip, k, corner, i as u32, j as u32) as usize];
+                    let node = self.model.mesh.node_index(
+                        i + (corner & 1) as usize,
+                        j + (corner >> 1) as usize,
+                        k as usize,
+                    );
+                    force[node] -= DVec3::new(f[0].into(), f[1].into(), f[2].into());
+                }
+            }
+        }
+        Ok(force)
+    }
+}

@@ -1,0 +1,181 @@
+//! From a stage's name to a pipeline: compose, validate, find bindings by name.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+use super::compose::{Composed, compose};
+use crate::error::{Error, Result};
+use crate::solver::step::Stage;
+
+/// One resource of an entry point.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Binding {
+    /// Variable name in the shader, which is also the name of the buffer.
+    pub name: String,
+    pub group: u32,
+    pub binding: u32,
+    pub uniform: bool,
+    pub writable: bool,
+}
+
+/// A stage composed and validated, without a device.
+pub struct Reflected {
+    pub stage: Stage,
+    pub composed: Composed,
+    pub module: naga::Module,
+    pub bindings: Vec<Binding>,
+    pub workgroup_size: u32,
+}
+
+/// Composes and validates a stage and lists the resources that its entry point uses.
+pub fn reflect(stage: Stage, defines: &BTreeSet<&'static str>) -> Result<Reflected> {
+    let composed = compose(&format!("stages/{}", stage.name()), defines)?;
+    let fail = |message: String| Error::Shader { stage: stage.name().into(), message };
+    let module = naga::front::wgsl::parse_str(&composed.source).map_err(|e| {
+        let line = e.location(&composed.source).map_or(0, |l| l.line_number as usize);
+        fail(format!("{}\n{}", composed.place(line), e.emit_to_string(&composed.source)))
+    })?;
+    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
+        .validate(&module)
+        .map_err(|e| {
+            let line = e.location(&composed.source).map_or(0, |l| l.line_number as usize);
+            fail(format!("{}\n{}", composed.place(line), e.emit_to_string(&composed.source)))
+        })?;
+    let entry = module
+        .entry_points
+        .iter()
+        .position(|e| e.name == stage.name())
+        .ok_or_else(|| fail("no entry point of that name".into()))?;
+    let used = info.get_entry_point(entry);
+    let bindings = module
+        .global_variables
+        .iter()
+        .filter(|(handle, _)| !used[*handle].is_empty())
+        .filter_map(|(_, variable)| {
+            let at = variable.binding.as_ref()?;
+            let writable = matches!(variable.space,
+                naga::AddressSpace::Storage { access } if access.contains(naga::StorageAccess::STORE));
+            Some(Binding {
+                name: variable.name.clone().unwrap_or_default(),
+                group: at.group,
+                binding: at.binding,
+                uniform: variable.space == naga::AddressSpace::Uniform,
+                writable,
+            })
+        })
+        .collect();
+    let workgroup_size = module.entry_points[entry].workgroup_size.iter().product();
+    Ok(Reflected { stage, composed, module, bindings, workgroup_size })
+}
+
+/// Name of the uniform that changes from step to step and is bound with a dynamic offset.
+pub const STEP_INPUT: &str = "step_input";
+
+/// A pipeline with its bind groups.
+pub struct Kernel {
+    pub stage: Stage,
+    pipeline: wgpu::ComputePipeline,
+    /// Bind group per group index and whether it takes the dynamic offset of the step.
+    groups: Vec<Option<(wgpu::BindGroup, bool)>>,
+    workgroup_size: u32,
+    threads: u32,
+}
+
+impl Kernel {
+    /// Builds the pipeline of a stage that runs `threads` threads, binding `buffers` by name.
+    pub fn new(
+        device: &wgpu::Device,
+        reflected: Reflected,
+        buffers: &BTreeMap<&'static str, wgpu::Buffer>,
+        step_input_size: u64,
+        threads: u32,
+    ) -> Result<Self> {
+        let Reflected { stage, module, bindings, workgroup_size, .. } = reflected;
+        let label = Some(stage.name());
+        let group_count = bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
+        let mut layouts = Vec::new();
+        let mut groups = Vec::new();
+        for group in 0..group_count {
+            let members: Vec<&Binding> = bindings.iter().filter(|b| b.group == group).collect();
+            if members.is_empty() {
+                layouts.push(None);
+                groups.push(None);
+                continue;
+            }
+            let entries: Vec<wgpu::BindGroupLayoutEntry> = members
+                .iter()
+                .map(|b| wgpu::BindGroupLayoutEntry {
+                    binding: b.binding,
+                    visibility: wgpu::ShaderStages::COMPUTE,
+                    ty: wgpu::BindingType::Buffer {
+                        ty: match b.uniform {
+                            true => wgpu::BufferBindingType::Uniform,
+                            false => wgpu::BufferBindingType::Storage { read_only: !b.writable },
+                        },
+                        has_dynamic_offset: b.name == STEP_INPUT,
+                        min_binding_size: None,
+                    },
+                    count: None,
+                })
+                .collect();
+            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
+            let mut resources = Vec::new();
+            for b in &members {
+                let buffer = buffers.get(b.name.as_str()).ok_or_else(|| Error::Shader {
+                    stage: stage.name().into(),
+                    message: format!("no buffer for binding `{}`", b.name),
+                })?;
+                let size = (b.name == STEP_INPUT).then_some(step_input_size).and_then(wgpu::BufferSize::new);
+                resources.push(wgpu::BindGroupEntry {
+                    binding: b.binding,
+                    resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }),
+                });
+            }
+            let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label,
+                layout: &layout,
+                entries: &resources,
+            });
+            groups.push(Some((bind_group, members.iter().any(|b| b.name == STEP_INPUT))));
+            layouts.push(Some(layout));
+        }
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &layouts.iter().map(Option::as_ref).collect::<Vec<_>>(),
+            immediate_size: 0,
+        });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label,
+            source: wgpu::ShaderSource::Naga(std::borrow::Cow::Owned(module)),
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label,
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some(stage.name()),
+            // Zeroing of workgroup memory can take seconds on some drivers; the shaders initialise what they read.
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        Ok(Kernel { stage, pipeline, groups, workgroup_size, threads })
+    }
+
+    /// Records the dispatch. `step_offset` is the byte offset of the step's input.
+    pub fn encode(&self, pass: &mut wgpu::ComputePass<'_>, step_offset: u32) {
+        pass.set_pipeline(&self.pipeline);
+        for (index, group) in self.groups.iter().enumerate() {
+            if let Some((group, dynamic)) = group {
+                let offsets: &[u32] = if *dynamic { &[step_offset] } else { &[] };
+                pass.set_bind_group(index as u32, group, offsets);
+            }
+        }
+        // 65,535 workgroups per dimension are the portable limit; shaders undo the wrap with `thread_index`.
+        let groups = self.threads.div_ceil(self.workgroup_size).max(1);
+        let rows = groups.div_ceil(65_535);
+        pass.dispatch_workgroups(groups.div_ceil(rows), rows, 1);
+    }
+}

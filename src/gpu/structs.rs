@@ -1,0 +1,208 @@
+//! Structs shared with the shaders: same names, same fields, same order as in `shaders/`. A test compares the layouts.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Declares `#[repr(C)]` structs with a list of their field names and offsets for the layout test.
+macro_rules! shared_structs {
+    ($($(#[$meta:meta])* struct $name:ident { $($field:ident: $ty:ty,)* })*) => {
+        $(
+            $(#[$meta])*
+            #[repr(C)]
+            #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+            pub struct $name { $(pub $field: $ty,)* }
+        )*
+
+        /// Name, size and (field, offset) of every shared struct.
+        pub fn layouts() -> Vec<(&'static str, usize, Vec<(&'static str, usize)>)> {
+            vec![$((
+                stringify!($name),
+                size_of::<$name>(),
+                vec![$((stringify!($field), std::mem::offset_of!($name, $field)),)*],
+            ),)*]
+        }
+    };
+}
+
+shared_structs! {
+    /// shaders/shared/params.wgsl
+    struct Params {
+        cells_x: u32,
+        cells_y: u32,
+        cells_z: u32,
+        nodes_x: u32,
+        nodes_y: u32,
+        nodes_z: u32,
+        column_count: u32,
+        strip_layers: u32,
+        strip_count: u32,
+        padded_columns: u32,
+        measure_threads: u32,
+        fixed_x_min: u32,
+        fixed_x_max: u32,
+        fixed_y_min: u32,
+        fixed_y_max: u32,
+        fixed_z_min: u32,
+        fixed_z_max: u32,
+        c10: f32,
+        c01: f32,
+        bulk_modulus: f32,
+        shear_bound: f32,
+        hourglass: f32,
+        quartic: f32,
+        dt: f32,
+        mass_damping: f32,
+        speed_limit: f32,
+        _pad0: u32,
+        _pad1: u32,
+    }
+    /// shaders/shared/step_input.wgsl
+    struct DriveStep {
+        translation_rate: [f32; 4],
+        cosine_rate: f32,
+        sine_rate: f32,
+        _pad0: f32,
+        _pad1: f32,
+    }
+    /// shaders/shared/step_input.wgsl
+    struct StepInput {
+        tip: [f32; 4],
+        velocity: [f32; 4],
+        direction: [f32; 4],
+        depth: f32,
+        speed: f32,
+        load_factor: f32,
+        _pad: f32,
+        drives: [DriveStep; 6],
+    }
+    /// shaders/shared/cell_edge.wgsl
+    struct CellEdge {
+        length: f32,
+        cube_root: f32,
+        quarter_inverse: f32,
+        _pad: f32,
+    }
+    /// shaders/effects/gravity.wgsl
+    struct GravityParams {
+        acceleration: [f32; 4],
+    }
+    /// shaders/effects/puncture.wgsl
+    struct PunctureParams {
+        puncture_force: f32,
+        cutting_force: f32,
+        transition_length: f32,
+        tip_stiffness: f32,
+        residual_stiffness: f32,
+        contact_stiffness: f32,
+        contact_damping: f32,
+        entry_fade: f32,
+        needle_radius: f32,
+        tip_length: f32,
+        path_cell_count: u32,
+        _pad: u32,
+    }
+    /// shaders/effects/puncture.wgsl
+    struct TipAnchor {
+        surface: [f32; 4],
+    }
+    /// shaders/effects/puncture.wgsl
+    struct TipAnchorLoad {
+        cell: [u32; 4],
+        local: [f32; 4],
+        force: f32,
+        _pad0: f32,
+        _pad1: f32,
+        _pad2: f32,
+    }
+    /// shaders/effects/puncture.wgsl
+    struct TipState {
+        coordinate: f32,
+        dissipation: f32,
+        spring_energy: f32,
+        softening: f32,
+    }
+    /// shaders/effects/puncture.wgsl
+    struct PathCell {
+        cell: u32,
+        fraction: f32,
+        axial_start: f32,
+        axial_end: f32,
+    }
+    /// shaders/effects/friction.wgsl
+    struct FrictionParams {
+        coefficient: f32,
+        stiffness_ratio: f32,
+        fade_length: f32,
+        _pad: f32,
+    }
+    /// shaders/effects/indentation.wgsl
+    struct IndentationParams {
+        radius: f32,
+        contact_stiffness: f32,
+        contact_damping: f32,
+        flat: u32,
+        bonded: u32,
+        _pad0: u32,
+        _pad1: u32,
+        _pad2: u32,
+    }
+    /// shaders/shared/contact_node.wgsl
+    struct ContactNode {
+        rest: [f32; 4],
+        grid: [u32; 4],
+        node: u32,
+        slot: u32,
+        pushed: u32,
+        rest_radius: f32,
+        rest_axial: f32,
+        mass: f32,
+        _pad0: u32,
+        _pad1: u32,
+    }
+    /// shaders/shared/contact_node.wgsl
+    struct ContactMemory {
+        stick: [f32; 4],
+        overlap: f32,
+        axial_on: f32,
+        touching: f32,
+        _pad: f32,
+    }
+    /// shaders/shared/contact_node.wgsl
+    struct ContactSums {
+        impulse: [f32; 4],
+        angular_impulse: [f32; 4],
+        cutting: f32,
+        spreading: f32,
+        sliding: f32,
+        work: f32,
+        sliding_dissipation: f32,
+        damping_dissipation: f32,
+        stored: f32,
+        _pad: f32,
+    }
+    /// shaders/shared/cell_sums.wgsl
+    struct CellSums {
+        elastic: f32,
+        hourglass: f32,
+        min_jacobian: f32,
+        min_corner_jacobian: f32,
+        inverted_cells: u32,
+        inverted_cell: u32,
+        _pad0: u32,
+        _pad1: u32,
+    }
+    /// shaders/shared/node_sums.wgsl
+    struct NodeSums {
+        kinetic: f32,
+        damping: f32,
+        work: f32,
+        moment_x: f32,
+        moment_y: f32,
+        moment_z: f32,
+        max_speed: f32,
+        raised_mass: u32,
+        out_of_range: u32,
+        clamped_nodes: u32,
+        _pad0: u32,
+        _pad1: u32,
+    }
+}
