@@ -69,6 +69,9 @@ pub struct Model {
     pub contact_nodes: Vec<ContactNode>,
 }
 
+/// Reference length of the contact stiffness [m].
+const CONTACT_LENGTH: f64 = 0.6e-3;
+
 /// Number of tip springs: one on the axis, 6 at R/2, 12 at R.
 pub const ANCHOR_COUNT: usize = 19;
 
@@ -125,9 +128,13 @@ impl Model {
         0.05 * self.smallest_edge() / dt
     }
 
-    /// Stiffness of a penalty contact, `factor (K + 4/3 mu) h` [N/m].
+    /// Stiffness of a penalty contact, `factor (K + 4/3 mu) l^2 / h` with the reference length l = 0.6 mm [N/m].
+    ///
+    /// With a stiffness that grows like h the force at 12 mm scatters by 14 % over 0.8/0.6/0.5 mm, with this one by
+    /// 8 %: a finer mesh gets the stiffer contact and penetrates less (measured in the default scene).
     fn contact_stiffness(&self, factor: f64) -> f64 {
-        factor * self.scene.material.law.p_wave_modulus() * self.scene.tissue.cell_size
+        let h = self.scene.tissue.cell_size;
+        factor * self.scene.material.law.p_wave_modulus() * CONTACT_LENGTH * CONTACT_LENGTH / h
     }
 
     fn plan_puncture(&mut self) {

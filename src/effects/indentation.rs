@@ -2,7 +2,7 @@
 //!
 //! Gap `g` along the outward normal `n` of the tool; `f = k <-g> n - 2 zeta sqrt(k m) v_n n`, never tensile.
 //! A bonded punch keeps the node at the place of its first touch by a spring of stiffness `k` in all
-//! directions. `k = stiffness_factor (K + 4/3 mu) h` with `h` the fine cell edge [m].
+//! directions. `k = stiffness_factor (K + 4/3 mu) l^2/h` with `h` the fine cell edge, l = 0.6 mm.
 
 use super::Effect;
 

@@ -28,7 +28,7 @@ pub struct Params {
     pub residual_stiffness: f64,
     /// Outer radius of the ring of nodes that the shaft pushes [m] [calibration].
     pub ring_radius: f64,
-    /// Contact stiffness factor: k = factor (K + 4/3 mu) h [calibration].
+    /// Contact stiffness factor: k = factor (K + 4/3 mu) l^2/h, l = 0.6 mm [calibration].
     pub contact_stiffness_factor: f64,
     /// Fraction of critical damping in the contact normal.
     pub contact_damping: f64,
@@ -39,11 +39,11 @@ pub struct Params {
 impl Default for Params {
     fn default() -> Self {
         Params {
-            puncture_force: 0.5,
+            puncture_force: 0.6,
             cutting_force: 0.3,
             transition_length: 0.5e-3,
             tip_stiffness: 2.0e3,
-            softened_radius: 0.6e-3,
+            softened_radius: 0.72e-3,
             residual_stiffness: 0.02,
             ring_radius: 2.0e-3,
             contact_stiffness_factor: 2.35,

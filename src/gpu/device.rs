@@ -51,6 +51,11 @@ pub fn adapters() -> Result<Vec<wgpu::Adapter>> {
     Ok(found)
 }
 
+/// True where the user names an adapter or a backend: then a failure to open one is the user's to mend.
+pub fn adapter_wanted_by_name() -> bool {
+    ["WGPU_ADAPTER_NAME", "WGPU_BACKEND"].iter().any(|v| std::env::var(v).is_ok_and(|s| !s.is_empty()))
+}
+
 impl Gpu {
     /// Opens the adapter named by `WGPU_ADAPTER_NAME` (part of the name, any case), or the best one.
     ///

@@ -29,7 +29,7 @@ pub struct EnergyAccount {
     pub kinetic: f64,
     /// Hourglass energy (stored).
     pub hourglass: f64,
-    /// Dissipated by mass damping and bulk viscosity.
+    /// Dissipated by mass damping.
     pub damping: f64,
     /// Dissipated by friction.
     pub friction: f64,

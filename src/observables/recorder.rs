@@ -27,7 +27,7 @@ impl Recorder {
         e.elastic = sums.elastic;
         e.kinetic = sums.kinetic;
         e.hourglass = sums.hourglass;
-        e.damping += sums.damping_dissipation + sums.viscous_dissipation;
+        e.damping += sums.damping_dissipation;
         e.friction += sums.friction_dissipation;
         e.cutting += sums.tip_dissipation + sums.softening_dissipation;
         self.contact_dissipation += sums.contact_dissipation;

@@ -179,8 +179,6 @@ pub struct SolverSettings {
     pub time_step: Option<f64>,
     /// Mass-proportional damping alpha [1/s].
     pub mass_damping: f64,
-    /// Linear bulk viscosity factor (dimensionless): eta = factor * rho * c_p * h on the rate of F.
-    pub bulk_viscosity: f64,
     /// Hourglass stiffness kappa (dimensionless).
     pub hourglass_stiffness: f64,
     /// Quartic hourglass factor c (dimensionless).

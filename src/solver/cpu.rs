@@ -51,8 +51,6 @@ pub struct Elements {
     hourglass: f64,
     /// c.
     quartic: f64,
-    /// Viscosity per cell edge, eta = factor rho c_p h [Pa s] with h the smallest edge of the cell.
-    viscosity_per_edge: f64,
 }
 
 /// What one cell tells about itself.
@@ -72,7 +70,6 @@ impl Elements {
             law,
             hourglass: solver.hourglass_stiffness * HOURGLASS_MODULUS * law.shear_modulus(),
             quartic: solver.hourglass_quartic,
-            viscosity_per_edge: solver.bulk_viscosity * model.scaled_density() * model.scaled_wave_speed(),
         }
     }
 
@@ -82,7 +79,7 @@ impl Elements {
     }
 
     /// H = F - I (or its rate) at the centre of a cell.
-    fn displacement_gradient(values: &[DVec3; 8], size: DVec3) -> DMat3 {
+    pub fn displacement_gradient(values: &[DVec3; 8], size: DVec3) -> DMat3 {
         let mut h = DMat3::ZERO;
         for (i, u) in values.iter().enumerate() {
             let b = Self::gradient(size, i);
@@ -128,27 +125,18 @@ impl Elements {
     }
 
     /// Forces of the cell on its corners with the minus sign of the motion left out (f_int) and the stiffness bound.
-    /// `stiffness` scales elastic and hourglass parts. Returns also the viscous power [W].
+    /// `stiffness` scales elastic and hourglass parts.
     fn corner_forces(
         &self,
         model: &Model,
         cell: usize,
         u: &[DVec3; 8],
-        v: &[DVec3; 8],
         stiffness: f64,
-    ) -> ([DVec3; 8], f64, f64) {
+    ) -> ([DVec3; 8], f64) {
         let size = model.mesh.cell_size(cell);
         let volume = size.x * size.y * size.z;
         let h = Self::displacement_gradient(u, size);
-        let mut p = self.law.first_piola_kirchhoff(h) * stiffness;
-        let mut viscous_power = 0.0;
-        if self.viscosity_per_edge > 0.0 {
-            let rate = Self::displacement_gradient(v, size);
-            let eta = self.viscosity_per_edge * size.min_element();
-            p += rate * eta;
-            let square = rate.x_axis.length_squared() + rate.y_axis.length_squared() + rate.z_axis.length_squared();
-            viscous_power = volume * eta * square;
-        }
+        let p = self.law.first_piola_kirchhoff(h) * stiffness;
         let q = Self::hourglass_modes(u);
         let q2: f64 = q.iter().map(|q| q.length_squared()).sum();
         let edge = volume.cbrt();
@@ -163,7 +151,7 @@ impl Elements {
         let f = DMat3::IDENTITY + h;
         let i1 = f.x_axis.length_squared() + f.y_axis.length_squared() + f.z_axis.length_squared();
         let bound = self.stiffness_bound(model, cell, cofactor(f), self.law.bulk_modulus, i1 / 3.0, q2);
-        (force, bound * stiffness, viscous_power)
+        (force, bound * stiffness)
     }
 
     /// Energies and Jacobians of one cell; `stiffness` scales the energies.
@@ -209,7 +197,6 @@ impl Elements {
         &self,
         model: &Model,
         u: &[DVec3],
-        v: &[DVec3],
         stiffness: &[f64],
     ) -> Vec<DVec3> {
         let mesh = &model.mesh;
@@ -217,14 +204,8 @@ impl Elements {
             .into_par_iter()
             .map(|cell| {
                 let nodes = mesh.cell_nodes(cell);
-                let (f, _, _) = self.corner_forces(
-                    model,
-                    cell,
-                    &nodes.map(|n| u[n]),
-                    &nodes.map(|n| v[n]),
-                    stiffness.get(cell).copied().unwrap_or(1.0),
-                );
-                f
+                let stiffness = stiffness.get(cell).copied().unwrap_or(1.0);
+                self.corner_forces(model, cell, &nodes.map(|n| u[n]), stiffness).0
             })
             .collect();
         let mut force = vec![DVec3::ZERO; mesh.node_count()];
@@ -242,7 +223,6 @@ impl Elements {
 struct CellForces {
     force: [DVec3; 8],
     bound: f64,
-    viscous_power: f64,
 }
 
 /// Sums of one contact node over one step.
@@ -430,16 +410,11 @@ impl CpuEngine {
         let (model, elements, state) = (&self.model, &self.elements, &self.state);
         self.cells.par_iter_mut().with_min_len(256).enumerate().for_each(|(cell, out)| {
             let nodes = model.mesh.cell_nodes(cell);
-            let (force, bound, viscous_power) = elements.corner_forces(
-                model,
-                cell,
-                &nodes.map(|n| state.displacement[n]),
-                &nodes.map(|n| state.velocity[n]),
-                state.stiffness.get(cell).copied().unwrap_or(1.0),
-            );
-            *out = CellForces { force, bound, viscous_power };
+            let stiffness = state.stiffness.get(cell).copied().unwrap_or(1.0);
+            let (force, bound) =
+                elements.corner_forces(model, cell, &nodes.map(|n| state.displacement[n]), stiffness);
+            *out = CellForces { force, bound };
         });
-        self.sums.viscous_dissipation += self.dt * self.cells.iter().map(|c| c.viscous_power).sum::<f64>();
     }
 
     /// Stage `needle_contact`: nodes of the ring that the tip has passed keep `r >= r_e(s)`,
@@ -781,9 +756,6 @@ impl Engine for CpuEngine {
     }
 
     fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
-        let zero = vec![DVec3::ZERO; self.state.displacement.len()];
-        Ok(self
-            .elements
-            .internal_forces(&self.model, &self.state.displacement, &zero, &self.state.stiffness))
+        Ok(self.elements.internal_forces(&self.model, &self.state.displacement, &self.state.stiffness))
     }
 }

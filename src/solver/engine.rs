@@ -91,8 +91,6 @@ pub struct FrameSums {
     /// Total: elastic and hourglass energy [J].
     pub elastic: f64,
     pub hourglass: f64,
-    /// Dissipated by bulk viscosity [J].
-    pub viscous_dissipation: f64,
     /// Total: kinetic energy [J].
     pub kinetic: f64,
     /// Dissipated by mass damping [J].

@@ -2,5 +2,6 @@
 
 pub mod cpu;
 pub mod engine;
+pub mod simulation;
 pub mod stable_dt;
 pub mod step;

@@ -16,6 +16,13 @@ pub struct StableStep {
     pub power_iteration: f64,
 }
 
+impl StableStep {
+    /// The step that a run must not exceed: the smaller bound.
+    pub fn limit(&self) -> f64 {
+        self.wave_speed.min(self.power_iteration)
+    }
+}
+
 /// Computes both bounds for a model at rest.
 pub fn stable_step(model: &Model) -> StableStep {
     let elements = Elements::new(model);
@@ -53,7 +60,6 @@ fn power_iteration(model: &Model, elements: &Elements) -> f64 {
         })
         .collect();
     let mut omega_squared = 0.0;
-    let zero = vec![DVec3::ZERO; count];
     for _ in 0..ITERATIONS {
         for (node, value) in mode.iter_mut().enumerate() {
             let fixed = fixed_components(model, node);
@@ -69,7 +75,7 @@ fn power_iteration(model: &Model, elements: &Elements) -> f64 {
         }
         let scale = 1e-5 * smallest / largest;
         let u: Vec<DVec3> = mode.iter().map(|v| *v * scale).collect();
-        let force = elements.internal_forces(model, &u, &zero, &[]);
+        let force = elements.internal_forces(model, &u, &[]);
         let next: Vec<DVec3> = force
             .par_iter()
             .zip(&model.node_mass)

@@ -1,0 +1,335 @@
+//! One run in memory: model, engine, time step and the order of frames. Commands and tests use it alike.
+
+use std::collections::BTreeSet;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::cpu::{CpuEngine, Elements};
+use super::engine::{Engine, FramePlan, State, StepInput};
+use super::stable_dt::{StableStep, stable_step};
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, GpuEngine};
+use crate::material::mooney_rivlin::{Verdict, von_mises};
+use crate::mesh::BlockMesh;
+use crate::model::Model;
+use crate::observables::{FieldSnapshot, FrameRecord, Recorder};
+use crate::scene::Scene;
+
+/// Which engine the user wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum EngineChoice {
+    /// The best adapter; the CPU where there is none.
+    #[default]
+    Auto,
+    Gpu,
+    Cpu,
+}
+
+impl FromStr for EngineChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "auto" => Ok(EngineChoice::Auto),
+            "gpu" => Ok(EngineChoice::Gpu),
+            "cpu" => Ok(EngineChoice::Cpu),
+            _ => Err(format!("there is no engine `{text}`; use auto, gpu or cpu")),
+        }
+    }
+}
+
+/// Frames that may be under way before the oldest result is awaited.
+const AHEAD: u64 = 2;
+
+/// A simulation that is advanced frame by frame.
+pub struct Simulation {
+    pub model: Arc<Model>,
+    pub stable: StableStep,
+    /// Time step [s].
+    pub dt: f64,
+    engine: Box<dyn Engine>,
+    device: Option<Gpu>,
+    recorder: Recorder,
+    steps_per_frame: u64,
+    total_steps: u64,
+    frames: u64,
+    started: u64,
+    collected: u64,
+    /// Frames after which the state is read, so that no later frame may have been started.
+    stops: BTreeSet<u64>,
+    watch_stretch: bool,
+    /// Things the user should know, one sentence each.
+    pub notices: Vec<String>,
+}
+
+/// Time step and steps per frame that a model gets.
+///
+/// The computed step is `safety` times the smaller bound of [`StableStep`]; a scene's own step is taken as it is. Both
+/// are shortened so that a whole number of steps fills a frame.
+pub fn choose_step(model: &Model, stable: &StableStep) -> (f64, u64) {
+    let solver = &model.scene.solver;
+    let wanted = solver.time_step.unwrap_or(solver.safety * stable.limit());
+    let frame = 1.0 / solver.frame_rate;
+    let steps = (frame / wanted * (1.0 - 1e-9)).ceil().max(1.0);
+    (frame / steps, steps as u64)
+}
+
+impl Simulation {
+    /// Prepares a scene: mesh, model, stable step, engine.
+    ///
+    /// # Errors
+    /// `Error::Adapter` where the wanted engine is not to be had, `Error::Input` where the mesh does not fit the device.
+    pub fn new(scene: Scene, choice: EngineChoice) -> Result<Self> {
+        let mesh = BlockMesh::for_scene(&scene);
+        Self::with_mesh(scene, mesh, choice)
+    }
+
+    /// The same on a given mesh.
+    pub fn with_mesh(scene: Scene, mesh: BlockMesh, choice: EngineChoice) -> Result<Self> {
+        let mut notices = Vec::new();
+        let device = match choice {
+            EngineChoice::Cpu => None,
+            EngineChoice::Gpu => Some(Gpu::open()?),
+            EngineChoice::Auto => match Gpu::open() {
+                Ok(gpu) => Some(gpu),
+                // A name that fits nothing is the user's mistake; no adapter at all is not.
+                Err(error) if crate::gpu::device::adapter_wanted_by_name() => return Err(error),
+                Err(error) => {
+                    notices.push(format!("running on the CPU engine (f64): {error}"));
+                    None
+                }
+            },
+        };
+        let model = Arc::new(Model::new(scene, mesh));
+        let stable = stable_step(&model);
+        let (dt, steps_per_frame) = choose_step(&model, &stable);
+        if dt > stable.limit() {
+            notices.push(format!(
+                "the time step {:.3} us is above the stable step {:.3} us: expect the run to fail; drop time_step_us or \
+                 lower it",
+                dt * 1e6,
+                stable.limit() * 1e6
+            ));
+        }
+        let engine: Box<dyn Engine> = match &device {
+            Some(gpu) => Box::new(GpuEngine::new(model.clone(), gpu.clone(), dt, steps_per_frame as usize)?),
+            None => Box::new(CpuEngine::new(model.clone(), dt)),
+        };
+        let total_steps = ((model.duration() / dt) * (1.0 - 1e-9)).ceil() as u64;
+        // The first frame is a single step, so that the time to the first step can be told.
+        let frames = 1 + total_steps.saturating_sub(1).div_ceil(steps_per_frame);
+        let watch_stretch = !matches!(model.scene.material.law.verdict(), Verdict::Stable);
+        Ok(Simulation {
+            stable,
+            dt,
+            engine,
+            device,
+            recorder: Recorder::default(),
+            steps_per_frame,
+            total_steps,
+            frames,
+            started: 0,
+            collected: 0,
+            stops: BTreeSet::new(),
+            watch_stretch,
+            notices,
+            model,
+        })
+    }
+
+    pub fn engine(&mut self) -> &mut dyn Engine {
+        self.engine.as_mut()
+    }
+
+    /// The opened device, if the engine runs on one.
+    pub fn device(&self) -> Option<&Gpu> {
+        self.device.as_ref()
+    }
+
+    /// Number of frames of the whole run.
+    pub fn frame_count(&self) -> u64 {
+        self.frames
+    }
+
+    pub fn total_steps(&self) -> u64 {
+        self.total_steps
+    }
+
+    /// Simulated length of the run [s].
+    pub fn duration(&self) -> f64 {
+        self.total_steps as f64 * self.dt
+    }
+
+    /// Steps before frame `frame`.
+    fn first_step(&self, frame: u64) -> u64 {
+        if frame == 0 { 0 } else { 1 + (frame - 1) * self.steps_per_frame }
+    }
+
+    /// Frame whose end is the first one at or after `time` [s].
+    pub fn frame_at(&self, time: f64) -> u64 {
+        let step = (time / self.dt).ceil().max(1.0) as u64;
+        ((step - 1).div_ceil(self.steps_per_frame)).min(self.frames - 1)
+    }
+
+    /// Asks that the state can be read right after the record of `frame` has been returned.
+    pub fn stop_after(&mut self, frame: u64) {
+        self.stops.insert(frame);
+    }
+
+    fn plan(&self, frame: u64) -> FramePlan {
+        let first_step = self.first_step(frame);
+        let last = self.first_step(frame + 1).min(self.total_steps.max(1));
+        FramePlan {
+            frame,
+            first_step,
+            steps: (first_step..last).map(|s| StepInput::at(&self.model, s as f64 * self.dt, self.dt)).collect(),
+        }
+    }
+
+    fn may_start(&self, frame: u64) -> bool {
+        let waits = self.watch_stretch || self.stops.range(self.collected..frame).next().is_some();
+        frame < self.frames && frame - self.collected <= AHEAD && (!waits || frame == self.collected)
+    }
+
+    /// The next record; `None` after the last frame.
+    ///
+    /// # Errors
+    /// `Error::Diverged` when the state has left the range in which its numbers mean something; `Error::Device`.
+    pub fn next_frame(&mut self) -> Result<Option<FrameRecord>> {
+        while self.may_start(self.started) {
+            self.engine.start_frame(&self.plan(self.started))?;
+            self.started += 1;
+        }
+        if self.collected == self.started {
+            return Ok(None);
+        }
+        let Some(sums) = self.engine.collect(true)? else {
+            return Err(Error::Device("the engine lost a frame".into()));
+        };
+        self.collected += 1;
+        let record = self.recorder.record(&self.model, self.dt, &sums);
+        if record.health.not_finite {
+            return Err(self.diverged(&record));
+        }
+        if self.watch_stretch {
+            self.check_stretch(&record)?;
+        }
+        Ok(Some(record))
+    }
+
+    /// Where and how the state broke.
+    fn diverged(&mut self, record: &FrameRecord) -> Error {
+        let place = match self.engine.read_state() {
+            Ok(state) => {
+                let broken = |v: &DVec3| !v.is_finite() || v.abs().max_element() > 0.03;
+                let velocity = state.velocity.iter().position(|v| !v.is_finite());
+                match state.displacement.iter().position(broken).or(velocity) {
+                    Some(n) => {
+                        let x = self.model.mesh.rest_position(n) * 1e3;
+                        format!(
+                            "stage integrate_nodes: displacement or velocity of node {n} (rest position {:.2}, {:.2}, \
+                             {:.2} mm) is out of range (u = {:?} m)",
+                            x.x, x.y, x.z, state.displacement[n]
+                        )
+                    }
+                    None => "a displacement or velocity was out of range".into(),
+                }
+            }
+            Err(error) => error.to_string(),
+        };
+        Error::Diverged { frame: record.frame, step: record.step, time_s: record.time, message: place }
+    }
+
+    /// Stops when an element leaves the stretch range in which the material is stable.
+    fn check_stretch(&mut self, record: &FrameRecord) -> Result<()> {
+        let verdict = self.model.scene.material.law.verdict();
+        let state = self.engine.read_state()?;
+        for (cell, h) in displacement_gradients(&self.model.mesh, &state).into_iter().enumerate() {
+            let (low, high) = principal_stretch_range(glam::DMat3::IDENTITY + h);
+            let (broken, limit, value) = match verdict {
+                Verdict::StableBelow(limit) => (high > limit, limit, high),
+                Verdict::StableAbove(limit) => (low < limit, limit, low),
+                _ => (false, 0.0, 0.0),
+            };
+            if broken {
+                let x = self.model.mesh.rest_position(self.model.mesh.cell_nodes(cell)[0]) * 1e3;
+                return Err(Error::Diverged {
+                    frame: record.frame,
+                    step: record.step,
+                    time_s: record.time,
+                    message: format!(
+                        "stage element_forces: cell {cell} at ({:.2}, {:.2}, {:.2}) mm has the principal stretch {value:.4}, \
+                         beyond the limit {limit:.4} up to which these constants are stable",
+                        x.x, x.y, x.z
+                    ),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Fields of the present state; call it right after a frame registered with [`Simulation::stop_after`].
+    pub fn snapshot(&mut self, record: &FrameRecord) -> Result<FieldSnapshot> {
+        let state = self.engine.read_state()?;
+        Ok(snapshot(&self.model, record, state))
+    }
+}
+
+/// H = F - I at the centre of every cell.
+fn displacement_gradients(mesh: &BlockMesh, state: &State) -> Vec<glam::DMat3> {
+    (0..mesh.cell_count())
+        .map(|cell| {
+            let u = mesh.cell_nodes(cell).map(|n| state.displacement[n]);
+            Elements::displacement_gradient(&u, mesh.cell_size(cell))
+        })
+        .collect()
+}
+
+/// Smallest and largest principal stretch of F: roots of the eigenvalues of C, by the trigonometric solution of the
+/// characteristic cubic.
+fn principal_stretch_range(f: glam::DMat3) -> (f64, f64) {
+    let c = f.transpose() * f;
+    let mean = (c.x_axis.x + c.y_axis.y + c.z_axis.z) / 3.0;
+    let d = c - glam::DMat3::IDENTITY * mean;
+    let square = d.x_axis.length_squared() + d.y_axis.length_squared() + d.z_axis.length_squared();
+    let p = (square / 6.0).sqrt();
+    if p < 1e-15 {
+        return (mean.sqrt(), mean.sqrt());
+    }
+    let angle = (d.determinant() / (2.0 * p * p * p)).clamp(-1.0, 1.0).acos() / 3.0;
+    let largest = mean + 2.0 * p * angle.cos();
+    let smallest = mean + 2.0 * p * (angle + std::f64::consts::TAU / 3.0).cos();
+    (smallest.max(0.0).sqrt(), largest.max(0.0).sqrt())
+}
+
+/// Stresses and Jacobians of a state, in f64.
+pub fn snapshot(model: &Model, record: &FrameRecord, state: State) -> FieldSnapshot {
+    let law = &model.scene.material.law;
+    let gradients = displacement_gradients(&model.mesh, &state);
+    let mut fields = FieldSnapshot {
+        frame: record.frame,
+        time: record.time,
+        depth: record.depth,
+        axial_force: record.force.axial,
+        tool_pose: model.kinematics.as_ref().map(|k| {
+            let pose = k.pose(record.time);
+            (pose.tip, pose.direction)
+        }),
+        ..Default::default()
+    };
+    for (cell, h) in gradients.into_iter().enumerate() {
+        let f = glam::DMat3::IDENTITY + h;
+        let j = f.determinant();
+        let stiffness = state.stiffness.get(cell).copied().unwrap_or(1.0);
+        // An inverted cell has no Cauchy stress; its J tells.
+        let sigma = if j > 0.0 { law.cauchy(h) * stiffness } else { glam::DMat3::ZERO };
+        fields.von_mises.push(von_mises(sigma));
+        fields.jacobian.push(j);
+        fields.pressure.push(-(sigma.x_axis.x + sigma.y_axis.y + sigma.z_axis.z) / 3.0);
+    }
+    fields.displacement = state.displacement;
+    fields.stiffness = state.stiffness;
+    fields
+}
