@@ -311,14 +311,24 @@ mod tests {
     fn a_slow_fall_is_no_puncture() {
         // 10 % over 1 mm.
         let figures = CurveFigures::from_records(&insertion(4e-3, |d| {
-            if d < 3e-3 { d / 3e-3 } else { 1.0 - 100.0 * (d - 3e-3) }
+            if d < 3e-3 {
+                d / 3e-3
+            } else {
+                1.0 - 100.0 * (d - 3e-3)
+            }
         }));
         assert_eq!(figures.puncture_force, None);
     }
 
     #[test]
     fn the_first_of_two_drops_counts() {
-        let second = |d: f64| if d < 8e-3 { punctured(d) } else { punctured(d) - 0.4 };
+        let second = |d: f64| {
+            if d < 8e-3 {
+                punctured(d)
+            } else {
+                punctured(d) - 0.4
+            }
+        };
         let figures = CurveFigures::from_records(&insertion(12e-3, second));
         near(figures.puncture_depth, 3e-3, 1e-9);
     }
@@ -348,10 +358,7 @@ mod tests {
     fn nothing_and_not_a_number() {
         assert_eq!(CurveFigures::from_records(&[]), CurveFigures::default());
         let broken = [record(f64::NAN, 1.0), record(1e-3, f64::NAN)];
-        assert_eq!(
-            CurveFigures::from_records(&broken),
-            CurveFigures::default()
-        );
+        assert_eq!(CurveFigures::from_records(&broken), CurveFigures::default());
         let mut records = insertion(12e-3, punctured);
         records[60].force.axial = f64::NAN;
         records[61].depth = f64::NAN;

@@ -225,7 +225,12 @@ fn listing(path: &Path, files: &[PathBuf]) -> String {
     let names: Vec<String> = files
         .iter()
         .take(SHOWN)
-        .map(|file| file.strip_prefix(path).unwrap_or(file).display().to_string())
+        .map(|file| {
+            file.strip_prefix(path)
+                .unwrap_or(file)
+                .display()
+                .to_string()
+        })
         .collect();
     let more = files.len().saturating_sub(SHOWN);
     if more > 0 {

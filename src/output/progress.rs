@@ -44,7 +44,8 @@ impl Progress {
     pub fn update(&self, record: &FrameRecord, real_time_factor: f64) {
         let left = (self.total - record.time).max(0.0) / real_time_factor;
         self.bar.set_position(ticks(record.time));
-        self.bar.set_message(message(record, real_time_factor, left));
+        self.bar
+            .set_message(message(record, real_time_factor, left));
     }
 
     /// Removes the line.

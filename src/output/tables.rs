@@ -162,7 +162,11 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
 /// Nine significant digits, trailing zeros left away; an exponent where the plain form would be long.
 pub fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
-        return if value == 0.0 { "0".into() } else { value.to_string() };
+        return if value == 0.0 {
+            "0".into()
+        } else {
+            value.to_string()
+        };
     }
     let rounded: f64 = format!("{value:.8e}")
         .parse()

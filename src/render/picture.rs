@@ -89,7 +89,8 @@ impl Picture {
             height: layout.size.1,
             background: PAGE.linear(1.0),
             colour_table: std::array::from_fn(|i| {
-                let c = colorous::INFERNO.eval_continuous(i as f64 / 255.0);
+                let at = DARKEST + (1.0 - DARKEST) * i as f64 / 255.0;
+                let c = colorous::INFERNO.eval_continuous(at);
                 Colour(c.r, c.g, c.b).linear(1.0)
             }),
             vertices: canvas.vertices,
@@ -100,7 +101,10 @@ impl Picture {
     pub fn table_colour(&self, value: f32) -> [f32; 4] {
         let at = value.clamp(0.0, 1.0) * 255.0;
         let low = at as usize;
-        let (a, b) = (self.colour_table[low], self.colour_table[(low + 1).min(255)]);
+        let (a, b) = (
+            self.colour_table[low],
+            self.colour_table[(low + 1).min(255)],
+        );
         std::array::from_fn(|i| a[i] + (at - low as f32) * (b[i] - a[i]))
     }
 }
@@ -114,6 +118,8 @@ const AIR: Colour = Colour(222, 230, 237);
 const INK: Colour = Colour(28, 30, 36);
 const WHITE: Colour = Colour(255, 255, 255);
 const WARNING: Colour = Colour(170, 20, 20);
+/// Where the colour table starts in the map `inferno`: its black would swallow outlines and look like a hole.
+const DARKEST: f64 = 0.1;
 /// Mixed into the field where the tip has opened the tissue.
 const OPENED: Colour = Colour(205, 214, 222);
 /// Share of the field's colour there.
@@ -418,7 +424,7 @@ fn draw_tissue(
     }
     // Cell edges fade out where cells are only a few pixels wide.
     let cell_pixels = cell_size * layout.pixels_per_metre / layout.unit;
-    let alpha = 0.2 * ((cell_pixels - 3.0) / 9.0).clamp(0.0, 1.0) as f32;
+    let alpha = 0.07 * ((cell_pixels - 3.0) / 9.0).clamp(0.0, 1.0) as f32;
     for (border, width, colour) in [
         (false, 1.0, WHITE.linear(alpha)),
         (true, 2.0, INK.linear(1.0)),
@@ -500,7 +506,12 @@ impl ToolDrawing {
                 };
                 stem.draw_rod(canvas, layout, 0.25 * radius, 0.0, length);
                 let centre = layout.place(self.tip + radius * self.back);
-                draw_ball(canvas, centre, radius * layout.pixels_per_metre, layout.unit);
+                draw_ball(
+                    canvas,
+                    centre,
+                    radius * layout.pixels_per_metre,
+                    layout.unit,
+                );
             }
         }
     }
@@ -602,10 +613,22 @@ fn draw_frame(canvas: &mut Canvas, layout: &Layout) {
         bottom: height,
     };
     for margin in [
-        Rectangle { bottom: plot.top, ..page },
-        Rectangle { top: plot.bottom, ..page },
-        Rectangle { right: plot.left, ..page },
-        Rectangle { left: plot.right, ..page },
+        Rectangle {
+            bottom: plot.top,
+            ..page
+        },
+        Rectangle {
+            top: plot.bottom,
+            ..page
+        },
+        Rectangle {
+            right: plot.left,
+            ..page
+        },
+        Rectangle {
+            left: plot.right,
+            ..page
+        },
     ] {
         canvas.rectangle(margin, PAGE);
     }
@@ -634,7 +657,11 @@ fn draw_texts(
 ) {
     let unit = layout.unit;
     let (width, height) = (f64::from(layout.size.0), f64::from(layout.size.1));
-    let title = if scene.title.is_empty() { &scene.name } else { &scene.title };
+    let title = if scene.title.is_empty() {
+        &scene.name
+    } else {
+        &scene.title
+    };
     let capital = 15.0 * unit;
     let room = width - 2.0 * unit * LEFT_MARGIN;
     canvas.text(

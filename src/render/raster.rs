@@ -40,9 +40,28 @@ pub fn render_on_processor(picture: &Picture) -> Vec<u8> {
     bytes
 }
 
+/// Parts of a pixel to which corners are rounded, as adapters do. Edges are then exact integers, and triangles that
+/// share one leave no gap.
+const PARTS: f32 = 256.0;
+
+/// Corners farther out than this are not drawn [px]; keeps the products of an edge within 64 bits.
+const FARTHEST: f32 = 1e6;
+
+type Point = [i64; 2];
+
+fn rounded(position: [f32; 2]) -> Point {
+    position.map(|x| (x * PARTS).round() as i64)
+}
+
 /// Twice the signed area of a, b, p.
-fn edge(a: [f32; 2], b: [f32; 2], p: [f32; 2]) -> f32 {
+fn edge(a: Point, b: Point, p: Point) -> i64 {
     (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+}
+
+/// A sample exactly on an edge belongs to the triangle for which this holds: shared edges, which two triangles run
+/// through in opposite directions, are drawn once.
+fn counts_on_edge(from: Point, to: Point) -> bool {
+    to[1] < from[1] || (to[1] == from[1] && to[0] > from[0])
 }
 
 /// Draws one triangle into a band of rows.
@@ -54,76 +73,114 @@ fn fill(
     rows: usize,
     width: usize,
 ) {
-    let [mut a, b, mut c] = [triangle[0], triangle[1], triangle[2]];
-    let (left, right) = span([a, b, c].map(|v| v.position[0]));
-    let (upper, lower) = span([a, b, c].map(|v| v.position[1]));
-    if lower < top as f32 || upper > (top + rows) as f32 {
+    let near = |v: &Vertex| v.position.iter().all(|x| x.abs() <= FARTHEST);
+    if !triangle.iter().all(near) {
         return;
     }
-    let mut area = edge(a.position, b.position, c.position);
-    if area < 0.0 {
-        std::mem::swap(&mut a, &mut c);
+    let mut corner = [triangle[0], triangle[1], triangle[2]];
+    let columns = pixels(corner.map(|v| v.position[0]), 0, width);
+    let lines = pixels(corner.map(|v| v.position[1]), top, top + rows);
+    if columns.is_empty() || lines.is_empty() {
+        return;
+    }
+    let mut at = corner.map(|v| rounded(v.position));
+    let mut area = edge(at[0], at[1], at[2]);
+    if area < 0 {
+        corner.swap(0, 2);
+        at.swap(0, 2);
         area = -area;
     }
-    // Written so that NaN counts as empty.
-    if !(area > 0.0) {
+    if area == 0 {
         return;
     }
-    let first_row = (upper.floor().max(0.0) as usize).max(top);
-    let last_row = (lower.ceil().max(0.0) as usize).min(top + rows);
-    let first_column = left.floor().max(0.0) as usize;
-    let last_column = (right.ceil().max(0.0) as usize).min(width);
-    // A sample exactly on an edge belongs to the triangle whose edge is a top or left one: shared edges are drawn once.
-    let counts_on_edge = |from: Vertex, to: Vertex| {
-        let (dx, dy) = (
-            to.position[0] - from.position[0],
-            to.position[1] - from.position[1],
-        );
-        dy < 0.0 || (dy == 0.0 && dx > 0.0)
-    };
+    let [a, b, c] = at;
     let on_edge = [
         counts_on_edge(b, c),
         counts_on_edge(c, a),
         counts_on_edge(a, b),
     ];
-    for row in first_row..last_row {
-        for column in first_column..last_column {
+    for row in lines {
+        for column in columns.clone() {
             let pixel = &mut band[(row - top) * width + column];
             for (sample, offset) in pixel.iter_mut().zip(SAMPLES) {
-                let p = [column as f32 + offset[0], row as f32 + offset[1]];
-                let weight = [
-                    edge(b.position, c.position, p),
-                    edge(c.position, a.position, p),
-                    edge(a.position, b.position, p),
-                ];
-                let inside = (0..3).all(|i| weight[i] > 0.0 || (weight[i] == 0.0 && on_edge[i]));
-                if !inside {
-                    continue;
-                }
-                let mean = |value: fn(&Vertex) -> f32| {
-                    (weight[0] * value(&a) + weight[1] * value(&b) + weight[2] * value(&c)) / area
-                };
-                let field = picture.table_colour(mean(|v| v.field_value));
-                let share = mean(|v| v.field_weight);
-                let colour: [f32; 4] = [
-                    mean(|v| v.colour[0]),
-                    mean(|v| v.colour[1]),
-                    mean(|v| v.colour[2]),
-                    mean(|v| v.colour[3]),
-                ];
-                let alpha = colour[3] + share * (field[3] - colour[3]);
-                for channel in 0..3 {
-                    let source = colour[channel] + share * (field[channel] - colour[channel]);
-                    sample[channel] += alpha * (source - sample[channel]);
+                let p = rounded([column as f32 + offset[0], row as f32 + offset[1]]);
+                let weight = [edge(b, c, p), edge(c, a, p), edge(a, b, p)];
+                if (0..3).all(|i| weight[i] > 0 || (weight[i] == 0 && on_edge[i])) {
+                    let share = weight.map(|w| w as f32 / area as f32);
+                    blend(sample, picture, &corner, share);
                 }
             }
         }
     }
 }
 
-fn span(values: [f32; 3]) -> (f32, f32) {
-    (
-        values[0].min(values[1]).min(values[2]),
-        values[0].max(values[1]).max(values[2]),
-    )
+/// Pixels within bounds that three coordinates span.
+fn pixels(values: [f32; 3], from: usize, to: usize) -> std::ops::Range<usize> {
+    let low = values.into_iter().fold(f32::INFINITY, f32::min);
+    let high = values.into_iter().fold(f32::NEG_INFINITY, f32::max);
+    // One more on each side: rounding may carry a corner over a pixel's edge.
+    let first = (low.floor().max(1.0) as usize - 1).max(from);
+    let last = ((high.ceil().max(0.0) as usize).saturating_add(1)).min(to);
+    first..last
+}
+
+/// Colours one sample; `share`: weights of the three corners. The same formula as in the shader.
+fn blend(sample: &mut [f32; 3], picture: &Picture, corner: &[Vertex; 3], share: [f32; 3]) {
+    let mean = |value: &dyn Fn(&Vertex) -> f32| -> f32 {
+        (0..3).map(|i| share[i] * value(&corner[i])).sum()
+    };
+    let field = picture.table_colour(mean(&|v| v.field_value));
+    let weight = mean(&|v| v.field_weight);
+    let colour: [f32; 4] = std::array::from_fn(|channel| {
+        let plain = mean(&|v| v.colour[channel]);
+        plain + weight * (field[channel] - plain)
+    });
+    for channel in 0..3 {
+        sample[channel] += colour[3] * (colour[channel] - sample[channel]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half-transparent triangles around a point, in both orientations: each sample of their union is drawn once.
+    #[test]
+    fn shared_edges_are_drawn_once() {
+        let vertex = |x: f32, y: f32| Vertex {
+            position: [x, y],
+            field_value: 0.0,
+            field_weight: 0.0,
+            colour: [1.0, 1.0, 1.0, 0.5],
+        };
+        let rim = [
+            (0.0, 0.0),
+            (20.0, 0.0),
+            (20.0, 20.0),
+            (7.3, 20.0),
+            (0.0, 20.0),
+        ];
+        for (x, y) in [(10.0, 10.0), (3.7, 11.125), (10.375, 0.125), (19.9, 19.9)] {
+            let mut vertices = Vec::new();
+            for i in 0..rim.len() {
+                let (a, b) = (rim[i], rim[(i + 1) % rim.len()]);
+                let mut triangle = [vertex(x, y), vertex(a.0, a.1), vertex(b.0, b.1)];
+                if i % 2 == 0 {
+                    triangle.reverse();
+                }
+                vertices.extend(triangle);
+            }
+            let picture = Picture {
+                width: 20,
+                height: 20,
+                background: [0.0, 0.0, 0.0, 1.0],
+                colour_table: [[0.0; 4]; 256],
+                vertices,
+            };
+            let once = encode_srgb(0.5);
+            for pixel in render_on_processor(&picture).chunks(4) {
+                assert_eq!(pixel, [once, once, once, 255], "around {x}, {y}");
+            }
+        }
+    }
 }

@@ -147,7 +147,10 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
         if height.iter().all(|&h| h >= 0.0) || height.iter().all(|&h| h < 0.0) {
             continue;
         }
-        let opened = snapshot.stiffness.get(cell).is_some_and(|&s| s < OPENED_BELOW);
+        let opened = snapshot
+            .stiffness
+            .get(cell)
+            .is_some_and(|&s| s < OPENED_BELOW);
         let crossing = |a: usize, b: usize| {
             let t = height[a] / (height[a] - height[b]);
             (
@@ -246,7 +249,11 @@ mod tests {
                 .collect()
         };
         BlockMesh {
-            lines: [lines(-0.01, 0.01, 5), lines(-0.01, 0.01, 4), lines(-0.016, 0.0, 4)],
+            lines: [
+                lines(-0.01, 0.01, 5),
+                lines(-0.01, 0.01, 4),
+                lines(-0.016, 0.0, 4),
+            ],
         }
     }
 
@@ -284,8 +291,17 @@ mod tests {
     #[test]
     fn an_upright_cut_has_the_area_of_the_block() {
         let mesh = mesh();
-        let slice = cut(&mesh, &snapshot(&mesh, |_| DVec3::ZERO), &plane(DVec3::Z), 4e-3);
-        assert!((area(&slice) - 0.02 * 0.016).abs() < 1e-12, "{}", area(&slice));
+        let slice = cut(
+            &mesh,
+            &snapshot(&mesh, |_| DVec3::ZERO),
+            &plane(DVec3::Z),
+            4e-3,
+        );
+        assert!(
+            (area(&slice) - 0.02 * 0.016).abs() < 1e-12,
+            "{}",
+            area(&slice)
+        );
         for t in &slice.triangles {
             for value in t.von_mises {
                 assert!((value - 7.0).abs() < 1e-9);
@@ -328,6 +344,11 @@ mod tests {
         snapshot.displacement[last] = DVec3::splat(1e30);
         let slice = cut(&mesh, &snapshot, &plane(DVec3::Z), 4e-3);
         assert_eq!(slice.cells_left_out, 2);
-        assert!(slice.triangles.iter().all(|t| t.points.iter().all(|p| p.is_finite())));
+        assert!(
+            slice
+                .triangles
+                .iter()
+                .all(|t| t.points.iter().all(|p| p.is_finite()))
+        );
     }
 }

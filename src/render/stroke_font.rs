@@ -10,10 +10,10 @@ use glam::DVec2;
 const BASELINE: f64 = 4.0;
 const CAPITAL: f64 = 14.0;
 /// Room between letters and width of a space, in glyph units.
-const LETTER_SPACING: f64 = 4.2;
-const SPACE: f64 = 6.0;
+const LETTER_SPACING: f64 = 3.8;
+const SPACE: f64 = 5.0;
 /// Stroke width over capital height.
-const WEIGHT: f64 = 0.115;
+const WEIGHT: f64 = 0.13;
 /// Rounds of corner cutting that turn a control polygon into a curve.
 const ROUNDS: usize = 3;
 
@@ -160,7 +160,10 @@ mod tests {
             let text = strokes(character);
             for stroke in text.split(' ') {
                 let points = stroke.strip_prefix('~').unwrap_or(stroke);
-                assert!(points.len() % 2 == 0 && points.len() >= 4, "{character}: {text}");
+                assert!(
+                    points.len() % 2 == 0 && points.len() >= 4,
+                    "{character}: {text}"
+                );
             }
             for p in glyph(character).iter().flatten() {
                 assert!((0.0..=14.0).contains(&p.x), "{character}");
@@ -180,7 +183,10 @@ mod tests {
     fn long_text_is_shortened() {
         let text = "a very long title that does not fit";
         let short = shortened(text, 10.0, 100.0);
-        assert!(short.ends_with("...") && width(&short, 10.0) <= 100.0, "{short}");
+        assert!(
+            short.ends_with("...") && width(&short, 10.0) <= 100.0,
+            "{short}"
+        );
         assert_eq!(shortened("short", 10.0, 100.0), "short");
         assert_eq!(shortened(text, 10.0, 1.0), "");
     }
