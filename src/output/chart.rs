@@ -31,6 +31,7 @@ const LEAST_TRAVEL: f64 = 1e-6;
 struct Curve {
     label: &'static str,
     colour: RGBColor,
+    /// [1/FINER px]
     width: u32,
     /// Length of dash and gap [px]; `None`: a solid line.
     dash: Option<(u32, u32)>,
@@ -100,15 +101,18 @@ pub fn force_chart(
             .y_labels(9)
             .x_label_formatter(&|v| tick(*v, x_max - x_min))
             .y_label_formatter(&|v| tick(*v, y_max - y_min))
-            .bold_line_style(BLACK.mix(0.14))
-            .light_line_style(BLACK.mix(0.04))
+            .bold_line_style(BLACK.mix(0.14).stroke_width(fine(1)))
+            .light_line_style(BLACK.mix(0.05).stroke_width(fine(1)))
+            .axis_style(BLACK.mix(0.6).stroke_width(fine(1)))
+            .set_all_tick_mark_size(fine(5))
+            .max_light_lines(5)
             .draw()?;
         chart.draw_series(LineSeries::new(
             [(x_min, 0.0), (x_max, 0.0)],
             BLACK.mix(0.6).stroke_width(fine(1)),
         ))?;
         for curve in &curves {
-            let style = curve.colour.stroke_width(fine(curve.width));
+            let style = curve.colour.stroke_width(curve.width);
             match curve.dash {
                 None => {
                     chart.draw_series(LineSeries::new(curve.points.iter().copied(), style))?;
@@ -177,7 +181,7 @@ fn curves(
     let part = |label, colour, dash, value: fn(&FrameRecord) -> f64| Curve {
         label,
         colour,
-        width: 1,
+        width: FINER * 3 / 2,
         dash,
         points: inward
             .iter()
@@ -188,7 +192,7 @@ fn curves(
     let axial = |label, colour, dash, records: &[&FrameRecord]| Curve {
         label,
         colour,
-        width: 3,
+        width: FINER * 3,
         dash,
         points: records
             .iter()
@@ -241,7 +245,7 @@ fn draw_head<DB: DrawingBackend>(
     let y = 62;
     // The two main lines first.
     for curve in curves.iter().rev() {
-        let style = curve.colour.stroke_width(fine(curve.width));
+        let style = curve.colour.stroke_width(curve.width);
         match curve.dash {
             None => head.draw(&PathElement::new(
                 vec![place(x, y), place(x + SAMPLE, y)],

@@ -99,8 +99,19 @@ fn fill(
         counts_on_edge(c, a),
         counts_on_edge(a, b),
     ];
+    // An edge function changes by at most this much from the middle of a pixel to its rim.
+    let half = (PARTS / 2.0) as i64;
+    let reach = [(b, c), (c, a), (a, b)]
+        .map(|(from, to)| half * ((to[0] - from[0]).abs() + (to[1] - from[1]).abs()));
     for row in lines {
         for column in columns.clone() {
+            let middle = rounded([column as f32 + 0.5, row as f32 + 0.5]);
+            if edge(b, c, middle) < -reach[0]
+                || edge(c, a, middle) < -reach[1]
+                || edge(a, b, middle) < -reach[2]
+            {
+                continue;
+            }
             let pixel = &mut band[(row - top) * width + column];
             for (sample, offset) in pixel.iter_mut().zip(SAMPLES) {
                 let p = rounded([column as f32 + offset[0], row as f32 + offset[1]]);
