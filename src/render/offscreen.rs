@@ -82,6 +82,7 @@ fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result
         mapped_at_creation: false,
     });
 
+    let shader = parsed_shader()?;
     let pipeline = pipeline(device);
     let viewport = Viewport {
         size: [picture.width as f32, picture.height as f32],
@@ -101,11 +102,11 @@ fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result
         layout: &pipeline.get_bind_group_layout(0),
         entries: &[
             wgpu::BindGroupEntry {
-                binding: 0,
+                binding: binding(&shader, "viewport")?,
                 resource: viewport.as_entire_binding(),
             },
             wgpu::BindGroupEntry {
-                binding: 1,
+                binding: binding(&shader, "colour_table")?,
                 resource: table.as_entire_binding(),
             },
         ],
@@ -187,6 +188,29 @@ fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result
         .collect())
 }
 
+fn shader_error(message: String) -> Error {
+    Error::Shader {
+        stage: "stress_picture".into(),
+        message,
+    }
+}
+
+fn parsed_shader() -> Result<naga::Module> {
+    naga::front::wgsl::parse_str(SHADER)
+        .map_err(|reason| shader_error(reason.emit_to_string(SHADER)))
+}
+
+/// Binding number of a variable of the shader, by its name.
+fn binding(shader: &naga::Module, name: &str) -> Result<u32> {
+    shader
+        .global_variables
+        .iter()
+        .find(|(_, variable)| variable.name.as_deref() == Some(name))
+        .and_then(|(_, variable)| variable.binding.as_ref())
+        .map(|place| place.binding)
+        .ok_or_else(|| shader_error(format!("there is no bound variable {name}")))
+}
+
 fn pipeline(device: &wgpu::Device) -> wgpu::RenderPipeline {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("stress_picture"),
@@ -226,4 +250,51 @@ fn pipeline(device: &wgpu::Device) -> wgpu::RenderPipeline {
         multiview_mask: None,
         cache: None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::mem::offset_of;
+
+    #[test]
+    fn host_and_shader_agree_on_the_viewport() {
+        let shader = parsed_shader().unwrap();
+        let (_, viewport) = shader
+            .types
+            .iter()
+            .find(|(_, kind)| kind.name.as_deref() == Some("Viewport"))
+            .expect("struct Viewport in the shader");
+        let naga::TypeInner::Struct { members, span } = &viewport.inner else {
+            panic!("Viewport is no struct");
+        };
+        let found: Vec<(&str, usize)> = members
+            .iter()
+            .map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize))
+            .collect();
+        assert_eq!(
+            found,
+            [
+                ("size", offset_of!(Viewport, size)),
+                ("_pad", offset_of!(Viewport, _pad)),
+            ]
+        );
+        assert_eq!(*span as usize, size_of::<Viewport>());
+    }
+
+    #[test]
+    fn vertices_are_laid_out_as_the_pipeline_reads_them() {
+        assert_eq!(offset_of!(Vertex, field_value), 8);
+        assert_eq!(offset_of!(Vertex, field_weight), 12);
+        assert_eq!(offset_of!(Vertex, colour), 16);
+        assert_eq!(size_of::<Vertex>(), 32);
+    }
+
+    #[test]
+    fn a_missing_variable_is_named() {
+        let shader = parsed_shader().unwrap();
+        assert!(binding(&shader, "colour_table").is_ok());
+        let error = binding(&shader, "colour_tabel").unwrap_err();
+        assert!(error.to_string().contains("colour_tabel"), "{error}");
+    }
 }

@@ -3,13 +3,12 @@
 
 use super::picture::{Picture, Vertex, encode_srgb};
 
-/// Sample positions within a pixel, those of Vulkan's and Direct3D's standard pattern.
-const SAMPLES: [[f32; 2]; 4] = [
-    [0.375, 0.125],
-    [0.875, 0.375],
-    [0.125, 0.625],
-    [0.625, 0.875],
-];
+/// Parts of a pixel to which corners are rounded, as adapters do. Edges are then exact integers, and triangles that
+/// share one leave no gap.
+const PARTS: i64 = 256;
+
+/// Sample positions within a pixel [parts], those of Vulkan's and Direct3D's standard pattern.
+const SAMPLES: [Point; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];
 
 /// Rows that are drawn together; bounds the memory for large pictures.
 const BAND: usize = 64;
@@ -40,17 +39,14 @@ pub fn render_on_processor(picture: &Picture) -> Vec<u8> {
     bytes
 }
 
-/// Parts of a pixel to which corners are rounded, as adapters do. Edges are then exact integers, and triangles that
-/// share one leave no gap.
-const PARTS: f32 = 256.0;
-
 /// Corners farther out than this are not drawn [px]; keeps the products of an edge within 64 bits.
 const FARTHEST: f32 = 1e6;
 
+/// A place in the picture [parts].
 type Point = [i64; 2];
 
 fn rounded(position: [f32; 2]) -> Point {
-    position.map(|x| (x * PARTS).round() as i64)
+    position.map(|x| (x * PARTS as f32).round() as i64)
 }
 
 /// Twice the signed area of a, b, p.
@@ -100,12 +96,14 @@ fn fill(
         counts_on_edge(a, b),
     ];
     // An edge function changes by at most this much from the middle of a pixel to its rim.
-    let half = (PARTS / 2.0) as i64;
+    let half = PARTS / 2;
     let reach = [(b, c), (c, a), (a, b)]
         .map(|(from, to)| half * ((to[0] - from[0]).abs() + (to[1] - from[1]).abs()));
+    let single = single_colour(&corner);
     for row in lines {
         for column in columns.clone() {
-            let middle = rounded([column as f32 + 0.5, row as f32 + 0.5]);
+            let corner_of_pixel = [column, row].map(|at| at as i64 * PARTS);
+            let middle = corner_of_pixel.map(|at| at + half);
             if edge(b, c, middle) < -reach[0]
                 || edge(c, a, middle) < -reach[1]
                 || edge(a, b, middle) < -reach[2]
@@ -114,11 +112,19 @@ fn fill(
             }
             let pixel = &mut band[(row - top) * width + column];
             for (sample, offset) in pixel.iter_mut().zip(SAMPLES) {
-                let p = rounded([column as f32 + offset[0], row as f32 + offset[1]]);
+                let p = [
+                    corner_of_pixel[0] + offset[0],
+                    corner_of_pixel[1] + offset[1],
+                ];
                 let weight = [edge(b, c, p), edge(c, a, p), edge(a, b, p)];
                 if (0..3).all(|i| weight[i] > 0 || (weight[i] == 0 && on_edge[i])) {
-                    let share = weight.map(|w| w as f32 / area as f32);
-                    blend(sample, picture, &corner, share);
+                    let colour = single.unwrap_or_else(|| {
+                        let share = weight.map(|w| w as f32 / area as f32);
+                        mixed_colour(picture, &corner, share)
+                    });
+                    for channel in 0..3 {
+                        sample[channel] += colour[3] * (colour[channel] - sample[channel]);
+                    }
                 }
             }
         }
@@ -135,20 +141,24 @@ fn pixels(values: [f32; 3], from: usize, to: usize) -> std::ops::Range<usize> {
     first..last
 }
 
-/// Colours one sample; `share`: weights of the three corners. The same formula as in the shader.
-fn blend(sample: &mut [f32; 3], picture: &Picture, corner: &[Vertex; 3], share: [f32; 3]) {
-    let mean = |value: &dyn Fn(&Vertex) -> f32| -> f32 {
-        (0..3).map(|i| share[i] * value(&corner[i])).sum()
-    };
-    let field = picture.table_colour(mean(&|v| v.field_value));
-    let weight = mean(&|v| v.field_weight);
-    let colour: [f32; 4] = std::array::from_fn(|channel| {
-        let plain = mean(&|v| v.colour[channel]);
-        plain + weight * (field[channel] - plain)
-    });
-    for channel in 0..3 {
-        sample[channel] += colour[3] * (colour[channel] - sample[channel]);
-    }
+/// The colour of a triangle that has only one.
+fn single_colour(corner: &[Vertex; 3]) -> Option<[f32; 4]> {
+    let plain = corner.iter().all(|v| v.field_weight == 0.0);
+    let equal = corner.iter().all(|v| v.colour == corner[0].colour);
+    (plain && equal).then_some(corner[0].colour)
+}
+
+/// Colour at a point with the given weights of the corners. The same formula as in the shader.
+fn mixed_colour(picture: &Picture, corner: &[Vertex; 3], share: [f32; 3]) -> [f32; 4] {
+    let [a, b, c] = corner;
+    let mean =
+        |values: [f32; 3]| share[0] * values[0] + share[1] * values[1] + share[2] * values[2];
+    let field = picture.table_colour(mean([a.field_value, b.field_value, c.field_value]));
+    let weight = mean([a.field_weight, b.field_weight, c.field_weight]);
+    std::array::from_fn(|i| {
+        let plain = mean([a.colour[i], b.colour[i], c.colour[i]]);
+        plain + weight * (field[i] - plain)
+    })
 }
 
 #[cfg(test)]
