@@ -267,9 +267,11 @@ struct StressScale {
 
 impl StressScale {
     fn new(chosen: Option<f64>, slice: &Slice) -> Self {
+        // Opened cells are drawn pale: they set no scale.
         let largest = slice
             .triangles
             .iter()
+            .filter(|t| !t.opened)
             .flat_map(|t| t.von_mises)
             .fold(0.0, f64::max);
         match chosen {
