@@ -1,1 +1,22 @@
-//! (being built)
+//! What a run leaves behind: tables, a summary, a force chart, fields for ParaView, and the line on the terminal.
+//!
+//! [`folder`] decides where, before anything is simulated. [`tables`] are appended and flushed frame by frame under
+//! their final names, so an interrupted run keeps every row; all other files appear whole or not at all
+//! ([`whole_file`]). [`curve`] reads figures off the force curve, [`summary`] writes them down.
+
+pub mod chart;
+pub mod curve;
+pub mod folder;
+pub mod progress;
+pub mod summary;
+pub mod tables;
+pub mod vtu;
+pub mod whole_file;
+
+pub use chart::write_force_chart;
+pub use curve::CurveFigures;
+pub use folder::{OutputFolder, PictureMoment};
+pub use progress::Progress;
+pub use summary::{Status, Summary};
+pub use tables::Tables;
+pub use vtu::FieldFiles;

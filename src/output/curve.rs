@@ -1,0 +1,374 @@
+//! Figures read off the curve of axial force against depth.
+//!
+//! Only frames on the way in count: those deeper than every frame before them. Holding, withdrawing and frames whose
+//! depth or force is not a finite number are left out.
+
+use crate::observables::FrameRecord;
+
+/// Travel after the peak within which the force has to fall, and in which the force after puncture is sought [m].
+pub const DROP_TRAVEL: f64 = 0.5e-3;
+/// Fraction of the peak by which the force has to fall.
+pub const DROP_FRACTION: f64 = 0.10;
+/// Depth from which the force is expected to grow linearly [m].
+pub const LINEAR_FROM: f64 = 5.0e-3;
+/// The same, counted from the puncture, for insertions that end before [`LINEAR_FROM`] plus [`LINEAR_AT_LEAST`] [m].
+pub const LINEAR_AFTER_PUNCTURE: f64 = 2.0e-3;
+/// Shortest travel over which a slope is fitted [m].
+pub const LINEAR_AT_LEAST: f64 = 1.0e-3;
+/// Travel at the end of the insertion over which the force at full depth is averaged [m].
+pub const END_TRAVEL: f64 = 0.25e-3;
+/// A drop smaller than this many standard deviations of the frame-to-frame noise is noise.
+const NOISE_FACTOR: f64 = 4.0;
+/// A peak below this fraction of the largest force is first contact, not puncture.
+const LEAST_PEAK: f64 = 0.05;
+
+/// What the curve tells. `None` where the curve does not hold it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CurveFigures {
+    /// Largest axial force on the way in [N].
+    pub peak_force: Option<f64>,
+    /// Axial force at the puncture peak [N].
+    pub puncture_force: Option<f64>,
+    /// Depth of the puncture peak [m].
+    pub puncture_depth: Option<f64>,
+    /// Smallest axial force within [`DROP_TRAVEL`] after the peak [N].
+    pub force_after_puncture: Option<f64>,
+    /// Fall of the force at puncture over the force at the peak.
+    pub drop_fraction: Option<f64>,
+    /// Largest depth [m].
+    pub max_depth: Option<f64>,
+    /// Mean axial force over the last [`END_TRAVEL`] of the insertion [N].
+    pub force_at_max_depth: Option<f64>,
+    /// Least-squares slope of the force over the linear part [N/m].
+    pub slope_after_puncture: Option<f64>,
+    /// Coefficient of determination of that fit.
+    pub r2: Option<f64>,
+}
+
+impl CurveFigures {
+    /// Reads the figures off the records of a run, in order of time.
+    pub fn from_records(records: &[FrameRecord]) -> Self {
+        let curve: Vec<Point> = frames_on_the_way_in(records)
+            .map(|r| Point {
+                depth: r.depth,
+                force: r.force.axial,
+            })
+            .filter(|p| p.force.is_finite())
+            .collect();
+        let Some(end) = curve.last() else {
+            return Self::default();
+        };
+        let peak_force = curve
+            .iter()
+            .map(|p| p.force)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let at_end: Vec<f64> = curve
+            .iter()
+            .filter(|p| p.depth >= end.depth - END_TRAVEL)
+            .map(|p| p.force)
+            .collect();
+        let mut figures = Self {
+            peak_force: Some(peak_force),
+            max_depth: Some(end.depth),
+            force_at_max_depth: Some(at_end.iter().sum::<f64>() / at_end.len() as f64),
+            ..Self::default()
+        };
+        if let Some(puncture) = find_puncture(&curve, peak_force) {
+            let peak = curve[puncture];
+            let after = window_after(&curve, puncture)
+                .iter()
+                .map(|p| p.force)
+                .fold(peak.force, f64::min);
+            figures.puncture_force = Some(peak.force);
+            figures.puncture_depth = Some(peak.depth);
+            figures.force_after_puncture = Some(after);
+            figures.drop_fraction = Some((peak.force - after) / peak.force);
+        }
+        let linear_from = if end.depth >= LINEAR_FROM + LINEAR_AT_LEAST {
+            Some(LINEAR_FROM)
+        } else {
+            figures.puncture_depth.map(|d| d + LINEAR_AFTER_PUNCTURE)
+        };
+        if let Some(from) = linear_from
+            && end.depth - from >= LINEAR_AT_LEAST
+        {
+            let linear: Vec<Point> = curve.iter().copied().filter(|p| p.depth >= from).collect();
+            if let Some((slope, r2)) = fit_line(&linear) {
+                figures.slope_after_puncture = Some(slope);
+                figures.r2 = r2;
+            }
+        }
+        figures
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    /// [m]
+    depth: f64,
+    /// Axial force [N].
+    force: f64,
+}
+
+/// Frames deeper than every frame before them.
+pub fn frames_on_the_way_in(records: &[FrameRecord]) -> impl Iterator<Item = &FrameRecord> {
+    let mut deepest = f64::NEG_INFINITY;
+    records.iter().filter(move |r| {
+        let deeper = r.depth.is_finite() && r.depth > deepest;
+        if deeper {
+            deepest = r.depth;
+        }
+        deeper
+    })
+}
+
+/// Points after index `i` within [`DROP_TRAVEL`], at least one where there is one.
+fn window_after(curve: &[Point], i: usize) -> &[Point] {
+    let rest = &curve[i + 1..];
+    let within = rest.partition_point(|p| p.depth <= curve[i].depth + DROP_TRAVEL);
+    &rest[..within.max(1).min(rest.len())]
+}
+
+/// Index of the first peak after which the force falls by [`DROP_FRACTION`] within [`DROP_TRAVEL`], before it rises
+/// above the peak again. Sought on the median of three frames, so that one stray frame is no peak.
+fn find_puncture(curve: &[Point], largest: f64) -> Option<usize> {
+    if curve.len() < 3 {
+        return None;
+    }
+    let noise = frame_noise(curve);
+    let smooth: Vec<Point> = (0..curve.len())
+        .map(|i| {
+            let mut force = match i {
+                0 => [curve[0].force; 3],
+                _ if i + 1 == curve.len() => [curve[i].force; 3],
+                _ => [curve[i - 1].force, curve[i].force, curve[i + 1].force],
+            };
+            force.sort_by(f64::total_cmp);
+            Point {
+                depth: curve[i].depth,
+                force: force[1],
+            }
+        })
+        .collect();
+    let candidate = (0..smooth.len()).find(|&i| {
+        let here = smooth[i];
+        if here.force <= 0.0 || here.force < LEAST_PEAK * largest {
+            return false;
+        }
+        let above_before = smooth[..i]
+            .iter()
+            .rev()
+            .take_while(|p| p.depth >= here.depth - DROP_TRAVEL)
+            .any(|p| p.force > here.force);
+        if above_before {
+            return false;
+        }
+        let drop = (DROP_FRACTION * here.force).max(NOISE_FACTOR * noise);
+        window_after(&smooth, i)
+            .iter()
+            .take_while(|p| p.force <= here.force)
+            .any(|p| p.force <= here.force - drop)
+    })?;
+    // The median flattens a sharp peak: take the largest of the three frames themselves.
+    let nearby = candidate.saturating_sub(1)..=(candidate + 1).min(curve.len() - 1);
+    nearby.max_by(|&a, &b| curve[a].force.total_cmp(&curve[b].force))
+}
+
+/// Standard deviation of the frame-to-frame noise [N], from the median size of the second differences: a smooth curve
+/// contributes little to them, and the few frames around a puncture do not move a median.
+fn frame_noise(curve: &[Point]) -> f64 {
+    let mut second: Vec<f64> = curve
+        .windows(3)
+        .map(|w| (w[0].force - 2.0 * w[1].force + w[2].force).abs())
+        .collect();
+    second.sort_by(f64::total_cmp);
+    // 1.4826: median of |x| to standard deviation; the second difference of white noise has variance 6.
+    1.4826 * second[second.len() / 2] / 6f64.sqrt()
+}
+
+/// Slope and coefficient of determination of the least-squares line.
+fn fit_line(points: &[Point]) -> Option<(f64, Option<f64>)> {
+    if points.len() < 3 {
+        return None;
+    }
+    let n = points.len() as f64;
+    let mean_depth = points.iter().map(|p| p.depth).sum::<f64>() / n;
+    let mean_force = points.iter().map(|p| p.force).sum::<f64>() / n;
+    let (mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0);
+    for p in points {
+        let (x, y) = (p.depth - mean_depth, p.force - mean_force);
+        sxx += x * x;
+        sxy += x * y;
+        syy += y * y;
+    }
+    let slope = sxy / sxx;
+    let r2 = (syy > 0.0).then(|| sxy * sxy / (sxx * syy));
+    slope.is_finite().then_some((slope, r2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observables::ForceParts;
+
+    /// Records with a depth step of 0.05 mm and the given force law [m -> N].
+    fn insertion(max_depth: f64, force: impl Fn(f64) -> f64) -> Vec<FrameRecord> {
+        let step = 0.05e-3;
+        (0..=(max_depth / step).round() as usize)
+            .map(|i| record(i as f64 * step, force(i as f64 * step)))
+            .collect()
+    }
+
+    fn record(depth: f64, axial: f64) -> FrameRecord {
+        FrameRecord {
+            depth,
+            force: ForceParts {
+                axial,
+                ..Default::default()
+            },
+            ..Default::default()
+        }
+    }
+
+    /// Rise to 1 N at 3 mm, fall to 0.6 N within 0.2 mm, then 50 N/m.
+    fn punctured(d: f64) -> f64 {
+        if d <= 3e-3 {
+            d / 3e-3
+        } else if d <= 3.2e-3 {
+            1.0 - 0.4 * (d - 3e-3) / 0.2e-3
+        } else {
+            0.6 + 50.0 * (d - 3.2e-3)
+        }
+    }
+
+    /// Repeatable noise in -1..1 (SplitMix64).
+    fn noise(i: u64) -> f64 {
+        let mut z = i.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        (z ^ (z >> 31)) as f64 / u64::MAX as f64 * 2.0 - 1.0
+    }
+
+    fn near(value: Option<f64>, expected: f64, tolerance: f64) {
+        let value = value.expect("a figure");
+        assert!(
+            (value - expected).abs() <= tolerance,
+            "{value} instead of {expected}"
+        );
+    }
+
+    #[test]
+    fn smooth_puncture() {
+        let figures = CurveFigures::from_records(&insertion(12e-3, punctured));
+        near(figures.puncture_depth, 3e-3, 1e-9);
+        near(figures.puncture_force, 1.0, 1e-9);
+        near(figures.force_after_puncture, 0.6, 1e-9);
+        near(figures.drop_fraction, 0.4, 1e-9);
+        near(figures.slope_after_puncture, 50.0, 1e-6);
+        near(figures.r2, 1.0, 1e-9);
+        near(figures.max_depth, 12e-3, 1e-12);
+        // Mean over 11.75 to 12 mm: the line at 11.875 mm.
+        near(figures.force_at_max_depth, 0.6 + 50.0 * 8.675e-3, 1e-9);
+        near(figures.peak_force, 0.6 + 50.0 * 8.8e-3, 1e-9);
+    }
+
+    #[test]
+    fn noise_neither_hides_nor_invents_a_puncture() {
+        let mut records = insertion(12e-3, punctured);
+        for (i, r) in records.iter_mut().enumerate() {
+            r.force.axial += 0.02 * noise(i as u64);
+        }
+        let figures = CurveFigures::from_records(&records);
+        near(figures.puncture_depth, 3e-3, 0.15e-3);
+        near(figures.puncture_force, 1.0, 0.03);
+        near(figures.force_after_puncture, 0.6, 0.03);
+        near(figures.slope_after_puncture, 50.0, 1.0);
+
+        let mut without = insertion(12e-3, |d| 100.0 * d);
+        for (i, r) in without.iter_mut().enumerate() {
+            r.force.axial += 0.02 * noise(i as u64);
+        }
+        assert_eq!(CurveFigures::from_records(&without).puncture_force, None);
+    }
+
+    #[test]
+    fn one_stray_frame_is_no_puncture() {
+        let mut records = insertion(12e-3, |d| 100.0 * d);
+        records[100].force.axial = 2.0;
+        assert_eq!(CurveFigures::from_records(&records).puncture_force, None);
+    }
+
+    #[test]
+    fn without_a_drop_there_is_no_puncture() {
+        let figures = CurveFigures::from_records(&insertion(8e-3, |d| 100.0 * d));
+        assert_eq!(figures.puncture_force, None);
+        assert_eq!(figures.force_after_puncture, None);
+        near(figures.slope_after_puncture, 100.0, 1e-9);
+        near(figures.peak_force, 0.8, 1e-9);
+    }
+
+    #[test]
+    fn a_slow_fall_is_no_puncture() {
+        // 10 % over 1 mm.
+        let figures = CurveFigures::from_records(&insertion(4e-3, |d| {
+            if d < 3e-3 {
+                d / 3e-3
+            } else {
+                1.0 - 100.0 * (d - 3e-3)
+            }
+        }));
+        assert_eq!(figures.puncture_force, None);
+    }
+
+    #[test]
+    fn the_first_of_two_drops_counts() {
+        let second = |d: f64| {
+            if d < 8e-3 {
+                punctured(d)
+            } else {
+                punctured(d) - 0.4
+            }
+        };
+        let figures = CurveFigures::from_records(&insertion(12e-3, second));
+        near(figures.puncture_depth, 3e-3, 1e-9);
+    }
+
+    #[test]
+    fn withdrawal_is_left_out() {
+        let mut records = insertion(12e-3, punctured);
+        for i in 0..100 {
+            records.push(record(12e-3 - i as f64 * 0.1e-3, -5.0));
+        }
+        let figures = CurveFigures::from_records(&records);
+        near(figures.force_at_max_depth, 0.6 + 50.0 * 8.675e-3, 1e-9);
+        near(figures.puncture_depth, 3e-3, 1e-9);
+    }
+
+    #[test]
+    fn a_shallow_insertion_is_fitted_from_the_puncture() {
+        let shallow = |d: f64| punctured(d + 2e-3);
+        let figures = CurveFigures::from_records(&insertion(4.5e-3, shallow));
+        near(figures.puncture_depth, 1e-3, 1e-9);
+        near(figures.slope_after_puncture, 50.0, 1e-6);
+        let too_short = CurveFigures::from_records(&insertion(3.5e-3, shallow));
+        assert_eq!(too_short.slope_after_puncture, None);
+    }
+
+    #[test]
+    fn nothing_and_not_a_number() {
+        assert_eq!(CurveFigures::from_records(&[]), CurveFigures::default());
+        let broken = [record(f64::NAN, 1.0), record(1e-3, f64::NAN)];
+        assert_eq!(CurveFigures::from_records(&broken), CurveFigures::default());
+        let mut records = insertion(12e-3, punctured);
+        records[60].force.axial = f64::NAN;
+        records[61].depth = f64::NAN;
+        near(
+            CurveFigures::from_records(&records).puncture_depth,
+            3e-3,
+            0.11e-3,
+        );
+        let one = CurveFigures::from_records(&[record(0.0, 0.5)]);
+        assert_eq!(one.peak_force, Some(0.5));
+        assert_eq!(one.slope_after_puncture, None);
+    }
+}

@@ -1,0 +1,243 @@
+//! `summary.json`: one run in numbers, for people and for scripts that compare runs.
+
+use std::path::Path;
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::curve::{CurveFigures, frames_on_the_way_in};
+use super::tables::{hourglass_to_internal, kinetic_to_internal};
+use super::whole_file;
+use crate::observables::FrameRecord;
+use crate::{Error, Result};
+
+/// Internal energy below this fraction of its largest value says nothing about hourglassing: the ratio of two numbers
+/// near zero.
+const TELLING_ENERGY: f64 = 0.01;
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(into = "String", from = "String")]
+pub enum Status {
+    #[default]
+    Ok,
+    /// Stopped by the user; the results up to there are complete.
+    Interrupted,
+    /// Why the run stopped.
+    Failed(String),
+}
+
+impl From<Status> for String {
+    fn from(status: Status) -> Self {
+        match status {
+            Status::Ok => "ok".into(),
+            Status::Interrupted => "interrupted".into(),
+            Status::Failed(why) => format!("failed: {why}"),
+        }
+    }
+}
+
+impl From<String> for Status {
+    fn from(text: String) -> Self {
+        match text.as_str() {
+            "ok" => Status::Ok,
+            "interrupted" => Status::Interrupted,
+            other => Status::Failed(other.strip_prefix("failed: ").unwrap_or(other).to_string()),
+        }
+    }
+}
+
+/// The keys of `summary.json`, with their unit in the name. `null` stands for "the run does not hold this number".
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Summary {
+    pub status: Status,
+    pub scene: String,
+    /// Program version that made the results.
+    pub version: String,
+    /// `gpu` or `cpu`.
+    pub engine: String,
+    /// Name of the adapter; empty on the engine `cpu`.
+    pub adapter: String,
+    pub driver: String,
+    /// Keys of the effects that were on, in their order.
+    pub effects: Vec<String>,
+    pub cells: u64,
+    pub nodes: u64,
+    /// Time step that was used [s].
+    pub dt_s: f64,
+    /// Largest stable time step [s].
+    pub stable_dt_s: f64,
+    /// Factor on the density; 1 = none.
+    pub mass_scaling: f64,
+    pub steps: u64,
+    pub simulated_s: f64,
+    /// Wall time of the steps, without start-up [s].
+    pub wall_s: f64,
+    /// Simulated time over wall time.
+    pub real_time_factor: f64,
+    pub cell_steps_per_s: f64,
+    /// Processor time of all threads per cell and step [ns].
+    pub cpu_ns_per_cell_step: Option<f64>,
+    /// From program start to the end of the first step [ms].
+    pub first_step_ms: Option<f64>,
+    /// Largest memory of the process [byte].
+    pub host_peak_bytes: Option<u64>,
+    /// Memory of all buffers on the device [byte].
+    pub device_bytes: Option<u64>,
+
+    /// Largest axial force on the way in [N].
+    pub peak_force_n: Option<f64>,
+    pub puncture_force_n: Option<f64>,
+    pub puncture_depth_m: Option<f64>,
+    pub force_after_puncture_n: Option<f64>,
+    pub force_at_max_depth_n: Option<f64>,
+    pub max_depth_m: Option<f64>,
+    pub slope_after_puncture_n_per_m: Option<f64>,
+    /// Coefficient of determination of the straight line from 5 mm to the deepest point.
+    pub linear_fit_r2: Option<f64>,
+
+    /// Largest |imbalance| of a frame; not a number (`null`) if any frame had none.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub energy_imbalance: f64,
+    /// Medians over the way in.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub kinetic_to_internal: f64,
+    #[serde(deserialize_with = "null_is_nan")]
+    pub hourglass_to_internal: f64,
+    /// Largest value among frames that store at least 1 % of the largest internal energy.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub hourglass_to_internal_max: f64,
+    /// Nodes whose speed was clamped, summed over all steps.
+    pub clamped_nodes: u64,
+    /// Most inverted cells in one frame.
+    pub inverted_cells: u64,
+}
+
+/// JSON has no NaN; it is written as `null`.
+fn null_is_nan<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+impl Summary {
+    /// Fills in everything that the frames tell: figures of the curve, energies, health.
+    pub fn take_frames(&mut self, records: &[FrameRecord]) {
+        let figures = CurveFigures::from_records(records);
+        self.peak_force_n = figures.peak_force;
+        self.puncture_force_n = figures.puncture_force;
+        self.puncture_depth_m = figures.puncture_depth;
+        self.force_after_puncture_n = figures.force_after_puncture;
+        self.force_at_max_depth_n = figures.force_at_max_depth;
+        self.max_depth_m = figures.max_depth;
+        self.slope_after_puncture_n_per_m = figures.slope_after_puncture;
+        self.linear_fit_r2 = figures.r2;
+
+        self.energy_imbalance = largest(records.iter().map(|r| r.energy.imbalance().abs()));
+        // A scene without a moving tool has no way in: every frame counts.
+        let mut inward: Vec<&FrameRecord> = frames_on_the_way_in(records).collect();
+        if inward.len() < 2 {
+            inward = records.iter().collect();
+        }
+        self.kinetic_to_internal = median(inward.iter().map(|r| kinetic_to_internal(&r.energy)));
+        self.hourglass_to_internal =
+            median(inward.iter().map(|r| hourglass_to_internal(&r.energy)));
+        let internal = |r: &FrameRecord| r.energy.elastic + r.energy.hourglass;
+        let telling = TELLING_ENERGY * records.iter().map(internal).fold(0.0, f64::max);
+        self.hourglass_to_internal_max = largest(
+            records
+                .iter()
+                .filter(|r| internal(r) >= telling)
+                .map(|r| hourglass_to_internal(&r.energy)),
+        );
+        self.clamped_nodes = records
+            .iter()
+            .map(|r| u64::from(r.health.clamped_nodes))
+            .sum();
+        self.inverted_cells = records
+            .iter()
+            .map(|r| u64::from(r.health.inverted_cells))
+            .max()
+            .unwrap_or(0);
+    }
+
+    /// Writes `summary.json`, whole or not at all.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let mut text = serde_json::to_string_pretty(self)
+            .map_err(|source| Error::file(path, source.into()))?;
+        text.push('\n');
+        whole_file::write(path, text.as_bytes())
+    }
+
+    /// Reads a summary back.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|source| Error::file(path, source))?;
+        serde_json::from_str(&text).map_err(|reason| {
+            Error::input(
+                format!("{} is no summary of a run: {reason}", path.display()),
+                "give the summary.json that a run of this version wrote",
+            )
+        })
+    }
+}
+
+/// Largest value, 0 of none, NaN if any value is NaN (`f64::max` would drop it).
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, |a: f64, b| {
+        if a.is_nan() || b.is_nan() {
+            f64::NAN
+        } else {
+            a.max(b)
+        }
+    })
+}
+
+/// Median, 0 of none, NaN if any value is NaN.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    if values.iter().any(|v| v.is_nan()) {
+        return f64::NAN;
+    }
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 {
+        values[middle]
+    } else {
+        0.5 * (values[middle - 1] + values[middle])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn not_a_number_is_not_lost_in_a_maximum() {
+        assert!(largest([0.1, f64::NAN, 0.2].into_iter()).is_nan());
+        assert_eq!(largest([0.1, 0.3, 0.2].into_iter()), 0.3);
+        assert_eq!(largest(std::iter::empty()), 0.0);
+    }
+
+    #[test]
+    fn medians() {
+        assert_eq!(median([3.0, 1.0, 2.0].into_iter()), 2.0);
+        assert_eq!(median([4.0, 1.0, 2.0, 3.0].into_iter()), 2.5);
+        assert_eq!(median(std::iter::empty()), 0.0);
+    }
+
+    #[test]
+    fn status_is_one_string() {
+        for status in [
+            Status::Ok,
+            Status::Interrupted,
+            Status::Failed("an inverted cell".into()),
+        ] {
+            let text = serde_json::to_string(&status).unwrap();
+            assert_eq!(serde_json::from_str::<Status>(&text).unwrap(), status);
+        }
+        assert_eq!(
+            serde_json::to_string(&Status::Failed("x".into())).unwrap(),
+            "\"failed: x\""
+        );
+    }
+}

@@ -1,0 +1,213 @@
+//! `force.csv` and `energy.csv`: one row per display frame, units in the column names.
+//!
+//! Both are flushed after every row: whatever stops the program, the rows of all finished frames are on the disk.
+
+use std::fs::File;
+use std::path::PathBuf;
+
+use super::folder::{ENERGY_TABLE, FORCE_TABLE, OutputFolder};
+use crate::observables::{EnergyAccount, FrameRecord};
+use crate::{Error, Result};
+
+/// Columns of `force.csv`; the meaning is that of the fields of [`FrameRecord`].
+pub const FORCE_COLUMNS: [&str; 14] = [
+    "time_s",
+    "depth_m",
+    "phase",
+    "axial_force_n",
+    "cutting_force_n",
+    "spreading_force_n",
+    "friction_force_n",
+    "lateral_x_n",
+    "lateral_y_n",
+    "lateral_z_n",
+    "torque_x_nm",
+    "torque_y_nm",
+    "torque_z_nm",
+    "tip_coordinate_m",
+];
+
+/// Columns of `energy.csv`.
+pub const ENERGY_COLUMNS: [&str; 19] = [
+    "time_s",
+    "depth_m",
+    "external_work_j",
+    "elastic_j",
+    "kinetic_j",
+    "hourglass_j",
+    "damping_j",
+    "friction_j",
+    "cutting_j",
+    "contact_j",
+    "imbalance",
+    "kinetic_to_internal",
+    "hourglass_to_internal",
+    "min_j",
+    "min_corner_j",
+    "clamped_nodes",
+    "inverted_cells",
+    "max_speed_m_per_s",
+    "raised_mass",
+];
+
+/// Kinetic over internal energy, internal = elastic + hourglass; 0 where nothing is stored.
+pub fn kinetic_to_internal(energy: &EnergyAccount) -> f64 {
+    ratio(energy.kinetic, energy.elastic + energy.hourglass)
+}
+
+/// Hourglass over internal energy, internal = elastic + hourglass; 0 where nothing is stored.
+pub fn hourglass_to_internal(energy: &EnergyAccount) -> f64 {
+    ratio(energy.hourglass, energy.elastic + energy.hourglass)
+}
+
+fn ratio(part: f64, whole: f64) -> f64 {
+    if whole == 0.0 { 0.0 } else { part / whole }
+}
+
+/// The two open tables of a run.
+#[derive(Debug)]
+pub struct Tables {
+    force: Table,
+    energy: Table,
+}
+
+#[derive(Debug)]
+struct Table {
+    path: PathBuf,
+    writer: csv::Writer<File>,
+}
+
+impl Table {
+    fn create(path: PathBuf, columns: &[&str]) -> Result<Self> {
+        let file = File::create(&path).map_err(|source| Error::file(&path, source))?;
+        let mut table = Self {
+            path,
+            writer: csv::Writer::from_writer(file),
+        };
+        table.write_row(columns)?;
+        Ok(table)
+    }
+
+    fn write_row<T: AsRef<[u8]>>(&mut self, fields: &[T]) -> Result<()> {
+        self.writer
+            .write_record(fields)
+            .map_err(std::io::Error::from)
+            .and_then(|()| self.writer.flush())
+            .map_err(|source| Error::file(&self.path, source))
+    }
+}
+
+impl Tables {
+    /// Creates both files with their header rows.
+    pub fn create(folder: &OutputFolder) -> Result<Self> {
+        Ok(Self {
+            force: Table::create(folder.file(FORCE_TABLE), &FORCE_COLUMNS)?,
+            energy: Table::create(folder.file(ENERGY_TABLE), &ENERGY_COLUMNS)?,
+        })
+    }
+
+    /// Appends one row to each file and flushes both.
+    pub fn append(&mut self, record: &FrameRecord) -> Result<()> {
+        self.force.write_row(&force_row(record))?;
+        self.energy.write_row(&energy_row(record))
+    }
+}
+
+fn force_row(record: &FrameRecord) -> [String; FORCE_COLUMNS.len()] {
+    let f = &record.force;
+    [
+        number(record.time),
+        number(record.depth),
+        record.phase.to_string(),
+        number(f.axial),
+        number(f.cutting),
+        number(f.spreading),
+        number(f.friction),
+        number(f.lateral.x),
+        number(f.lateral.y),
+        number(f.lateral.z),
+        number(f.torque.x),
+        number(f.torque.y),
+        number(f.torque.z),
+        number(record.tip_coordinate),
+    ]
+}
+
+fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
+    let e = &record.energy;
+    let h = &record.health;
+    [
+        number(record.time),
+        number(record.depth),
+        number(e.external),
+        number(e.elastic),
+        number(e.kinetic),
+        number(e.hourglass),
+        number(e.damping),
+        number(e.friction),
+        number(e.cutting),
+        number(e.contact),
+        number(e.imbalance()),
+        number(kinetic_to_internal(e)),
+        number(hourglass_to_internal(e)),
+        number(h.min_j),
+        number(h.min_corner_j),
+        h.clamped_nodes.to_string(),
+        h.inverted_cells.to_string(),
+        number(h.max_speed),
+        h.raised_mass.to_string(),
+    ]
+}
+
+/// Nine significant digits, trailing zeros left away; an exponent where the plain form would be long.
+pub fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 {
+            "0".into()
+        } else {
+            value.to_string()
+        };
+    }
+    let rounded: f64 = format!("{value:.8e}")
+        .parse()
+        .expect("a number that was just formatted can be parsed");
+    if (1e-4..1e9).contains(&rounded.abs()) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_nine_significant_digits() {
+        assert_eq!(number(0.0), "0");
+        assert_eq!(number(-0.0), "0");
+        assert_eq!(number(1.0 / 3.0), "0.333333333");
+        assert_eq!(number(-12345.678912345), "-12345.6789");
+        assert_eq!(number(1.234567894e-7), "1.23456789e-7");
+        assert_eq!(number(2.5e12), "2.5e12");
+        assert_eq!(number(f64::NAN), "NaN");
+        assert_eq!(number(f64::INFINITY), "inf");
+    }
+
+    #[test]
+    fn ratios_are_zero_without_internal_energy() {
+        let energy = EnergyAccount {
+            kinetic: 1.0,
+            ..Default::default()
+        };
+        assert_eq!(kinetic_to_internal(&energy), 0.0);
+        let energy = EnergyAccount {
+            kinetic: 1.0,
+            elastic: 3.0,
+            hourglass: 1.0,
+            ..Default::default()
+        };
+        assert_eq!(kinetic_to_internal(&energy), 0.25);
+        assert_eq!(hourglass_to_internal(&energy), 0.25);
+    }
+}
