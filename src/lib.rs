@@ -4,6 +4,7 @@
 //! [`scene`] -> [`mesh`] -> [`effects`] -> [`model`] -> [`solver`] (engines [`solver::cpu`] and
 //! [`gpu`]) -> [`observables`] -> [`output`] and [`render`].
 
+pub mod commands;
 pub mod effects;
 pub mod error;
 pub mod gpu;
@@ -13,6 +14,7 @@ pub mod model;
 pub mod needle;
 pub mod observables;
 pub mod output;
+pub mod process;
 pub mod render;
 pub mod scene;
 pub mod solver;

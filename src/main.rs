@@ -1,1 +1,172 @@
-fn main(){}
+//! Command line of Stylet.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use clap::{Args, Parser, Subcommand};
+use stylet::commands::{self, bench::BenchOptions, run::RunOptions};
+use stylet::error::{Error, Result};
+use stylet::scene::Scene;
+use stylet::solver::simulation::EngineChoice;
+
+/// Scene of the main job.
+const DEFAULT_SCENE: &str = "scenes/muscle_biopsy.toml";
+
+/// A needle goes into soft tissue: explicit tissue simulation on the GPU, from a scene file to forces and pictures.
+#[derive(Parser)]
+#[command(version, about, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Simulate a scene and write forces, energies, fields and pictures
+    Run(RunArgs),
+    /// Check a scene and tell what it means, without running it
+    Check(CheckArgs),
+    /// Measure this machine against the performance goals
+    Bench(BenchArgs),
+    /// List the GPU adapters
+    Adapters,
+    /// Print the JSON schema of scene files
+    Schema,
+    /// One step of the bench block: milliseconds since the start of the program (called by `bench`)
+    #[command(hide = true)]
+    FirstStep {
+        #[arg(long, default_value = "auto")]
+        engine: EngineChoice,
+    },
+}
+
+#[derive(Args)]
+struct SceneArgs {
+    /// Scene file
+    #[arg(default_value = DEFAULT_SCENE)]
+    scene: PathBuf,
+    /// Override a key of the scene, e.g. --set tissue.cell_size_mm=0.8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    #[arg(long, default_value = "auto")]
+    engine: EngineChoice,
+}
+
+#[derive(Args)]
+struct RunArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Folder of the results [default: the next out/<scene>/001, 002, ...]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Replace the results that the folder holds
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Args)]
+struct CheckArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+}
+
+#[derive(Args)]
+struct BenchArgs {
+    /// auto, gpu or cpu
+    #[arg(long, default_value = "auto")]
+    engine: EngineChoice,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Largest number of cells
+    #[arg(long, default_value_t = 500_000)]
+    max_cells: usize,
+}
+
+/// Prints to standard output; a closed pipe (`| head`) is no failure.
+fn print(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+}
+
+fn run(args: &RunArgs, start: Instant) -> Result<u8> {
+    let scene = Scene::load(&args.scene.scene, &args.scene.overrides)?;
+    let options = RunOptions { engine: args.scene.engine, out: args.out.clone(), force: args.force };
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = interrupted.clone();
+    // A second Ctrl-C ends the program at once.
+    let handler = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(commands::run::EXIT_INTERRUPTED.into());
+        }
+    };
+    if let Err(error) = ctrlc::set_handler(handler) {
+        log::warn!("Ctrl-C will end the program at once: {error}");
+    }
+    let outcome = commands::run::run(scene, &options, start, &interrupted);
+    let code = commands::run::exit_code(&outcome);
+    match outcome {
+        Ok(outcome) => {
+            eprintln!("{}", commands::run::describe(&outcome.summary));
+            print(&outcome.folder.display().to_string());
+        }
+        Err(error) if code == 2 => return Err(error),
+        Err(error) => eprintln!("error: {error}"),
+    }
+    Ok(code)
+}
+
+fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
+    match cli.command {
+        None => run(&cli.run, start),
+        Some(Command::Run(args)) => run(&args, start),
+        Some(Command::Check(args)) => {
+            let scene = Scene::load(&args.scene.scene, &args.scene.overrides)?;
+            print(&commands::check::check(scene, args.scene.engine)?);
+            Ok(0)
+        }
+        Some(Command::Bench(args)) => {
+            let options = BenchOptions { engine: args.engine, max_cells: args.max_cells };
+            let report = commands::bench::bench(&options)?;
+            print(&if args.json { report.json() } else { report.table() });
+            Ok(0)
+        }
+        Some(Command::FirstStep { engine }) => {
+            print(&commands::bench::first_step(engine, start)?);
+            Ok(0)
+        }
+        Some(Command::Adapters) => {
+            print(commands::adapters()?.trim_end());
+            Ok(0)
+        }
+        Some(Command::Schema) => {
+            let text = serde_json::to_string_pretty(&Scene::schema());
+            print(&text.map_err(|e| Error::input(e.to_string(), "report this as a defect"))?);
+            Ok(0)
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let start = Instant::now();
+    if std::env::var_os("NODEVICE_SELECT").is_none() {
+        // Mesa's device-select layer writes noise about XDG_RUNTIME_DIR on machines without a desktop.
+        // SAFETY: no other thread exists yet.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+    }
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error,wgpu_hal=off")).init();
+    match dispatch(Cli::parse(), start) {
+        Ok(code) => ExitCode::from(code),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

@@ -95,7 +95,8 @@ pub struct Summary {
     /// Coefficient of determination of the straight line from 5 mm to the deepest point.
     pub linear_fit_r2: Option<f64>,
 
-    /// Largest |imbalance| of a frame; not a number (`null`) if any frame had none.
+    /// Largest |external work - accounted energy| of a frame over the largest external work of the run; not a number
+    /// (`null`) if any frame had none.
     #[serde(deserialize_with = "null_is_nan")]
     pub energy_imbalance: f64,
     /// Medians over the way in.
@@ -130,7 +131,13 @@ impl Summary {
         self.slope_after_puncture_n_per_m = figures.slope_after_puncture;
         self.linear_fit_r2 = figures.r2;
 
-        self.energy_imbalance = largest(records.iter().map(|r| r.energy.imbalance().abs()));
+        let scale = records.iter().map(|r| r.energy.external_max).fold(0.0, f64::max);
+        let residual = |r: &FrameRecord| (r.energy.external - r.energy.accounted()).abs();
+        self.energy_imbalance = match scale > 0.0 {
+            true => largest(records.iter().map(residual)) / scale,
+            // Nothing was done to the tissue; what it holds all the same is measured against itself.
+            false => largest(records.iter().map(|r| r.energy.imbalance().abs())),
+        };
         // A scene without a moving tool has no way in: every frame counts.
         let mut inward: Vec<&FrameRecord> = frames_on_the_way_in(records).collect();
         if inward.len() < 2 {

@@ -1,0 +1,457 @@
+//! `stylet bench`: this machine against the performance goals.
+//!
+//! Figures are process CPU time per cell and step where the adapter is a software one (wall time moves by two on a
+//! shared machine), wall time beside it, and ratios inside one run. Every figure is the smallest of several rounds.
+
+use std::fmt::Write;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::DVec3;
+use serde::Serialize;
+
+use crate::effects::{EffectSet, friction, mass_scaling, puncture};
+use crate::error::Result;
+use crate::gpu::{Gpu, GpuEngine};
+use crate::material::MooneyRivlin;
+use crate::mesh::BlockMesh;
+use crate::model::Model;
+use crate::process;
+use crate::scene::{
+    FaceCondition, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool,
+};
+use crate::solver::cpu::CpuEngine;
+use crate::solver::engine::{Engine, FramePlan, StepInput};
+use crate::solver::simulation::EngineChoice;
+use crate::solver::stable_dt::stable_step;
+
+/// What the command line chooses.
+#[derive(Debug, Clone)]
+pub struct BenchOptions {
+    pub engine: EngineChoice,
+    pub max_cells: usize,
+}
+
+/// Cells along x, y, z of the measured blocks, edges of 0.8 mm.
+const SIZES: [[usize; 3]; 5] = [[17, 17, 17], [28, 28, 26], [46, 46, 47], [79, 79, 80], [100, 100, 100]];
+
+/// Rounds per figure; the smallest counts.
+const ROUNDS: usize = 3;
+
+/// Wall time of one round [s]; the clock of processor time ticks in 10 ms.
+const ROUND_SECONDS: f64 = 0.8;
+
+/// One measured block.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    pub cells: usize,
+    pub needle: bool,
+    /// Process CPU time per cell and step [ns].
+    pub cpu_ns_per_cell_step: Option<f64>,
+    /// Wall time per cell and step [ns], and per step [us].
+    pub wall_ns_per_cell_step: f64,
+    pub wall_us_per_step: f64,
+    /// Time step at mass scaling 1000 [us] and the real-time factor with it.
+    pub dt_us: f64,
+    pub real_time_factor: f64,
+    pub device_bytes_per_cell: f64,
+    /// Recording of commands per dispatch [us].
+    pub record_us_per_dispatch: f64,
+}
+
+/// One line of the goals.
+#[derive(Debug, Clone, Serialize)]
+pub struct Goal {
+    pub what: String,
+    pub measured: f64,
+    pub unit: String,
+    /// Bound and whether the measured value must stay below (`<=`) or above (`>=`) it.
+    pub sense: String,
+    pub bound: f64,
+    pub met: bool,
+}
+
+/// All figures of one machine.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    pub engine: String,
+    pub adapter: String,
+    pub driver: String,
+    pub rows: Vec<Row>,
+    pub goals: Vec<Goal>,
+}
+
+/// A block of 0.8 mm cells with nu 0.45 at mass scaling 1000, with or without a 16G needle going in at 2 mm/s.
+fn scene(cells: [usize; 3], needle: bool) -> Scene {
+    let h = 0.8e-3;
+    let shear = 60e3 / 2.9;
+    let fixed = FaceCondition { fixed: [true; 3], ..Default::default() };
+    Scene {
+        name: "bench".into(),
+        title: "bench".into(),
+        path: "bench".into(),
+        tissue: Tissue {
+            size: DVec3::new(cells[0] as f64, cells[1] as f64, cells[2] as f64) * h,
+            cell_size: h,
+            fine_radius: 0.0,
+            growth: 1.0,
+            axis_offset_cells: [0.0, 0.0],
+        },
+        material: TissueMaterial {
+            name: "constants".into(),
+            source: "E 60 kPa, nu 0.45".into(),
+            law: MooneyRivlin::from_moduli(shear, 60e3 / 0.3, 0.7),
+            density: 1060.0,
+        },
+        faces: [fixed.clone(), fixed.clone(), fixed.clone(), fixed.clone(), fixed, FaceCondition::default()],
+        tool: needle.then(|| {
+            Tool::Needle(NeedleShape {
+                name: "16G".into(),
+                radius: 0.8255e-3,
+                tip_length: 2.5e-3,
+                material: "steel-304".into(),
+            })
+        }),
+        motion: Motion {
+            // Off the grid lines, as scenes have it.
+            entry: DVec3::new(0.23 * h, 0.31 * h, 0.0),
+            direction: DVec3::NEG_Z,
+            phases: if needle { vec![Phase::Insert { speed: 2e-3, depth: 10e-3 }] } else { Vec::new() },
+        },
+        effects: EffectSet {
+            mass_scaling: Some(mass_scaling::Params { factor: 1000.0 }),
+            puncture: needle.then(puncture::Params::default),
+            friction: needle.then(friction::Params::default),
+            ..Default::default()
+        },
+        solver: SolverSettings {
+            safety: 0.8,
+            time_step: None,
+            mass_damping: 10.0,
+            hourglass_stiffness: 0.1,
+            hourglass_quartic: 15_000.0,
+            frame_rate: 60.0,
+            duration: Some(1.0),
+        },
+        outputs: Outputs::default(),
+        notices: Vec::new(),
+    }
+}
+
+fn uniform_mesh(cells: [usize; 3], h: f64) -> BlockMesh {
+    BlockMesh {
+        lines: std::array::from_fn(|a| {
+            let n = cells[a];
+            let start = if a == 2 { -(n as f64) * h } else { -0.5 * n as f64 * h };
+            (0..=n).map(|i| start + i as f64 * h).collect()
+        }),
+    }
+}
+
+/// A prepared block that steps on request.
+struct Subject {
+    model: Arc<Model>,
+    engine: Box<dyn Engine>,
+    dt: f64,
+    step: u64,
+    frame: u64,
+    recording: f64,
+    stages: usize,
+}
+
+impl Subject {
+    fn new(cells: [usize; 3], needle: bool, gpu: Option<&Gpu>, max_steps: usize) -> Result<Self> {
+        let scene = scene(cells, needle);
+        let mesh = uniform_mesh(cells, scene.tissue.cell_size);
+        let model = Arc::new(Model::new(scene, mesh));
+        let dt = 0.8 * stable_step(&model).wave_speed;
+        let engine: Box<dyn Engine> = match gpu {
+            Some(gpu) => Box::new(GpuEngine::new(model.clone(), gpu.clone(), dt, max_steps)?),
+            None => Box::new(CpuEngine::new(model.clone(), dt)),
+        };
+        let stages = crate::gpu::engine::stages(&model.effects).iter().filter(|s| !s.once_per_frame()).count();
+        Ok(Subject { model, engine, dt, step: 0, frame: 0, recording: 0.0, stages })
+    }
+
+    /// One frame of `steps` steps, waited for; the tool moves `haste` times as fast as the scene says.
+    fn frame(&mut self, steps: usize, haste: f64) -> Result<()> {
+        let inputs = (0..steps)
+            .map(|i| {
+                let time = (self.step + i as u64) as f64 * self.dt * haste;
+                let mut input = StepInput::at(&self.model, time, self.dt);
+                if let Some(pose) = &mut input.pose {
+                    pose.velocity *= haste;
+                }
+                input
+            })
+            .collect();
+        let plan = FramePlan { frame: self.frame, first_step: self.step, steps: inputs };
+        self.step += steps as u64;
+        self.frame += 1;
+        let begin = Instant::now();
+        self.engine.start_frame(&plan)?;
+        self.recording = begin.elapsed().as_secs_f64();
+        self.engine.collect(true)?;
+        Ok(())
+    }
+
+    /// Wall and CPU seconds per step over about `ROUND_SECONDS`, in frames of `steps`.
+    fn round(&mut self, steps: usize) -> Result<(f64, Option<f64>)> {
+        let (begin, cpu) = (Instant::now(), process::cpu_seconds());
+        let mut count = 0;
+        while begin.elapsed().as_secs_f64() < ROUND_SECONDS {
+            self.frame(steps, 1.0)?;
+            count += steps;
+        }
+        let wall = begin.elapsed().as_secs_f64() / count as f64;
+        let cpu = process::cpu_seconds().zip(cpu).map(|(b, a)| (b - a) / count as f64);
+        Ok((wall, cpu))
+    }
+
+    /// The smallest of several rounds.
+    fn best(&mut self, steps: usize) -> Result<(f64, Option<f64>)> {
+        let mut best = self.round(steps)?;
+        for _ in 1..ROUNDS {
+            let (wall, cpu) = self.round(steps)?;
+            best = (best.0.min(wall), best.1.zip(cpu).map(|(a, b)| a.min(b)));
+        }
+        Ok(best)
+    }
+}
+
+fn measure(cells: [usize; 3], needle: bool, gpu: Option<&Gpu>) -> Result<Row> {
+    const STEPS: usize = 100;
+    let mut subject = Subject::new(cells, needle, gpu, STEPS)?;
+    if needle {
+        // Into the tissue first, ten times as fast: the tip has punctured and the shaft rubs when it counts.
+        while (subject.step as f64) * subject.dt * 10.0 * 2e-3 < 6e-3 {
+            subject.frame(STEPS, 10.0)?;
+        }
+        subject.step *= 10;
+    } else {
+        subject.frame(STEPS, 1.0)?;
+    }
+    let (wall, cpu) = subject.best(STEPS)?;
+    let mut recording = f64::INFINITY;
+    for _ in 0..5 {
+        subject.frame(STEPS, 1.0)?;
+        recording = recording.min(subject.recording);
+    }
+    let count = subject.model.mesh.cell_count();
+    Ok(Row {
+        cells: count,
+        needle,
+        cpu_ns_per_cell_step: cpu.map(|c| c * 1e9 / count as f64),
+        wall_ns_per_cell_step: wall * 1e9 / count as f64,
+        wall_us_per_step: wall * 1e6,
+        dt_us: subject.dt * 1e6,
+        real_time_factor: subject.dt / wall,
+        device_bytes_per_cell: subject.engine.info().device_bytes as f64 / count as f64,
+        record_us_per_dispatch: recording * 1e6 / (STEPS * subject.stages) as f64,
+    })
+}
+
+/// Share of a 16-step frame that is no step: submission, measuring stages and read-back together.
+fn frame_overhead(gpu: Option<&Gpu>) -> Result<f64> {
+    let mut subject = Subject::new(SIZES[1], false, gpu, 160)?;
+    subject.frame(160, 1.0)?;
+    let (mut short, mut long) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..ROUNDS {
+        short = short.min(subject.round(16)?.0 * 16.0);
+        long = long.min(subject.round(160)?.0 * 160.0);
+    }
+    let step = (long - short) / 144.0;
+    Ok((short - 16.0 * step) / short)
+}
+
+/// Time from program start to the first finished step of 20 k cells [ms] and peak memory [MB], in a fresh process.
+fn start(cold: bool, engine: EngineChoice) -> Option<(f64, f64)> {
+    let mut command = std::process::Command::new(std::env::current_exe().ok()?);
+    command.arg("first-step").arg("--engine").arg(match engine {
+        EngineChoice::Auto => "auto",
+        EngineChoice::Gpu => "gpu",
+        EngineChoice::Cpu => "cpu",
+    });
+    if cold {
+        // Drivers keep compiled shaders on disk; Mesa and NVIDIA have their own switches.
+        command.env("MESA_SHADER_CACHE_DISABLE", "true").env("__GL_SHADER_DISK_CACHE", "0");
+    }
+    let output = command.output().ok().filter(|o| o.status.success())?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    let (ms, bytes) = text.trim().split_once(' ')?;
+    Some((ms.parse().ok()?, bytes.parse::<f64>().ok()? / 1e6))
+}
+
+/// `stylet first-step`: one step of the 20 k block; prints milliseconds since `program_start` and the peak memory.
+pub fn first_step(engine: EngineChoice, program_start: Instant) -> Result<String> {
+    let gpu = open(engine)?;
+    let mut subject = Subject::new(SIZES[1], false, gpu.as_ref(), 1)?;
+    subject.frame(1, 1.0)?;
+    let ms = program_start.elapsed().as_secs_f64() * 1e3;
+    Ok(format!("{ms:.3} {}", process::peak_bytes().unwrap_or(0)))
+}
+
+fn open(engine: EngineChoice) -> Result<Option<Gpu>> {
+    match engine {
+        EngineChoice::Cpu => Ok(None),
+        EngineChoice::Gpu => Gpu::open().map(Some),
+        EngineChoice::Auto => Ok(Gpu::open().ok()),
+    }
+}
+
+/// Bytes per second of a device-to-device copy, read and written counted, from buffers of 128 MiB.
+fn copy_bandwidth(gpu: &Gpu) -> Result<f64> {
+    const SIZE: u64 = 128 << 20;
+    let buffer = || {
+        gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("copy"),
+            size: SIZE,
+            usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    };
+    let (a, b) = (buffer(), buffer());
+    let mut best = f64::INFINITY;
+    for _ in 0..5 {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        for _ in 0..20 {
+            encoder.copy_buffer_to_buffer(&a, 0, &b, 0, SIZE);
+        }
+        let begin = Instant::now();
+        gpu.queue.submit([encoder.finish()]);
+        gpu.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|e| crate::Error::Device(e.to_string()))?;
+        best = best.min(begin.elapsed().as_secs_f64());
+    }
+    Ok(2.0 * 20.0 * SIZE as f64 / best)
+}
+
+/// Bytes that one cell and step move at least: four nodes of u loaded per plane and four forces stored by the element
+/// stage; four forces, u, v and mass loaded, u and v stored by the node stage, with planes shared within a strip.
+fn bytes_per_cell_step(strip_layers: f64) -> f64 {
+    let planes = (strip_layers + 1.0) / strip_layers;
+    planes * 4.0 * 16.0 * 3.0 + 16.0 * 4.0 + 4.0
+}
+
+/// Measures everything that fits under `max_cells`.
+pub fn bench(options: &BenchOptions) -> Result<Report> {
+    let gpu = open(options.engine)?;
+    let software = gpu.as_ref().is_none_or(Gpu::is_software);
+    let mut rows = Vec::new();
+    let sizes = SIZES.iter().take(if software { 4 } else { 5 });
+    for cells in sizes.filter(|c| c.iter().product::<usize>() <= options.max_cells) {
+        eprintln!("measuring {} cells", cells.iter().product::<usize>());
+        rows.push(measure(*cells, false, gpu.as_ref())?);
+    }
+    eprintln!("measuring the needle");
+    let needle = measure(SIZES[1], true, gpu.as_ref())?;
+    rows.push(needle.clone());
+    let info = Subject::new(SIZES[0], false, gpu.as_ref(), 1)?.engine.info().clone();
+    let mut goals = Vec::new();
+    let mut goal = |what: &str, measured: f64, unit: &str, sense: &str, bound: f64| {
+        goals.push(Goal {
+            what: what.into(),
+            measured,
+            unit: unit.into(),
+            sense: sense.into(),
+            bound,
+            met: if sense == "<=" { measured <= bound } else { measured >= bound },
+        });
+    };
+    // Work per cell: CPU time on a software adapter, wall time otherwise.
+    let cost = |r: &Row| match r.cpu_ns_per_cell_step {
+        Some(cpu) if software => cpu,
+        _ => r.wall_ns_per_cell_step,
+    };
+    let unit = if software { "cpu-ns" } else { "ns" };
+    let bare = rows.iter().find(|r| r.cells == needle.cells && !r.needle).cloned();
+    for row in rows.iter().filter(|r| !r.needle) {
+        if software && (row.cells == needle.cells || (90_000..110_000).contains(&row.cells)) {
+            let what = format!("tissue step, {} k cells, per cell-step", row.cells / 1000);
+            goal(&what, cost(row), unit, "<=", 120.0);
+        }
+    }
+    if let Some(bare) = &bare {
+        let extra = 100.0 * (cost(&needle) / cost(bare) - 1.0);
+        goal("needle, contact and tip law on top, 20 k cells", extra, "%", "<=", 25.0);
+        goal("device memory, optional effects off", bare.device_bytes_per_cell, "B/cell", "<=", 200.0);
+    }
+    if gpu.is_some() {
+        goal("recording per dispatch, 100 steps per frame", needle.record_us_per_dispatch, "us", "<=", 1.0);
+        let overhead = 100.0 * frame_overhead(gpu.as_ref())?;
+        goal("submission, measuring and read-back of a 16-step frame", overhead, "%", "<=", 5.0);
+    }
+    for (cold, bound) in [(true, 150.0), (false, 70.0)] {
+        let tries: Vec<(f64, f64)> = (0..ROUNDS).filter_map(|_| start(cold, options.engine)).collect();
+        let best = tries.iter().map(|t| t.0).fold(f64::INFINITY, f64::min);
+        if !tries.is_empty() {
+            let what = if cold { "start to first step, cold shader cache" } else { "start to first step, warm cache" };
+            goal(what, best, "ms", "<=", bound);
+            if !cold {
+                let peak = tries.iter().map(|t| t.1).fold(0.0, f64::max);
+                goal("host memory at 20 k cells", peak, "MB", "<=", 120.0);
+            }
+        }
+    }
+    goal("real-time factor, 20 k cells, S 1000, needle on", needle.real_time_factor, "x", ">=", 1.5);
+    let costs: Vec<f64> = rows.iter().filter(|r| !r.needle).map(cost).collect();
+    let (low, high) = (costs.iter().copied().fold(f64::INFINITY, f64::min), costs.iter().copied().fold(0.0, f64::max));
+    if software {
+        goal("growth: worst over best cost per cell-step", high / low, "x", "<=", 1.5);
+    } else {
+        if let Some(bare) = &bare {
+            goal("20 k cells, per step", bare.wall_us_per_step, "us", "<=", 10.0);
+        }
+        if let (Some(gpu), Some(row)) = (&gpu, rows.iter().find(|r| r.cells >= 1_000_000)) {
+            let rate = bytes_per_cell_step(4.0) / (row.wall_ns_per_cell_step * 1e-9);
+            goal("share of the copy bandwidth at 1 M cells", 100.0 * rate / copy_bandwidth(gpu)?, "%", ">=", 60.0);
+        }
+    }
+    Ok(Report { engine: info.engine, adapter: info.adapter, driver: info.driver, rows, goals })
+}
+
+impl Report {
+    /// As JSON.
+    pub fn json(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"))
+    }
+
+    /// As text for a terminal.
+    pub fn table(&self) -> String {
+        let mut out = format!("{} on {} ({})\n\n", self.engine, self.adapter, self.driver);
+        let _ = writeln!(
+            out,
+            "{:>8} {:>7} {:>13} {:>13} {:>9} {:>9} {:>8} {:>8}",
+            "cells", "needle", "cpu-ns/c-step", "wall-ns/c-st", "us/step", "dt us", "RTF", "B/cell"
+        );
+        for r in &self.rows {
+            let _ = writeln!(
+                out,
+                "{:>8} {:>7} {:>13} {:>13.1} {:>9.1} {:>9.1} {:>8.2} {:>8.0}",
+                r.cells,
+                if r.needle { "yes" } else { "no" },
+                r.cpu_ns_per_cell_step.map_or("-".into(), |v| format!("{v:.1}")),
+                r.wall_ns_per_cell_step,
+                r.wall_us_per_step,
+                r.dt_us,
+                r.real_time_factor,
+                r.device_bytes_per_cell
+            );
+        }
+        let _ = writeln!(out, "\n{:<56} {:>10} {:<7} {:>10}  met", "goal", "measured", "", "bound");
+        for g in &self.goals {
+            let _ = writeln!(
+                out,
+                "{:<56} {:>10.2} {:<7} {:>2} {:>7}  {}",
+                g.what,
+                g.measured,
+                g.unit,
+                g.sense,
+                g.bound,
+                if g.met { "yes" } else { "NO" }
+            );
+        }
+        out.trim_end().into()
+    }
+}

@@ -1,0 +1,249 @@
+//! `stylet run`: from a scene to a folder of results.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::observables::FrameRecord;
+use crate::output::{
+    CurveFigures, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables, folder, write_force_chart,
+};
+use crate::process;
+use crate::render;
+use crate::scene::Scene;
+use crate::solver::simulation::{EngineChoice, Simulation};
+
+/// What the command line adds to the scene.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    pub engine: EngineChoice,
+    /// Folder of the results; `None`: the next numbered one.
+    pub out: Option<PathBuf>,
+    /// Replace the results that a named folder holds.
+    pub force: bool,
+}
+
+/// What a run left behind.
+#[derive(Debug, Clone)]
+pub struct RunOutcome {
+    pub folder: PathBuf,
+    pub summary: Summary,
+}
+
+/// A moment at which the scene wants a picture or a field file.
+#[derive(Debug, Clone, Copy)]
+struct Moment {
+    frame: u64,
+    picture: Option<PictureMoment>,
+    field: bool,
+}
+
+/// Simulates the scene and writes everything that it asks for. `program_start` is when the process began,
+/// `interrupted` ends the run cleanly with what is there.
+///
+/// # Errors
+/// The input errors of [`Simulation::new`] and of the output folder come before anything is written. A run that fails
+/// half-way writes all results up to there, with the reason in `summary.json`, and returns the error.
+pub fn run(
+    scene: Scene,
+    options: &RunOptions,
+    program_start: Instant,
+    interrupted: &AtomicBool,
+) -> Result<RunOutcome> {
+    for notice in &scene.notices {
+        eprintln!("note: {notice}");
+    }
+    let mut simulation = Simulation::new(scene, options.engine)?;
+    let scene = simulation.model.scene.clone();
+    let output = OutputFolder::create(options.out.as_deref(), &scene.name, options.force)?;
+    let info = simulation.engine().info().clone();
+    eprintln!("{}: {} on {} ({})", scene.name, info.engine, info.adapter, info.driver);
+    for notice in &simulation.notices {
+        eprintln!("note: {notice}");
+    }
+    let moments = moments(&simulation);
+    for moment in &moments {
+        simulation.stop_after(moment.frame);
+    }
+    let mut tables = Tables::create(&output)?;
+    let mut fields = FieldFiles::new(&output);
+    let progress = Progress::new(simulation.duration());
+    let device = simulation.device().cloned();
+    let mut records: Vec<FrameRecord> = Vec::new();
+    let mut first_step_ms = None;
+    let begin = Instant::now();
+    let cpu_begin = process::cpu_seconds();
+    // Pictures and field files are no part of the step: their time is told apart.
+    let (mut drawing, mut drawing_cpu) = (0.0, 0.0);
+    let mut status = Status::Ok;
+    let mut failure = None;
+    loop {
+        if interrupted.load(Ordering::Relaxed) {
+            status = Status::Interrupted;
+            break;
+        }
+        let record = match simulation.next_frame() {
+            Ok(Some(record)) => record,
+            Ok(None) => break,
+            Err(error) => {
+                status = Status::Failed(error.to_string());
+                failure = Some(error);
+                break;
+            }
+        };
+        first_step_ms.get_or_insert_with(|| program_start.elapsed().as_secs_f64() * 1e3);
+        tables.append(&record)?;
+        let wall = begin.elapsed().as_secs_f64() - drawing;
+        progress.update(&record, record.time / wall.max(1e-9));
+        for moment in moments.iter().filter(|m| m.frame == record.frame) {
+            let (wall, cpu) = (Instant::now(), process::cpu_seconds());
+            write_moment(&mut simulation, &record, moment, &output, &mut fields, device.as_ref())?;
+            drawing += wall.elapsed().as_secs_f64();
+            drawing_cpu += difference(process::cpu_seconds(), cpu).unwrap_or(0.0);
+        }
+        records.push(record);
+    }
+    let wall = begin.elapsed().as_secs_f64() - drawing;
+    let cpu = difference(process::cpu_seconds(), cpu_begin).map(|c| c - drawing_cpu);
+    progress.finish();
+
+    let mesh = &simulation.model.mesh;
+    let steps = records.last().map_or(0, |r| r.step);
+    let simulated = records.last().map_or(0.0, |r| r.time);
+    let cell_steps = (mesh.cell_count() as u64 * steps) as f64;
+    let mut summary = Summary {
+        status,
+        scene: scene.name.clone(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        engine: info.engine,
+        adapter: info.adapter,
+        driver: info.driver,
+        effects: scene.effects.keys().iter().map(|k| k.to_string()).collect(),
+        cells: mesh.cell_count() as u64,
+        nodes: mesh.node_count() as u64,
+        dt_s: simulation.dt,
+        stable_dt_s: simulation.stable.limit(),
+        mass_scaling: simulation.model.mass_scaling(),
+        steps,
+        simulated_s: simulated,
+        wall_s: wall,
+        real_time_factor: simulated / wall.max(1e-9),
+        cell_steps_per_s: cell_steps / wall.max(1e-9),
+        cpu_ns_per_cell_step: cpu.filter(|_| steps > 0).map(|c| c * 1e9 / cell_steps),
+        first_step_ms,
+        host_peak_bytes: process::peak_bytes(),
+        device_bytes: Some(info.device_bytes),
+        ..Default::default()
+    };
+    summary.take_frames(&records);
+    if !records.is_empty() {
+        let figures = CurveFigures::from_records(&records);
+        write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, &records, &figures)?;
+    }
+    summary.write(&output.file(folder::SUMMARY))?;
+    match failure {
+        Some(error) => {
+            eprintln!("results up to the failure are in {}", output.path().display());
+            Err(error)
+        }
+        None => Ok(RunOutcome { folder: output.path().to_path_buf(), summary }),
+    }
+}
+
+fn difference(after: Option<f64>, before: Option<f64>) -> Option<f64> {
+    Some(after? - before?)
+}
+
+/// The frames at which pictures and field files are due.
+fn moments(simulation: &Simulation) -> Vec<Moment> {
+    let outputs = &simulation.model.scene.outputs;
+    let frame_of = |value: f64| match &simulation.model.kinematics {
+        // A depth counts on the way in: the first time that the tool gets there.
+        Some(k) => k.time_of_depth(value).map(|t| simulation.frame_at(t)),
+        None => (value <= simulation.duration() + simulation.dt).then(|| simulation.frame_at(value)),
+    };
+    let has_tool = simulation.model.kinematics.is_some();
+    let name = |v: f64| if has_tool { PictureMoment::Depth(v) } else { PictureMoment::Time(v) };
+    let pictures = outputs.pictures_at.iter().filter_map(|v| {
+        Some(Moment { frame: frame_of(*v)?, picture: Some(name(*v)), field: false })
+    });
+    let fields = outputs
+        .fields_at
+        .iter()
+        .filter_map(|v| Some(Moment { frame: frame_of(*v)?, picture: None, field: true }));
+    pictures.chain(fields).collect()
+}
+
+fn write_moment(
+    simulation: &mut Simulation,
+    record: &FrameRecord,
+    moment: &Moment,
+    output: &OutputFolder,
+    fields: &mut FieldFiles,
+    device: Option<&Gpu>,
+) -> Result<()> {
+    let snapshot = simulation.snapshot(record)?;
+    let model = &simulation.model;
+    if moment.field {
+        fields.write(&model.mesh, &snapshot)?;
+    }
+    if let Some(at) = moment.picture {
+        let device = device.map(|g| (&g.device, &g.queue));
+        let image = render::draw(&model.scene, &model.mesh, &snapshot, device)?;
+        image.write_png(&output.picture(at))?;
+    }
+    Ok(())
+}
+
+/// Short report for the terminal: what the run found.
+pub fn describe(summary: &Summary) -> String {
+    let newton = |v: Option<f64>| v.map_or("-".into(), |v| format!("{v:.3} N"));
+    let mm = |v: Option<f64>| v.map_or("-".into(), |v| format!("{:.2} mm", v * 1e3));
+    let mut text = format!(
+        "{} cells, {} steps of {:.1} us (mass scaling {}), {:.2} s simulated in {:.2} s: real-time factor {:.2}\n",
+        summary.cells,
+        summary.steps,
+        summary.dt_s * 1e6,
+        summary.mass_scaling,
+        summary.simulated_s,
+        summary.wall_s,
+        summary.real_time_factor
+    );
+    if summary.peak_force_n.is_some() {
+        text += &format!(
+            "force: puncture {} at {}, then {}; {} at {}; largest {}\n",
+            newton(summary.puncture_force_n),
+            mm(summary.puncture_depth_m),
+            newton(summary.force_after_puncture_n),
+            newton(summary.force_at_max_depth_n),
+            mm(summary.max_depth_m),
+            newton(summary.peak_force_n),
+        );
+    }
+    text += &format!(
+        "energy: imbalance {:.2} % of the external work, kinetic/internal {:.3} %, hourglass/internal {:.1} % (largest \
+         {:.1} %); {} clamped nodes, {} inverted cells",
+        100.0 * summary.energy_imbalance,
+        100.0 * summary.kinetic_to_internal,
+        100.0 * summary.hourglass_to_internal,
+        100.0 * summary.hourglass_to_internal_max,
+        summary.clamped_nodes,
+        summary.inverted_cells
+    );
+    text
+}
+
+/// Exit code of an interrupted run, as shells have it for Ctrl-C.
+pub const EXIT_INTERRUPTED: u8 = 130;
+
+/// Exit code of a finished run.
+pub fn exit_code(outcome: &Result<RunOutcome>) -> u8 {
+    match outcome {
+        Ok(o) if o.summary.status == Status::Interrupted => EXIT_INTERRUPTED,
+        Ok(_) => 0,
+        Err(Error::Diverged { .. }) => 3,
+        Err(error) => error.exit_code(),
+    }
+}

@@ -1,0 +1,28 @@
+//! What the operating system tells about this process; `None` where it does not.
+
+/// Processor time of all threads since the start [s]; resolution 10 ms.
+pub fn cpu_seconds() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The second field is the program name in parentheses and may hold spaces.
+    let mut fields = text.rsplit_once(')')?.1.split_whitespace().skip(11);
+    let user: f64 = fields.next()?.parse().ok()?;
+    let system: f64 = fields.next()?.parse().ok()?;
+    // Linux counts in USER_HZ, which is 100 on every platform that Rust supports.
+    Some((user + system) / 100.0)
+}
+
+/// Largest resident memory so far [bytes].
+pub fn peak_bytes() -> Option<u64> {
+    status_kilobytes("/proc/self/status", "VmHWM:")
+}
+
+/// Memory that new allocations can take [bytes].
+pub fn available_bytes() -> Option<u64> {
+    status_kilobytes("/proc/meminfo", "MemAvailable:")
+}
+
+fn status_kilobytes(file: &str, key: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let line = text.lines().find_map(|l| l.strip_prefix(key))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kb| kb * 1024)
+}
