@@ -1,8 +1,8 @@
 //! The structured, graded hexahedral block.
 
-use glam::DVec3;
+pub mod block;
 
-use crate::scene::{Motion, Tissue};
+use glam::DVec3;
 
 /// A rectilinear block of hexahedral cells: three lists of grid lines.
 ///
