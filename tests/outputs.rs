@@ -151,7 +151,6 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
             safety: 0.8,
             time_step: None,
             mass_damping: 10.0,
-            bulk_viscosity: 0.06,
             hourglass_stiffness: 0.1,
             hourglass_quartic: 0.0,
             frame_rate: 30.0,

@@ -3,12 +3,18 @@
 //! `file` holds the TOML form (units in the key names), `presets` the material and needle library;
 //! [`Scene::load`] reads, checks and converts. Nothing after this module knows about millimetres.
 
-use std::path::PathBuf;
+mod convert;
+mod document;
+pub mod file;
+pub mod presets;
+
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
 use crate::effects::EffectSet;
 use crate::material::MooneyRivlin;
+use crate::{Error, Result};
 
 /// One simulation: what is there, what moves, what is simulated and what is written.
 #[derive(Debug, Clone)]
@@ -31,6 +37,19 @@ pub struct Scene {
     pub outputs: Outputs,
     /// Things that the user should know and that are no errors, one sentence each.
     pub notices: Vec<String>,
+}
+
+impl Scene {
+    /// Reads, checks and converts a scene file. `overrides` are `key=value` texts (`motion.phase.0.speed_mm_s=5`) that
+    /// replace values of the file. Every error is an [`Error::Scene`] with file, line, excerpt and way out.
+    pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
+        convert::load(path, overrides).map_err(Error::Scene)
+    }
+
+    /// JSON schema of the scene file, for editors and for the `schema` command.
+    pub fn schema() -> serde_json::Value {
+        schemars::schema_for!(file::SceneFile).to_value()
+    }
 }
 
 /// The tissue block: `-size.x/2..size.x/2`, `-size.y/2..size.y/2`, `-size.z..0` [m]; the top face is z = 0.
@@ -131,9 +150,14 @@ pub struct FaceDrive {
 pub enum Tool {
     Needle(NeedleShape),
     /// Sphere of the given radius [m].
-    Sphere { radius: f64 },
+    Sphere {
+        radius: f64,
+    },
     /// Flat cylindrical punch of the given radius [m]; `bonded` sticks to the tissue where it touches first.
-    FlatPunch { radius: f64, bonded: bool },
+    FlatPunch {
+        radius: f64,
+        bonded: bool,
+    },
 }
 
 /// A rigid solid needle: a cylinder with a conical tip.
@@ -157,6 +181,45 @@ pub struct Motion {
     /// Unit vector of the insertion, into the tissue (z < 0).
     pub direction: DVec3,
     pub phases: Vec<Phase>,
+}
+
+impl Motion {
+    /// Largest depth of all phases along the direction [m].
+    pub fn deepest(&self) -> f64 {
+        self.phases.iter().fold(0.0, |deepest, phase| match *phase {
+            Phase::Insert { depth, .. } => depth.max(deepest),
+            _ => deepest,
+        })
+    }
+
+    /// Where the tip is at the largest depth [m].
+    pub fn deepest_point(&self) -> DVec3 {
+        self.entry + self.direction * self.deepest()
+    }
+
+    /// Largest speed of all phases [m/s].
+    pub fn largest_speed(&self) -> f64 {
+        self.phases.iter().fold(0.0, |largest, phase| match *phase {
+            Phase::Insert { speed, .. } | Phase::Withdraw { speed, .. } => speed.max(largest),
+            Phase::Hold { .. } => largest,
+        })
+    }
+
+    /// Time that all phases take [s].
+    pub fn duration(&self) -> f64 {
+        let mut at = 0.0;
+        let mut time = 0.0;
+        for phase in &self.phases {
+            match *phase {
+                Phase::Insert { speed, depth } | Phase::Withdraw { speed, depth } => {
+                    time += (depth - at).abs() / speed;
+                    at = depth;
+                }
+                Phase::Hold { duration } => time += duration,
+            }
+        }
+        time
+    }
 }
 
 /// One phase of the motion. Depth is measured along the direction from the entry point [m].

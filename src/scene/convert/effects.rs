@@ -1,0 +1,291 @@
+//! The effects of a scene: which are on, what they need, their parameters.
+
+use super::super::file::*;
+use super::super::{FaceCondition, Motion, TissueMaterial, Tool};
+use super::{Check, MM, Within};
+use crate::effects::{self, EFFECTS, EffectSet};
+
+impl Check<'_> {
+    pub(super) fn effects(
+        &mut self,
+        file: &SceneFile,
+        tool: &Option<Tool>,
+        motion: &Motion,
+        faces: &[FaceCondition; 6],
+        material: &TissueMaterial,
+    ) -> EffectSet {
+        let keys: Vec<&str> = EFFECTS.iter().map(|effect| effect.key).collect();
+        for (index, key) in file.effects.iter().enumerate() {
+            if !keys.contains(&key.as_str()) {
+                self.unknown_name(&format!("effects.{index}"), "effect", key, &keys);
+            } else if file.effects[..index].contains(key) {
+                self.notices
+                    .push(format!("Effect `{key}` is listed twice."));
+            }
+        }
+        let listed = |key: &str| file.effects.iter().any(|listed| listed == key);
+        let place = |key: &str| {
+            let index = file
+                .effects
+                .iter()
+                .position(|listed| listed == key)
+                .unwrap_or(0);
+            format!("effects.{index}")
+        };
+        let is_needle = matches!(tool, Some(Tool::Needle(_)));
+        let is_indenter = tool.is_some() && !is_needle;
+        if listed("puncture") && !is_needle {
+            self.problems.report(
+                &place("puncture"),
+                "effect `puncture` needs a needle",
+                "no [needle] in this scene",
+                "add [needle] with gauge = \"16G\" and tip_half_angle_deg = 18, or remove the effect",
+            );
+        }
+        if listed("indentation") && !is_indenter {
+            self.problems.report(
+                &place("indentation"),
+                "effect `indentation` needs a sphere or a flat punch",
+                "no [sphere] or [flat_punch] in this scene",
+                "add [sphere] with radius_mm = 5, or remove the effect",
+            );
+        }
+        if listed("friction") && tool.is_none() {
+            self.problems.report(
+                &place("friction"),
+                "effect `friction` needs a tool",
+                "nothing to rub on",
+                "add [needle], [sphere] or [flat_punch], or remove the effect",
+            );
+        }
+        if is_needle && !listed("puncture") {
+            self.notices.push(
+                "The needle has no effect on the tissue: effect `puncture` is not listed.".into(),
+            );
+        }
+        if is_indenter && !listed("indentation") {
+            self.notices.push(
+                "The tool has no effect on the tissue: effect `indentation` is not listed.".into(),
+            );
+        }
+        for (key, present) in [
+            ("puncture", file.puncture.is_some()),
+            ("friction", file.friction.is_some()),
+            ("indentation", file.indentation.is_some()),
+            ("gravity", file.gravity.is_some()),
+        ] {
+            if present && !listed(key) {
+                self.notices.push(format!(
+                    "Table [{key}] has no effect: `{key}` is not in the list `effects`."
+                ));
+            }
+        }
+        if file.solver.mass_scaling.is_some() && !listed("mass_scaling") {
+            self.notices.push(
+                "`solver.mass_scaling` has no effect: `mass_scaling` is not in the list `effects`."
+                    .into(),
+            );
+        }
+        let puncture = self.puncture(&file.puncture.clone().unwrap_or_default());
+        let friction = self.friction(&file.friction.clone().unwrap_or_default());
+        let indentation = self.indentation(&file.indentation.clone().unwrap_or_default());
+        let acceleration = file
+            .gravity
+            .as_ref()
+            .and_then(|table| table.acceleration_m_s2);
+        let gravity = effects::gravity::Params {
+            acceleration: self.vector(
+                "gravity.acceleration_m_s2",
+                acceleration.unwrap_or([0.0, 0.0, -9.81]),
+                1000.0,
+            ),
+        };
+        let factor = match file.solver.mass_scaling {
+            Some(MassScalingEntry::Factor(factor)) => {
+                self.number("solver.mass_scaling", factor, Within::Between(1.0, 1e8))
+            }
+            _ if listed("mass_scaling") => self.automatic_mass_scaling(motion, faces, material),
+            _ => 1.0,
+        };
+        EffectSet {
+            mass_scaling: listed("mass_scaling")
+                .then_some(effects::mass_scaling::Params { factor }),
+            gravity: listed("gravity").then_some(gravity),
+            puncture: listed("puncture").then_some(puncture),
+            indentation: listed("indentation").then_some(indentation),
+            friction: listed("friction").then_some(friction),
+        }
+    }
+
+    /// The factor of `mass_scaling = "auto"`, from the largest speed of tool and faces.
+    fn automatic_mass_scaling(
+        &mut self,
+        motion: &Motion,
+        faces: &[FaceCondition; 6],
+        material: &TissueMaterial,
+    ) -> f64 {
+        let driven = faces
+            .iter()
+            .filter_map(|face| face.drive)
+            .map(|drive| drive.displacement.length() / drive.duration);
+        let speed = driven.fold(motion.largest_speed(), f64::max);
+        let shear_modulus = material.law.shear_modulus();
+        if !(speed > 0.0 && shear_modulus > 0.0) {
+            self.notices.push(
+                "solver.mass_scaling \"auto\" is 1: nothing in the scene moves at a known speed."
+                    .into(),
+            );
+            return 1.0;
+        }
+        effects::mass_scaling::auto_factor(speed, (shear_modulus / material.density).sqrt())
+    }
+
+    fn puncture(&mut self, t: &PunctureTable) -> effects::puncture::Params {
+        use Within::{Between, NotNegative, Positive};
+        let d = effects::puncture::Params::default();
+        let at = |key: &str| format!("puncture.{key}");
+        let params = effects::puncture::Params {
+            puncture_force: self.optional(
+                &at("puncture_force_n"),
+                t.puncture_force_n,
+                1.0,
+                d.puncture_force,
+                Positive(100.0),
+            ),
+            cutting_force: self.optional(
+                &at("cutting_force_n"),
+                t.cutting_force_n,
+                1.0,
+                d.cutting_force,
+                Positive(100.0),
+            ),
+            transition_length: self.optional(
+                &at("transition_length_mm"),
+                t.transition_length_mm,
+                MM,
+                d.transition_length,
+                Positive(100.0),
+            ),
+            tip_stiffness: self.optional(
+                &at("tip_stiffness_n_mm"),
+                t.tip_stiffness_n_mm,
+                1e3,
+                d.tip_stiffness,
+                Positive(1e4),
+            ),
+            softened_radius: self.optional(
+                &at("softened_radius_mm"),
+                t.softened_radius_mm,
+                MM,
+                d.softened_radius,
+                Positive(100.0),
+            ),
+            residual_stiffness: self.optional(
+                &at("residual_stiffness"),
+                t.residual_stiffness,
+                1.0,
+                d.residual_stiffness,
+                Between(1e-4, 1.0),
+            ),
+            ring_radius: self.optional(
+                &at("ring_radius_mm"),
+                t.ring_radius_mm,
+                MM,
+                d.ring_radius,
+                Positive(100.0),
+            ),
+            contact_stiffness_factor: self.optional(
+                &at("contact_stiffness_factor"),
+                t.contact_stiffness_factor,
+                1.0,
+                d.contact_stiffness_factor,
+                Positive(100.0),
+            ),
+            contact_damping: self.optional(
+                &at("contact_damping"),
+                t.contact_damping,
+                1.0,
+                d.contact_damping,
+                NotNegative(1.0),
+            ),
+            entry_fade: self.optional(
+                &at("entry_fade_mm"),
+                t.entry_fade_mm,
+                MM,
+                d.entry_fade,
+                Positive(100.0),
+            ),
+        };
+        if params.softened_radius >= params.ring_radius {
+            let key = if t.softened_radius_mm.is_some() {
+                "softened_radius_mm"
+            } else {
+                "ring_radius_mm"
+            };
+            self.problems.report(
+                &at(key),
+                format!(
+                    "the softened path ({} mm) reaches the ring of pushed nodes ({} mm)",
+                    params.softened_radius / MM,
+                    params.ring_radius / MM
+                ),
+                "softened_radius_mm must be smaller than ring_radius_mm",
+                "write e.g. softened_radius_mm = 0.6 and ring_radius_mm = 2.0",
+            );
+        }
+        if params.cutting_force > params.puncture_force {
+            self.notices.push(format!(
+                "The cutting force {} N is larger than the puncture force {} N: the force will not drop at the puncture.",
+                params.cutting_force, params.puncture_force
+            ));
+        }
+        params
+    }
+
+    fn friction(&mut self, table: &FrictionTable) -> effects::friction::Params {
+        let default = effects::friction::Params::default();
+        effects::friction::Params {
+            coefficient: self.optional(
+                "friction.coefficient",
+                table.coefficient,
+                1.0,
+                default.coefficient,
+                Within::NotNegative(2.0),
+            ),
+            stiffness_ratio: self.optional(
+                "friction.stiffness_ratio",
+                table.stiffness_ratio,
+                1.0,
+                default.stiffness_ratio,
+                Within::Positive(1.0),
+            ),
+            fade_length: self.optional(
+                "friction.fade_length_mm",
+                table.fade_length_mm,
+                MM,
+                default.fade_length,
+                Within::NotNegative(100.0),
+            ),
+        }
+    }
+
+    fn indentation(&mut self, table: &IndentationTable) -> effects::indentation::Params {
+        let default = effects::indentation::Params::default();
+        effects::indentation::Params {
+            stiffness_factor: self.optional(
+                "indentation.contact_stiffness_factor",
+                table.contact_stiffness_factor,
+                1.0,
+                default.stiffness_factor,
+                Within::Positive(100.0),
+            ),
+            contact_damping: self.optional(
+                "indentation.contact_damping",
+                table.contact_damping,
+                1.0,
+                default.contact_damping,
+                Within::NotNegative(1.0),
+            ),
+        }
+    }
+}

@@ -1,0 +1,676 @@
+//! From the TOML form to the scene in SI: ranges, relations between keys, geometry, stability, memory.
+//!
+//! A check reports and goes on, so that one call shows all problems; the geometry is looked at only when every single
+//! number is in range.
+
+mod effects;
+mod material;
+mod tool;
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::document::{Document, Problems, closest};
+use super::file::*;
+use super::*;
+use crate::material::four_digits;
+use crate::mesh::BlockMesh;
+
+const MM: f64 = 1e-3;
+const KPA: f64 = 1e3;
+
+/// Distance that the path keeps from the sides and the bottom of the block [m].
+const PATH_MARGIN: f64 = 1.0e-3;
+/// Memory per cell and node, an upper estimate over all effects [B].
+const BYTES_PER_CELL: f64 = 220.0;
+const BYTES_PER_NODE: f64 = 60.0;
+/// Largest array per cell, and the largest storage binding that every device offers [B].
+const BINDING_BYTES_PER_CELL: f64 = 160.0;
+const LARGEST_BINDING: f64 = 128.0 * 1024.0 * 1024.0;
+
+/// Reads, checks and converts; the error is the rendered text of all problems of the first stage that finds any:
+/// document, keys, numbers, geometry, memory.
+pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, String> {
+    let source = std::fs::read_to_string(path).map_err(|error| unreadable(path, &error))?;
+    let document = Document::parse(path, &source, overrides)?;
+    let mut problems = Problems::new(&document);
+    for place in document.non_finite_numbers() {
+        problems.report(
+            &place,
+            format!("`{place}` is not a finite number"),
+            "NaN, infinite or too large",
+            "write a finite number",
+        );
+    }
+    problems.check()?;
+    let file: SceneFile = document.deserialize()?;
+    let mut check = Check {
+        problems,
+        notices: Vec::new(),
+    };
+    check.scene(path, &file)
+}
+
+/// The text for a file that cannot be read.
+fn unreadable(path: &Path, error: &std::io::Error) -> String {
+    let name = path.display();
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let mut scenes: Vec<String> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| name.ends_with(".toml"))
+        .collect();
+    scenes.sort();
+    let stem = path
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let way_out = match closest(&stem, scenes.iter().map(String::as_str)) {
+        Some(near) => format!("did you mean {}?", folder.join(near).display()),
+        None if scenes.is_empty() => {
+            "give the path of a scene file (.toml); the program's own lie in scenes/".into()
+        }
+        None => format!("scenes in {}: {}", folder.display(), scenes.join(", ")),
+    };
+    format!("error: cannot read the scene file {name}: {error}\n  = way out: {way_out}\n")
+}
+
+/// Range of a number, in the unit of its key.
+#[derive(Clone, Copy)]
+enum Within {
+    /// 0 < x <= limit.
+    Positive(f64),
+    /// 0 <= x <= limit.
+    NotNegative(f64),
+    /// low <= x <= high.
+    Between(f64, f64),
+}
+
+/// The running check: problems stop the load, notices travel with the scene.
+struct Check<'a> {
+    problems: Problems<'a>,
+    notices: Vec<String>,
+}
+
+type Checked<T> = std::result::Result<T, String>;
+
+impl Check<'_> {
+    fn scene(&mut self, path: &Path, file: &SceneFile) -> Checked<Scene> {
+        let name = path
+            .file_stem()
+            .map(|s| s.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        let tissue = self.tissue(&file.tissue);
+        let material = self.material(&file.material, tissue.cell_size);
+        let faces = self.faces(&file.boundaries);
+        let tool = self.tool(file);
+        let motion = self.motion(file, tool.is_some());
+        let solver = self.solver(&file.solver, tool.is_some());
+        let outputs = self.outputs(&file.outputs, &motion, tool.is_some(), solver.duration);
+        let effects = self.effects(file, &tool, &motion, &faces, &material);
+        self.problems.check()?;
+        self.geometry(&tissue, tool.as_ref(), &motion);
+        self.problems.check()?;
+        self.memory(&tissue, tool.as_ref(), &motion);
+        self.problems.check()?;
+        if tool.is_some() && faces.iter().all(|face| face.fixed == [false; 3]) {
+            self.notices
+                .push("No face of the block is fixed, so the tool pushes it away; set e.g. boundaries.z_min = \"fixed\".".into());
+        }
+        Ok(Scene {
+            title: file.title.clone().unwrap_or_else(|| name.replace('_', " ")),
+            name,
+            path: path.to_path_buf(),
+            tissue,
+            material,
+            faces,
+            tool,
+            motion,
+            effects,
+            solver,
+            outputs,
+            notices: std::mem::take(&mut self.notices),
+        })
+    }
+
+    /// Reports a number outside its range and returns it unchanged.
+    fn number(&mut self, path: &str, value: f64, within: Within) -> f64 {
+        let (good, range) = match within {
+            Within::Positive(limit) => (
+                value > 0.0 && value <= limit,
+                format!("greater than 0 and at most {limit}"),
+            ),
+            Within::NotNegative(limit) => {
+                (value >= 0.0 && value <= limit, format!("from 0 to {limit}"))
+            }
+            Within::Between(low, high) => (
+                value >= low && value <= high,
+                format!("from {low} to {high}"),
+            ),
+        };
+        if !good {
+            self.problems.report(
+                path,
+                format!("`{path}` is {value}"),
+                format!("must be {range}"),
+                format!("write a number {range}; the unit is the end of the key"),
+            );
+        }
+        value
+    }
+
+    /// An optional number in SI: `value * unit` where it is written, else `default` (already SI).
+    fn optional(
+        &mut self,
+        path: &str,
+        value: Option<f64>,
+        unit: f64,
+        default: f64,
+        within: Within,
+    ) -> f64 {
+        value.map_or(default, |value| self.number(path, value, within) * unit)
+    }
+
+    /// A vector of which every component lies within +-limit.
+    fn vector(&mut self, path: &str, value: [f64; 3], limit: f64) -> DVec3 {
+        for (index, component) in value.iter().enumerate() {
+            self.number(
+                &format!("{path}.{index}"),
+                *component,
+                Within::Between(-limit, limit),
+            );
+        }
+        DVec3::from(value)
+    }
+
+    fn tissue(&mut self, table: &TissueTable) -> Tissue {
+        for (index, size) in table.size_mm.iter().enumerate() {
+            self.number(
+                &format!("tissue.size_mm.{index}"),
+                *size,
+                Within::Positive(1000.0),
+            );
+        }
+        let smallest = table.size_mm.iter().cloned().fold(f64::INFINITY, f64::min);
+        let cell = self.number(
+            "tissue.cell_size_mm",
+            table.cell_size_mm,
+            Within::Between(1e-3, 100.0),
+        );
+        if cell > 0.5 * smallest && smallest > 0.0 {
+            self.problems.report(
+                "tissue.cell_size_mm",
+                format!("a cell of {cell} mm is more than half of the smallest edge of the block ({smallest} mm)"),
+                "too coarse",
+                format!("write at most {}", 0.5 * smallest),
+            );
+        }
+        let offset = table.axis_offset_cells.unwrap_or([0.23, 0.31]);
+        for (index, value) in offset.iter().enumerate() {
+            self.number(
+                &format!("tissue.axis_offset_cells.{index}"),
+                *value,
+                Within::Between(0.0, 1.0),
+            );
+        }
+        Tissue {
+            size: DVec3::from(table.size_mm) * MM,
+            cell_size: cell * MM,
+            fine_radius: self.optional(
+                "tissue.fine_radius_mm",
+                table.fine_radius_mm,
+                MM,
+                2.5 * MM,
+                Within::Positive(1000.0),
+            ),
+            growth: self.optional(
+                "tissue.growth",
+                table.growth,
+                1.0,
+                1.25,
+                Within::Between(1.0, 2.0),
+            ),
+            axis_offset_cells: offset,
+        }
+    }
+
+    fn unknown_name(&mut self, path: &str, what: &str, name: &str, names: &[&str]) {
+        let list = names.join(", ");
+        let way_out = match closest(name, names.iter().copied()) {
+            Some(near) => format!("did you mean \"{near}\"? There are: {list}"),
+            None => format!("use one of: {list}"),
+        };
+        self.problems.report(
+            path,
+            format!("there is no {what} called \"{name}\""),
+            "unknown name",
+            way_out,
+        );
+    }
+
+    fn faces(&mut self, table: &BoundariesTable) -> [FaceCondition; 6] {
+        let entries = [
+            &table.x_min,
+            &table.x_max,
+            &table.y_min,
+            &table.y_max,
+            &table.z_min,
+            &table.z_max,
+        ];
+        Face::ALL.map(|face| {
+            let default = if face == Face::ZMax {
+                FaceKind::Free
+            } else {
+                FaceKind::Fixed
+            };
+            match entries[face as usize] {
+                None => face_of_kind(face, default),
+                Some(FaceEntry::Kind(kind)) => face_of_kind(face, *kind),
+                Some(FaceEntry::Table(table)) => self.face(face, table),
+            }
+        })
+    }
+
+    fn face(&mut self, face: Face, table: &FaceTable) -> FaceCondition {
+        let at = |key: &str| format!("boundaries.{}.{key}", face.key());
+        let mut condition = FaceCondition::default();
+        for axis in &table.fixed {
+            condition.fixed[*axis as usize] = true;
+        }
+        let displacement = table
+            .displacement_mm
+            .map(|value| self.vector(&at("displacement_mm"), value, 1000.0) * MM);
+        let rotation = table.rotation_deg.map(|value| {
+            self.number(&at("rotation_deg"), value, Within::Between(-3600.0, 3600.0))
+                .to_radians()
+        });
+        if displacement.is_some() || rotation.is_some() {
+            let key = at(if displacement.is_some() {
+                "displacement_mm"
+            } else {
+                "rotation_deg"
+            });
+            match table.duration_s {
+                None => self.problems.report(
+                    &key,
+                    format!("the motion of face {} has no duration", face.key()),
+                    "no duration_s beside it",
+                    "add duration_s, the time over which the motion grows, e.g. duration_s = 0.5",
+                ),
+                Some(duration) => {
+                    self.number(&at("duration_s"), duration, Within::Positive(3600.0));
+                    condition.drive = Some(FaceDrive {
+                        displacement: displacement.unwrap_or_default(),
+                        rotation: rotation.unwrap_or(0.0),
+                        duration,
+                    });
+                }
+            }
+        } else if table.duration_s.is_some() {
+            self.notices.push(format!(
+                "`{}` has no effect without displacement_mm or rotation_deg.",
+                at("duration_s")
+            ));
+        }
+        let names = ["x", "y", "z"];
+        for axis in 0..3 {
+            if displacement.is_some_and(|d| d[axis] != 0.0) && !condition.fixed[axis] {
+                self.problems.report(
+                    &at("displacement_mm"),
+                    format!(
+                        "face {} moves along {} but is not fixed along it",
+                        face.key(),
+                        names[axis]
+                    ),
+                    "a free component cannot be prescribed",
+                    format!(
+                        "add \"{}\" to `fixed`, or write 0 for this component",
+                        names[axis]
+                    ),
+                );
+            }
+            if rotation.is_some_and(|r| r != 0.0) && axis != face.axis() && !condition.fixed[axis] {
+                self.problems.report(
+                    &at("rotation_deg"),
+                    format!(
+                        "face {} turns but is not fixed along {}",
+                        face.key(),
+                        names[axis]
+                    ),
+                    "both tangential components must be fixed",
+                    format!("add \"{}\" to `fixed`", names[axis]),
+                );
+            }
+            if table.traction_kpa.is_some_and(|t| t[axis] != 0.0) && condition.fixed[axis] {
+                self.problems.report(
+                    &at("traction_kpa"),
+                    format!(
+                        "face {} is loaded along {} and fixed along it",
+                        face.key(),
+                        names[axis]
+                    ),
+                    "a fixed component carries no load",
+                    format!(
+                        "remove \"{}\" from `fixed`, or write 0 for this component",
+                        names[axis]
+                    ),
+                );
+            }
+        }
+        condition.traction = table
+            .traction_kpa
+            .map(|value| self.vector(&at("traction_kpa"), value, 1e4) * KPA);
+        condition.traction_ramp = self.optional(
+            &at("traction_ramp_s"),
+            table.traction_ramp_s,
+            1.0,
+            0.0,
+            Within::NotNegative(3600.0),
+        );
+        condition
+    }
+
+    fn solver(&mut self, table: &SolverTable, has_tool: bool) -> SolverSettings {
+        let duration = table
+            .duration_s
+            .map(|value| self.number("solver.duration_s", value, Within::Positive(3600.0)));
+        if has_tool && duration.is_some() {
+            self.notices
+                .push("`solver.duration_s` has no effect: with a tool the phases decide how long the run is.".into());
+        }
+        if !has_tool && duration.is_none() {
+            self.problems.report(
+                "solver",
+                "a scene without a tool needs the length of the run",
+                "no solver.duration_s",
+                "add duration_s = 1.0 under [solver], or add a tool",
+            );
+        }
+        SolverSettings {
+            safety: self.optional(
+                "solver.safety",
+                table.safety,
+                1.0,
+                0.8,
+                Within::Positive(1.0),
+            ),
+            time_step: table.time_step_us.map(|value| {
+                self.number("solver.time_step_us", value, Within::Positive(1e5)) * 1e-6
+            }),
+            mass_damping: self.optional(
+                "solver.mass_damping_per_s",
+                table.mass_damping_per_s,
+                1.0,
+                10.0,
+                Within::NotNegative(1e5),
+            ),
+            hourglass_stiffness: self.optional(
+                "solver.hourglass_stiffness",
+                table.hourglass_stiffness,
+                1.0,
+                0.1,
+                Within::NotNegative(10.0),
+            ),
+            hourglass_quartic: self.optional(
+                "solver.hourglass_quartic",
+                table.hourglass_quartic,
+                1.0,
+                15_000.0,
+                Within::NotNegative(1e6),
+            ),
+            frame_rate: self.optional(
+                "solver.frame_rate_hz",
+                table.frame_rate_hz,
+                1.0,
+                60.0,
+                Within::Between(0.1, 1e5),
+            ),
+            duration: if has_tool { None } else { duration },
+        }
+    }
+
+    fn outputs(
+        &mut self,
+        table: &OutputsTable,
+        motion: &Motion,
+        has_tool: bool,
+        duration: Option<f64>,
+    ) -> Outputs {
+        let lists = [
+            ("pictures_at_depth_mm", &table.pictures_at_depth_mm, true),
+            ("fields_at_depth_mm", &table.fields_at_depth_mm, true),
+            ("pictures_at_s", &table.pictures_at_s, false),
+            ("fields_at_s", &table.fields_at_s, false),
+        ];
+        let mut values = [Vec::new(), Vec::new()];
+        for (slot, (key, list, by_depth)) in lists.into_iter().enumerate() {
+            let Some(list) = list else { continue };
+            let path = format!("outputs.{key}");
+            if by_depth != has_tool {
+                let (has, other) = if has_tool {
+                    ("a tool", "depth_mm")
+                } else {
+                    ("no tool", "s")
+                };
+                let stem = key.trim_end_matches("_depth_mm").trim_end_matches("_s");
+                self.problems.report(
+                    &path,
+                    format!("the scene has {has}, so `{key}` means nothing"),
+                    "wrong list for this scene",
+                    format!("write {stem}_{other} instead"),
+                );
+                continue;
+            }
+            let (unit, reach) = if by_depth {
+                (MM, motion.deepest())
+            } else {
+                (1.0, duration.unwrap_or(f64::INFINITY))
+            };
+            for (index, value) in list.iter().enumerate() {
+                let value = self.number(
+                    &format!("{path}.{index}"),
+                    *value,
+                    Within::NotNegative(3600.0),
+                ) * unit;
+                if value > reach * (1.0 + 1e-9) {
+                    self.notices.push(format!(
+                        "`{path}` holds {}, which the run never reaches.",
+                        value / unit
+                    ));
+                }
+                values[slot % 2].push(value);
+            }
+        }
+        for list in &mut values {
+            list.sort_by(f64::total_cmp);
+            list.dedup();
+        }
+        let [pictures_at, fields_at] = values;
+        let width = table.picture_width_px.unwrap_or(900);
+        self.number(
+            "outputs.picture_width_px",
+            width as f64,
+            Within::Between(64.0, 8192.0),
+        );
+        Outputs {
+            pictures_at,
+            fields_at,
+            picture_width: width,
+            stress_scale: table.stress_scale_kpa.map(|value| {
+                self.number("outputs.stress_scale_kpa", value, Within::Positive(1e6)) * KPA
+            }),
+        }
+    }
+
+    /// The path stays inside the block.
+    fn geometry(&mut self, tissue: &Tissue, tool: Option<&Tool>, motion: &Motion) {
+        let Some(tool) = tool else { return };
+        let half = tissue.size * 0.5;
+        let show = |p: DVec3| format!("({:.3}, {:.3}, {:.3}) mm", p.x / MM, p.y / MM, p.z / MM);
+        let range = format!(
+            "x {:.3} to {:.3}, y {:.3} to {:.3} mm",
+            -half.x / MM,
+            half.x / MM,
+            -half.y / MM,
+            half.y / MM
+        );
+        if motion.entry.x.abs() > half.x || motion.entry.y.abs() > half.y {
+            self.problems.report(
+                "motion.entry_mm",
+                format!(
+                    "the entry point {} lies outside the top face ({range})",
+                    show(motion.entry)
+                ),
+                "outside the block",
+                format!("choose entry_mm inside {range}"),
+            );
+            return;
+        }
+        let end = motion.deepest_point();
+        // The shaft of a needle is inside the tissue, a sphere or punch is not.
+        let radius = match tool {
+            Tool::Needle(shape) => shape.radius,
+            Tool::Sphere { .. } | Tool::FlatPunch { .. } => 0.0,
+        };
+        let margin = PATH_MARGIN + radius;
+        for (axis, name) in ["x", "y"].into_iter().enumerate() {
+            for (key, point) in [("entry_mm", motion.entry), ("phase", end)] {
+                if half[axis] - point[axis].abs() < margin {
+                    self.problems.report(
+                        &format!("motion.{key}"),
+                        format!(
+                            "the path comes within {:.3} mm of a side: {} with the sides at {name} = +-{:.3} mm",
+                            margin / MM,
+                            show(point),
+                            half[axis] / MM
+                        ),
+                        "the path leaves the block sideways",
+                        "move entry_mm away from the side, choose a steeper direction or a smaller depth_mm, or enlarge tissue.size_mm",
+                    );
+                    return;
+                }
+            }
+        }
+        if tissue.size.z + end.z < PATH_MARGIN {
+            let deepest = motion.phases.iter().enumerate().max_by(|a, b| {
+                let depth = |phase: &Phase| match *phase {
+                    Phase::Insert { depth, .. } => depth,
+                    _ => 0.0,
+                };
+                depth(a.1).total_cmp(&depth(b.1))
+            });
+            let index = deepest.map_or(0, |(index, _)| index);
+            self.problems.report(
+                &format!("motion.phase.{index}.depth_mm"),
+                format!(
+                    "the path ends at {}, less than {} mm above the bottom at z = {:.3} mm",
+                    show(end),
+                    PATH_MARGIN / MM,
+                    -tissue.size.z / MM
+                ),
+                "too deep for this block",
+                format!(
+                    "write depth_mm of at most {:.3}, or enlarge tissue.size_mm",
+                    (tissue.size.z - PATH_MARGIN) / -motion.direction.z / MM
+                ),
+            );
+        }
+    }
+
+    /// The mesh fits into the memory of this computer and into the bindings of every device.
+    fn memory(&mut self, tissue: &Tissue, tool: Option<&Tool>, motion: &Motion) {
+        let motion = tool.map(|_| motion);
+        let mesh = BlockMesh::for_tissue(tissue, motion);
+        let (excess, limit) = mesh_excess(&mesh);
+        if excess <= 1.0 {
+            return;
+        }
+        let mut enough = tissue.clone();
+        while mesh_excess(&BlockMesh::for_tissue(&enough, motion)).0 > 1.0 {
+            // Between a path and a block the count falls with some power of the edge from 1 to 3.
+            enough.cell_size *= 1.1;
+        }
+        let [nx, ny, nz] = mesh.cells();
+        let (cells, nodes) = (product(mesh.cells()), product(mesh.nodes()));
+        self.problems.report(
+            "tissue.cell_size_mm",
+            format!(
+                "the mesh of {nx} x {ny} x {nz} cells is too fine: it needs {} GiB; {limit}",
+                gib(cells * BYTES_PER_CELL + nodes * BYTES_PER_NODE)
+            ),
+            "too fine",
+            format!(
+                "write a cell_size_mm of {:.3} or more, or a smaller block or fine_radius_mm",
+                enough.cell_size / MM + 5e-4
+            ),
+        );
+    }
+}
+
+/// Need over limit of a mesh for its tightest limit, and that limit in words.
+fn mesh_excess(mesh: &BlockMesh) -> (f64, String) {
+    let (cells, nodes) = (product(mesh.cells()), product(mesh.nodes()));
+    let bytes = cells * BYTES_PER_CELL + nodes * BYTES_PER_NODE;
+    let binding = cells * BINDING_BYTES_PER_CELL;
+    let mut limits = vec![
+        (
+            nodes / 2f64.powi(31),
+            format!("it has {nodes:.3e} nodes and the index holds 2^31"),
+        ),
+        (
+            binding / LARGEST_BINDING,
+            format!(
+                "one of its buffers takes {} GiB and portable devices offer 0.125 GiB",
+                gib(binding)
+            ),
+        ),
+    ];
+    if let Some(available) = available_memory() {
+        let half = 0.5 * available;
+        limits.push((
+            bytes / half,
+            format!("half of the available memory is {} GiB", gib(half)),
+        ));
+    }
+    limits
+        .into_iter()
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .expect("two limits at least")
+}
+
+/// Product of three counts in floating point: for three long axes it may not fit an index.
+fn product(counts: [usize; 3]) -> f64 {
+    counts.iter().map(|n| *n as f64).product()
+}
+
+fn gib(bytes: f64) -> f64 {
+    four_digits(bytes / (1024.0 * 1024.0 * 1024.0))
+}
+
+/// A face held as a whole, along its normal, or not at all.
+fn face_of_kind(face: Face, kind: FaceKind) -> FaceCondition {
+    FaceCondition {
+        fixed: match kind {
+            FaceKind::Free => [false; 3],
+            FaceKind::Fixed => [true; 3],
+            FaceKind::Roller => std::array::from_fn(|axis| axis == face.axis()),
+        },
+        ..FaceCondition::default()
+    }
+}
+
+/// Memory that the system can give now [B]; `None` where /proc/meminfo does not exist.
+fn available_memory() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("MemAvailable:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024.0)
+}

@@ -1,0 +1,422 @@
+//! The TOML document of a scene with the place of every key, so that any later check can point at its line.
+//!
+//! Command-line overrides are merged into the parsed document; they carry a span behind the end of the file, which
+//! tells them apart from the file's own text in every later message.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+
+use codespan_reporting::diagnostic::{Diagnostic, Label};
+use codespan_reporting::files::SimpleFile;
+use codespan_reporting::term::{self, Chars, Config};
+use serde::de::DeserializeOwned;
+use toml::Spanned;
+use toml::de::{DeArray, DeTable, DeValue, ValueDeserializer};
+
+/// A parsed scene file with overrides.
+pub struct Document<'s> {
+    name: String,
+    source: &'s str,
+    overrides: &'s [String],
+    /// The merged document; always a table.
+    root: Spanned<DeValue<'s>>,
+    /// Key and value span of every dotted path (`motion.phase.0.speed_mm_s`).
+    places: BTreeMap<String, Place>,
+}
+
+#[derive(Debug, Clone)]
+struct Place {
+    key: Range<usize>,
+    value: Range<usize>,
+}
+
+/// The problems found in one document, in the order of the file once rendered.
+pub struct Problems<'a> {
+    document: &'a Document<'a>,
+    /// Position in the file and rendered text.
+    found: Vec<(usize, String)>,
+}
+
+impl<'s> Document<'s> {
+    /// Parses `source` and applies `overrides` (`key=value`); the error is rendered.
+    pub fn parse(
+        path: &Path,
+        source: &'s str,
+        overrides: &'s [String],
+    ) -> Result<Document<'s>, String> {
+        let mut document = Document {
+            name: path.display().to_string(),
+            source,
+            overrides,
+            root: Spanned::new(0..0, DeValue::Table(DeTable::new())),
+            places: BTreeMap::new(),
+        };
+        match DeTable::parse(source) {
+            Ok(root) => document.root = Spanned::new(0..0, DeValue::Table(root.into_inner())),
+            Err(error) => {
+                return Err(document.render(
+                    error.span().unwrap_or(0..0),
+                    &format!("this is not TOML: {}", one_line(error.message())),
+                    "here",
+                    "mend the line; a text needs quotes, a table starts with [name], a list is [1, 2, 3]",
+                ));
+            }
+        }
+        let mut problems = Vec::new();
+        for (number, text) in overrides.iter().enumerate() {
+            let place = document.override_span(number);
+            if let Err((message, way_out)) = apply_override(&mut document.root, text, &place) {
+                problems.push(document.render(place, &message, "", &way_out));
+            }
+        }
+        if !problems.is_empty() {
+            return Err(problems.join("\n"));
+        }
+        record_places("", &document.root, &mut document.places);
+        Ok(document)
+    }
+
+    /// Reads the document into `T`; the error is rendered.
+    pub fn deserialize<T: DeserializeOwned>(&self) -> Result<T, String> {
+        T::deserialize(ValueDeserializer::from(self.root.clone())).map_err(|error| {
+            let span = error.span().unwrap_or(0..0);
+            let message = one_line(error.message());
+            let way_out = way_out_of_reading(&message);
+            // A missing field is reported for its whole table; the first line shows which one.
+            self.render(span, &message, "here", &way_out)
+        })
+    }
+
+    /// Paths of all numbers that are NaN, infinite or too large for a double.
+    pub fn non_finite_numbers(&self) -> Vec<String> {
+        let mut found = Vec::new();
+        collect_non_finite("", self.root.get_ref(), &mut found);
+        found
+    }
+
+    /// Span of override `number`: behind the end of the file.
+    fn override_span(&self, number: usize) -> Range<usize> {
+        let place = self.source.len() + 1 + number;
+        place..place
+    }
+
+    /// Span of the value at `path`, or of the nearest table around it.
+    fn span(&self, path: &str) -> Range<usize> {
+        let mut path = path;
+        let mut exact = true;
+        loop {
+            if let Some(place) = self.places.get(path) {
+                return if exact {
+                    place.value.clone()
+                } else {
+                    place.key.clone()
+                };
+            }
+            exact = false;
+            match path.rfind('.') {
+                Some(dot) => path = &path[..dot],
+                None => return 0..0,
+            }
+        }
+    }
+
+    /// One problem as text: file, line, excerpt, label and the way out.
+    fn render(&self, span: Range<usize>, message: &str, label: &str, way_out: &str) -> String {
+        if span.start > self.source.len() {
+            let text = &self.overrides[span.start - self.source.len() - 1];
+            return format!("error: --set {text}: {message}\n  = way out: {way_out}\n");
+        }
+        // Only the first line of a span is shown: a table is recognised by its header.
+        let end = span.end.clamp(span.start, self.source.len());
+        let first_line = self.source[span.start..end]
+            .find('\n')
+            .map_or(end, |newline| span.start + newline);
+        let diagnostic = Diagnostic::error()
+            .with_message(message)
+            .with_labels(vec![
+                Label::primary((), span.start..first_line).with_message(label),
+            ])
+            .with_notes(vec![format!("way out: {way_out}")]);
+        let config = Config {
+            chars: Chars::ascii(),
+            ..Config::default()
+        };
+        term::emit_into_string(
+            &config,
+            &SimpleFile::new(&self.name, self.source),
+            &diagnostic,
+        )
+        .unwrap_or_else(|_| format!("error: {}: {message}\n  = way out: {way_out}\n", self.name))
+    }
+}
+
+impl<'a> Problems<'a> {
+    pub fn new(document: &'a Document<'a>) -> Self {
+        Problems {
+            document,
+            found: Vec::new(),
+        }
+    }
+
+    /// Adds a problem at the dotted `path` (or the nearest table around it).
+    pub fn report(
+        &mut self,
+        path: &str,
+        message: impl AsRef<str>,
+        label: impl AsRef<str>,
+        way_out: impl AsRef<str>,
+    ) {
+        let span = self.document.span(path);
+        let text = self.document.render(
+            span.clone(),
+            message.as_ref(),
+            label.as_ref(),
+            way_out.as_ref(),
+        );
+        self.found.push((span.start, text));
+    }
+
+    /// `Err` with all problems, in the order of the file, where there are any.
+    pub fn check(&mut self) -> Result<(), String> {
+        if self.found.is_empty() {
+            return Ok(());
+        }
+        self.found.sort_by_key(|(place, _)| *place);
+        let texts: Vec<&str> = self.found.iter().map(|(_, text)| text.trim_end()).collect();
+        Err(texts.join("\n\n") + "\n")
+    }
+}
+
+/// The entry of `choices` that differs least from `word`, where it is close enough to be a slip of the keys.
+pub fn closest<'a>(word: &str, choices: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    choices
+        .into_iter()
+        .map(|choice| (edit_distance(word, choice), choice))
+        .filter(|(distance, choice)| *distance <= 2 + choice.len() / 4)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, choice)| choice)
+}
+
+/// Levenshtein distance of two short words.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(x != *y);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(row[j + 1] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+/// The way out of an error of the reading layer, from the names that its message quotes.
+fn way_out_of_reading(message: &str) -> String {
+    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    let Some((word, choices)) = quoted.split_first() else {
+        return "write a value of the kind that the message names; `stylet schema` lists all keys"
+            .into();
+    };
+    if message.starts_with("unknown") {
+        let list = choices.join(", ");
+        match closest(word, choices.iter().copied()) {
+            Some(near) => format!("did you mean `{near}`? Known here: {list}"),
+            None if choices.is_empty() => format!("remove `{word}`"),
+            None => format!("remove `{word}` or use one of: {list}"),
+        }
+    } else if message.starts_with("missing field") {
+        format!("add `{word}` here; `stylet schema` describes every key")
+    } else {
+        "write a value of the kind that the message names; `stylet schema` lists all keys".into()
+    }
+}
+
+/// Sets one value of the table. The error is (message, way out).
+fn apply_override<'s>(
+    root: &mut Spanned<DeValue<'s>>,
+    text: &'s str,
+    place: &Range<usize>,
+) -> Result<(), (String, String)> {
+    const FORM: &str = "write --set table.key=value, e.g. --set motion.phase.0.speed_mm_s=5";
+    let fail = |message: String, way_out: &str| Err((message, way_out.to_string()));
+    let Some((path, value)) = text.split_once('=') else {
+        return fail("there is no `=`".into(), FORM);
+    };
+    let (path, value) = (path.trim(), value.trim());
+    let parts: Vec<&str> = path.split('.').map(str::trim).collect();
+    if parts.iter().any(|part| part.is_empty()) {
+        return fail("the key is incomplete".into(), FORM);
+    }
+    if value.is_empty() {
+        return fail("there is no value behind `=`".into(), FORM);
+    }
+    let value = match DeValue::parse(value) {
+        Ok(value) => moved_value(value.into_inner(), place),
+        Err(_)
+            if value
+                .chars()
+                .all(|c| c.is_alphanumeric() || "-_./ ".contains(c)) =>
+        {
+            DeValue::String(value.to_string().into())
+        }
+        Err(error) => {
+            return fail(
+                format!(
+                    "the value is not TOML: {}",
+                    error.message().trim().replace('\n', ", ")
+                ),
+                "write a number, a word, a list like [1, 2, 3] or a table like {speed_mm_s = 5}; quote it from the shell",
+            );
+        }
+    };
+    let (last, parents) = parts.split_last().expect("split gives at least one part");
+    set(root, parents, last, value, place, path).map_err(|message| (message, FORM.to_string()))
+}
+
+/// Walks down `parents` from `node`, making tables where they are missing, and sets `last`.
+fn set<'s>(
+    node: &mut Spanned<DeValue<'s>>,
+    parents: &[&str],
+    last: &str,
+    value: DeValue<'s>,
+    place: &Range<usize>,
+    path: &str,
+) -> Result<(), String> {
+    if let Some((first, rest)) = parents.split_first() {
+        let child = match node.get_mut() {
+            DeValue::Table(table) => {
+                if !table.contains_key(*first) {
+                    table.insert(
+                        Spanned::new(place.clone(), first.to_string().into()),
+                        Spanned::new(place.clone(), DeValue::Table(DeTable::new())),
+                    );
+                }
+                table.get_mut(*first).expect("just inserted")
+            }
+            DeValue::Array(array) => {
+                let length = array.len();
+                first
+                    .parse::<usize>()
+                    .ok()
+                    .and_then(|index| array.get_mut(index))
+                    .ok_or(format!(
+                        "`{first}` in `{path}` is no index of a list of {length} (the first is 0)"
+                    ))?
+            }
+            other => {
+                return Err(format!(
+                    "`{first}` in `{path}` would be inside a {}",
+                    other.type_str()
+                ));
+            }
+        };
+        return set(child, rest, last, value, place, path);
+    }
+    let value = Spanned::new(place.clone(), value);
+    match node.get_mut() {
+        DeValue::Table(table) => {
+            table.remove(last);
+            table.insert(Spanned::new(place.clone(), last.to_string().into()), value);
+            Ok(())
+        }
+        DeValue::Array(array) => {
+            let length = array.len();
+            match last.parse::<usize>() {
+                Ok(index) if index < length => {
+                    *array.get_mut(index).expect("index is below the length") = value
+                }
+                Ok(index) if index == length => array.push(value),
+                _ => {
+                    return Err(format!(
+                        "`{last}` in `{path}` is no index of a list of {length} (the first is 0)"
+                    ));
+                }
+            }
+            Ok(())
+        }
+        other => Err(format!(
+            "`{last}` in `{path}` would be inside a {}",
+            other.type_str()
+        )),
+    }
+}
+
+/// `value` with all its spans at `place`.
+fn moved_value<'s>(value: DeValue<'s>, place: &Range<usize>) -> DeValue<'s> {
+    let moved = |item: Spanned<DeValue<'s>>| {
+        Spanned::new(place.clone(), moved_value(item.into_inner(), place))
+    };
+    match value {
+        DeValue::Array(array) => DeValue::Array(array.into_iter().map(moved).collect::<DeArray>()),
+        DeValue::Table(table) => DeValue::Table(
+            table
+                .into_iter()
+                .map(|(key, item)| (Spanned::new(place.clone(), key.into_inner()), moved(item)))
+                .collect::<DeTable>(),
+        ),
+        scalar => scalar,
+    }
+}
+
+/// A message of the TOML reader on one line.
+fn one_line(message: &str) -> String {
+    message.trim().replace('\n', ", ")
+}
+
+/// `table.key`, or `key` at the top.
+fn join(path: &str, key: &str) -> String {
+    if path.is_empty() {
+        key.to_string()
+    } else {
+        format!("{path}.{key}")
+    }
+}
+
+/// Notes where everything below `value` stands.
+fn record_places(path: &str, value: &Spanned<DeValue>, places: &mut BTreeMap<String, Place>) {
+    let mut record = |path: String, key: Range<usize>, item: &Spanned<DeValue>| {
+        let place = Place {
+            key,
+            value: item.span(),
+        };
+        places.insert(path.clone(), place);
+        record_places(&path, item, places);
+    };
+    match value.get_ref() {
+        DeValue::Table(table) => {
+            for (key, item) in table.iter() {
+                record(join(path, key.get_ref()), key.span(), item);
+            }
+        }
+        DeValue::Array(array) => {
+            for (index, item) in array.iter().enumerate() {
+                record(join(path, &index.to_string()), item.span(), item);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Collects the paths of numbers that a double cannot hold as a finite value.
+fn collect_non_finite(path: &str, value: &DeValue, found: &mut Vec<String>) {
+    match value {
+        DeValue::Table(table) => {
+            for (key, item) in table.iter() {
+                collect_non_finite(&join(path, key.get_ref()), item.get_ref(), found);
+            }
+        }
+        DeValue::Array(array) => {
+            for (index, item) in array.iter().enumerate() {
+                collect_non_finite(&join(path, &index.to_string()), item.get_ref(), found);
+            }
+        }
+        DeValue::Float(float) if !float.as_str().parse::<f64>().is_ok_and(f64::is_finite) => {
+            found.push(path.to_string());
+        }
+        _ => {}
+    }
+}

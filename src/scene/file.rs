@@ -1,0 +1,414 @@
+//! The TOML form of a scene: what a person writes, units in the key names. Unknown keys are errors.
+//!
+//! The doc comments are the descriptions of the JSON schema. Ranges and relations between keys are checked in
+//! `convert`, where a message can point at the line.
+
+use schemars::JsonSchema;
+use serde::de::value::{MapAccessDeserializer, StrDeserializer};
+use serde::{Deserialize, Deserializer};
+
+/// A Stylet scene.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// One line for pictures and reports; default: the file name.
+    pub title: Option<String>,
+    /// Keys of the effects that are simulated, e.g. ["puncture", "friction", "mass_scaling"].
+    #[serde(default)]
+    pub effects: Vec<String>,
+    pub tissue: TissueTable,
+    pub material: MaterialTable,
+    /// What holds, moves or loads the six faces; default: sides and bottom fixed, top free.
+    #[serde(default)]
+    pub boundaries: BoundariesTable,
+    /// A rigid solid needle with a conical tip. At most one tool per scene.
+    pub needle: Option<NeedleTable>,
+    /// A rigid sphere. At most one tool per scene.
+    pub sphere: Option<SphereTable>,
+    /// A rigid flat cylindrical punch. At most one tool per scene.
+    pub flat_punch: Option<FlatPunchTable>,
+    /// Motion of the tool; required with a tool.
+    pub motion: Option<MotionTable>,
+    pub puncture: Option<PunctureTable>,
+    pub friction: Option<FrictionTable>,
+    pub indentation: Option<IndentationTable>,
+    pub gravity: Option<GravityTable>,
+    #[serde(default)]
+    pub solver: SolverTable,
+    #[serde(default)]
+    pub outputs: OutputsTable,
+}
+
+/// The tissue block. It spans -size/2..size/2 in x and y and -size..0 in z; the top face is z = 0.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TissueTable {
+    /// Edge lengths of the block in x, y, z [mm].
+    pub size_mm: [f64; 3],
+    /// Cell edge around the planned path [mm].
+    pub cell_size_mm: f64,
+    /// Half width of the fine zone around the path [mm]; default 2.5.
+    pub fine_radius_mm: Option<f64>,
+    /// Wanted ratio of neighbouring cell edges outside the fine zone, 1 to 2; default 1.25.
+    pub growth: Option<f64>,
+    /// Where the entry point lies between two grid lines in x and y, as a fraction of the cell; default [0.23, 0.31].
+    pub axis_offset_cells: Option<[f64; 2]>,
+}
+
+/// The tissue law: a preset, or Mooney-Rivlin constants with one volumetric key, or E, nu and the share of c10.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialTable {
+    /// Name in the material library.
+    pub preset: Option<String>,
+    /// First Mooney-Rivlin constant c10 [kPa].
+    pub c10_kpa: Option<f64>,
+    /// Second Mooney-Rivlin constant c01 [kPa].
+    pub c01_kpa: Option<f64>,
+    /// Bulk modulus K = 2/D [kPa].
+    pub bulk_modulus_kpa: Option<f64>,
+    /// D = 2/K [1/MPa].
+    pub d_per_mpa: Option<f64>,
+    /// Poisson's ratio at rest; beside K or D it is only compared.
+    pub poisson_ratio: Option<f64>,
+    /// Young's modulus at rest [kPa]; beside c10 and c01 it is only compared.
+    pub youngs_modulus_kpa: Option<f64>,
+    /// Share of the shear modulus that goes to c10 when E and nu are given, 0 to 1; default 0.7.
+    pub c10_share: Option<f64>,
+    /// Density [kg/m^3]; default 1060, or the preset's.
+    pub density_kg_m3: Option<f64>,
+    /// Accept constants of which one is negative while their sum is positive (stable up to a stretch limit).
+    #[serde(default)]
+    pub allow_limited: bool,
+}
+
+/// Conditions on the six faces.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoundariesTable {
+    /// Face x = -size/2; default "fixed".
+    pub x_min: Option<FaceEntry>,
+    /// Face x = +size/2; default "fixed".
+    pub x_max: Option<FaceEntry>,
+    /// Face y = -size/2; default "fixed".
+    pub y_min: Option<FaceEntry>,
+    /// Face y = +size/2; default "fixed".
+    pub y_max: Option<FaceEntry>,
+    /// Bottom; default "fixed".
+    pub z_min: Option<FaceEntry>,
+    /// Top; default "free".
+    pub z_max: Option<FaceEntry>,
+}
+
+/// One face: "free", "fixed", "roller" (normal component fixed: a plane of symmetry) or a table.
+#[derive(Debug, Clone, JsonSchema)]
+#[schemars(untagged)]
+pub enum FaceEntry {
+    Kind(FaceKind),
+    Table(FaceTable),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FaceKind {
+    Free,
+    Fixed,
+    Roller,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+/// What holds, moves or loads one face.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FaceTable {
+    /// Components that are held, or moved by `displacement_mm` and `rotation_deg`.
+    #[serde(default)]
+    pub fixed: Vec<Axis>,
+    /// Final displacement of the fixed components [mm].
+    pub displacement_mm: Option<[f64; 3]>,
+    /// Final rotation about the coordinate axis of the face normal [deg], right-handed about the positive axis.
+    pub rotation_deg: Option<f64>,
+    /// Time over which displacement and rotation grow linearly [s].
+    pub duration_s: Option<f64>,
+    /// Dead load per rest area [kPa].
+    pub traction_kpa: Option<[f64; 3]>,
+    /// Time over which the load grows linearly [s]; default 0: at once.
+    pub traction_ramp_s: Option<f64>,
+}
+
+/// A rigid solid needle: cylinder and cone.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NeedleTable {
+    /// Gauge in the needle library, e.g. "16G"; or give `outer_diameter_mm`.
+    pub gauge: Option<String>,
+    /// Outer diameter [mm].
+    pub outer_diameter_mm: Option<f64>,
+    /// Length of the cone [mm]; or give `tip_half_angle_deg`.
+    pub tip_length_mm: Option<f64>,
+    /// Half of the opening angle of the cone [deg].
+    pub tip_half_angle_deg: Option<f64>,
+    /// Needle material: a name in the library or a table; default "steel-304". The needle is rigid, so the material
+    /// is checked and reported only.
+    pub material: Option<NeedleMaterialEntry>,
+}
+
+/// A name in the library or a table of constants.
+#[derive(Debug, Clone, JsonSchema)]
+#[schemars(untagged)]
+pub enum NeedleMaterialEntry {
+    Preset(String),
+    Table(NeedleMaterialTable),
+}
+
+/// Constants of a needle material; exactly one density key.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NeedleMaterialTable {
+    /// Young's modulus [GPa].
+    pub youngs_modulus_gpa: f64,
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
+    /// Density [g/cm^3].
+    pub density_g_cm3: Option<f64>,
+    /// Density [g/mm^3], for tables that print it so.
+    pub density_g_mm3: Option<f64>,
+}
+
+/// A rigid sphere; depth is counted from the first touch of the top face.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SphereTable {
+    /// Radius [mm].
+    pub radius_mm: f64,
+}
+
+/// A rigid flat cylindrical punch.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FlatPunchTable {
+    /// Radius [mm].
+    pub radius_mm: f64,
+    /// Stick to the tissue where it is touched first; default false.
+    #[serde(default)]
+    pub bonded: bool,
+}
+
+/// Motion of the tool along a straight line. Depth is counted along it from the entry point.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotionTable {
+    /// Entry point on the top face, x and y [mm]; default [0, 0].
+    pub entry_mm: Option<[f64; 2]>,
+    /// Direction of the insertion, any length, z < 0; default [0, 0, -1]. Or give `angle_deg`.
+    pub direction: Option<[f64; 3]>,
+    /// Angle between the needle and the downward vertical [deg], 0 to 80.
+    pub angle_deg: Option<f64>,
+    /// Heading of an inclined needle in the xy plane, from +x towards +y [deg]; default 0.
+    pub azimuth_deg: Option<f64>,
+    /// The phases, in order.
+    #[serde(default)]
+    pub phase: Vec<PhaseTable>,
+}
+
+/// One phase of the motion.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PhaseTable {
+    /// What the tool does.
+    pub kind: PhaseKind,
+    /// Speed [mm/s]; for insert and withdraw.
+    pub speed_mm_s: Option<f64>,
+    /// Depth at the end of the phase [mm]; for insert and withdraw.
+    pub depth_mm: Option<f64>,
+    /// Duration [s]; for hold.
+    pub duration_s: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PhaseKind {
+    Insert,
+    Hold,
+    Withdraw,
+}
+
+/// Parameters of the effect `puncture`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PunctureTable {
+    /// Tip force at which the surface gives way [N] (calibration).
+    pub puncture_force_n: Option<f64>,
+    /// Tip force of steady cutting [N] (calibration).
+    pub cutting_force_n: Option<f64>,
+    /// Length over which the threshold falls from the puncture to the cutting force [mm].
+    pub transition_length_mm: Option<f64>,
+    /// Stiffness of all tip springs together [N/mm].
+    pub tip_stiffness_n_mm: Option<f64>,
+    /// Radius of the softened path [mm] (calibration).
+    pub softened_radius_mm: Option<f64>,
+    /// Elastic stiffness left in a fully softened cell, 0 to 1.
+    pub residual_stiffness: Option<f64>,
+    /// Outer radius of the ring of nodes that the shaft pushes [mm] (calibration); larger than `softened_radius_mm`.
+    pub ring_radius_mm: Option<f64>,
+    /// Contact stiffness over (K + 4/3 mu) h (calibration).
+    pub contact_stiffness_factor: Option<f64>,
+    /// Fraction of critical damping in the contact normal, 0 to 1.
+    pub contact_damping: Option<f64>,
+    /// Travel over which an overlap found at activation fades out [mm].
+    pub entry_fade_mm: Option<f64>,
+}
+
+/// Parameters of the effect `friction`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FrictionTable {
+    /// Friction coefficient mu.
+    pub coefficient: Option<f64>,
+    /// Tangential over normal contact stiffness.
+    pub stiffness_ratio: Option<f64>,
+    /// Length over which mu grows along the shaft behind the cone [mm].
+    pub fade_length_mm: Option<f64>,
+}
+
+/// Parameters of the effect `indentation`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IndentationTable {
+    /// Contact stiffness over (K + 4/3 mu) h.
+    pub contact_stiffness_factor: Option<f64>,
+    /// Fraction of critical damping in the contact normal, 0 to 1.
+    pub contact_damping: Option<f64>,
+}
+
+/// Parameters of the effect `gravity`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GravityTable {
+    /// Acceleration of free fall [m/s^2]; default [0, 0, -9.81].
+    pub acceleration_m_s2: Option<[f64; 3]>,
+}
+
+/// Numbers of the time integration.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SolverTable {
+    /// Mass-scaling factor, 1 or more, or "auto"; acts with the effect `mass_scaling` only. Default "auto".
+    pub mass_scaling: Option<MassScalingEntry>,
+    /// Fraction of the stable step that is used, 0 to 1; default 0.8.
+    pub safety: Option<f64>,
+    /// The scene's own time step [us]; default: computed.
+    pub time_step_us: Option<f64>,
+    /// Mass-proportional damping [1/s]; default 10.
+    pub mass_damping_per_s: Option<f64>,
+    /// Hourglass stiffness; default 0.1.
+    pub hourglass_stiffness: Option<f64>,
+    /// Quartic hourglass factor; default 15000.
+    pub hourglass_quartic: Option<f64>,
+    /// Display frames per simulated second [Hz]; default 60.
+    pub frame_rate_hz: Option<f64>,
+    /// Length of a run without a tool [s]; with a tool the phases decide.
+    pub duration_s: Option<f64>,
+}
+
+/// A number or "auto".
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
+#[schemars(untagged)]
+pub enum MassScalingEntry {
+    Factor(f64),
+    Word(AutoWord),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AutoWord {
+    Auto,
+}
+
+/// What is written, and when.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OutputsTable {
+    /// Depths on the way in at which a picture is drawn [mm]; scenes with a tool.
+    pub pictures_at_depth_mm: Option<Vec<f64>>,
+    /// Depths on the way in at which a VTU file is written [mm]; scenes with a tool.
+    pub fields_at_depth_mm: Option<Vec<f64>>,
+    /// Times at which a picture is drawn [s]; scenes without a tool.
+    pub pictures_at_s: Option<Vec<f64>>,
+    /// Times at which a VTU file is written [s]; scenes without a tool.
+    pub fields_at_s: Option<Vec<f64>>,
+    /// Width of a picture in pixels, 64 to 8192; default 900.
+    pub picture_width_px: Option<u32>,
+    /// Upper end of the colour bar [kPa]; default: the largest stress in the picture.
+    pub stress_scale_kpa: Option<f64>,
+}
+
+/// Reads a text as one kind of entry and a table as another. `#[serde(untagged)]` would lose the line and say only
+/// that nothing matched.
+macro_rules! text_or_table {
+    ($entry:ident, $expecting:literal, text => $from_text:expr, table => $from_table:expr) => {
+        impl<'de> Deserialize<'de> for $entry {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct Visitor;
+                impl<'de> serde::de::Visitor<'de> for Visitor {
+                    type Value = $entry;
+
+                    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                        f.write_str($expecting)
+                    }
+
+                    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<$entry, E> {
+                        let from_text: fn(StrDeserializer<E>) -> Result<$entry, E> = $from_text;
+                        from_text(StrDeserializer::new(text))
+                    }
+
+                    fn visit_map<A: serde::de::MapAccess<'de>>(
+                        self,
+                        map: A,
+                    ) -> Result<$entry, A::Error> {
+                        Deserialize::deserialize(MapAccessDeserializer::new(map)).map($from_table)
+                    }
+                }
+                deserializer.deserialize_any(Visitor)
+            }
+        }
+    };
+}
+
+text_or_table!(FaceEntry, "\"free\", \"fixed\", \"roller\" or a table like {fixed = [\"x\"]}",
+    text => |text| FaceKind::deserialize(text).map(FaceEntry::Kind), table => FaceEntry::Table);
+text_or_table!(NeedleMaterialEntry, "the name of a needle material or a table like {youngs_modulus_gpa = 193, ..}",
+    text => |text| String::deserialize(text).map(NeedleMaterialEntry::Preset), table => NeedleMaterialEntry::Table);
+
+impl<'de> Deserialize<'de> for MassScalingEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl serde::de::Visitor<'_> for Visitor {
+            type Value = MassScalingEntry;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("a number of 1 or more, or \"auto\"")
+            }
+
+            fn visit_i64<E>(self, number: i64) -> Result<MassScalingEntry, E> {
+                Ok(MassScalingEntry::Factor(number as f64))
+            }
+
+            fn visit_f64<E>(self, number: f64) -> Result<MassScalingEntry, E> {
+                Ok(MassScalingEntry::Factor(number))
+            }
+
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<MassScalingEntry, E> {
+                AutoWord::deserialize(StrDeserializer::new(text)).map(MassScalingEntry::Word)
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
