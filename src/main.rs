@@ -165,7 +165,11 @@ fn main() -> ExitCode {
     match dispatch(Cli::parse(), start) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            eprintln!("error: {error}");
+            match &error {
+                // Already rendered, with its own `error:` before every problem.
+                Error::Scene(text) => eprintln!("{}", text.trim_end()),
+                _ => eprintln!("error: {error}"),
+            }
             ExitCode::from(error.exit_code())
         }
     }

@@ -144,24 +144,20 @@ fn describe_tool(tool: &Tool) -> String {
 /// Wall time of the whole run, extrapolated from its first frames [s].
 fn predicted_seconds(simulation: &mut Simulation) -> Result<Option<f64>> {
     // The first frames compile shaders and fill caches.
+    let mut last = 0;
     for _ in 0..3 {
-        if simulation.next_frame()?.is_none() {
-            return Ok(None);
-        }
-    }
-    let (begin, mut first, mut last) = (Instant::now(), None, 0);
-    while begin.elapsed().as_secs_f64() < TRIAL {
         match simulation.next_frame()? {
-            Some(record) => {
-                first.get_or_insert(record.step);
-                last = record.step;
-            }
+            Some(record) => last = record.step,
             None => return Ok(None),
         }
     }
-    let steps = last - first.unwrap_or(last);
-    if steps == 0 {
-        return Ok(None);
+    let (begin, first) = (Instant::now(), last);
+    while begin.elapsed().as_secs_f64() < TRIAL {
+        match simulation.next_frame()? {
+            Some(record) => last = record.step,
+            None => return Ok(None),
+        }
     }
+    let steps = last - first;
     Ok(Some(begin.elapsed().as_secs_f64() / steps as f64 * simulation.total_steps() as f64))
 }

@@ -43,6 +43,11 @@ impl FromStr for EngineChoice {
 /// Frames that may be under way before the oldest result is awaited.
 const AHEAD: u64 = 2;
 
+/// Part of the node steps of a frame whose speed may be clamped before the run counts as diverged. A single clamp is
+/// counted and reported; an unstable step clamps nearly all of them and would go on for ever without a number being
+/// out of range.
+const RUNAWAY_PART: f64 = 0.05;
+
 /// A simulation that is advanced frame by frame.
 pub struct Simulation {
     pub model: Arc<Model>,
@@ -213,6 +218,10 @@ impl Simulation {
         if record.health.not_finite {
             return Err(self.diverged(&record));
         }
+        let node_steps = f64::from(sums.steps) * self.model.mesh.node_count() as f64;
+        if f64::from(sums.clamped_nodes) > RUNAWAY_PART * node_steps {
+            return Err(self.runaway(&record, f64::from(sums.clamped_nodes) / node_steps));
+        }
         if self.watch_stretch {
             self.check_stretch(&record)?;
         }
@@ -240,6 +249,42 @@ impl Simulation {
             Err(error) => error.to_string(),
         };
         Error::Diverged { frame: record.frame, step: record.step, time_s: record.time, message: place }
+    }
+
+    /// Where the tissue moves fastest in a run whose speeds are clamped all over.
+    fn runaway(&mut self, record: &FrameRecord, part: f64) -> Error {
+        let limit = self.model.speed_limit(self.dt);
+        let place = match self.engine.read_state() {
+            Ok(state) => {
+                let speeds = state.velocity.iter().map(|v| v.length()).enumerate();
+                let (n, speed) = speeds.fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+                let x = self.model.mesh.rest_position(n) * 1e3;
+                format!(
+                    "the fastest is node {n} (rest position {:.2}, {:.2}, {:.2} mm) with {speed:.4} m/s",
+                    x.x, x.y, x.z
+                )
+            }
+            Err(error) => error.to_string(),
+        };
+        let way_out = if self.dt > self.stable.limit() {
+            format!(
+                "the time step {:.3} us is above the stable step {:.3} us: drop time_step_us",
+                self.dt * 1e6,
+                self.stable.limit() * 1e6
+            )
+        } else {
+            "lower solver.safety or the speed of the tool".into()
+        };
+        Error::Diverged {
+            frame: record.frame,
+            step: record.step,
+            time_s: record.time,
+            message: format!(
+                "stage integrate_nodes: {:.0} % of the nodes would move faster than the limit of {limit:.4} m/s (a \
+                 twentieth of a cell edge per step); {place}\n  way out: {way_out}",
+                100.0 * part
+            ),
+        }
     }
 
     /// Stops when an element leaves the stretch range in which the material is stable.

@@ -1,0 +1,311 @@
+//! Wrong calls and wrong files: exit code 2, one message with place and way out, nothing written.
+
+use super::*;
+
+/// Runs the tiny scene with changes; the program must refuse it at the line of `marker` and write nothing.
+fn assert_refused(changes: &[(&str, &str)], marker: &str, expected: &[&str]) {
+    let place = Place::new();
+    let path = place.tiny(changes);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let line = 1 + text.lines().position(|l| l.contains(marker)).expect("marker is in the scene");
+    for command in ["run", "check"] {
+        let mut args = vec![command, "tiny.toml"];
+        if command == "run" {
+            args.extend(["--out", "results"]);
+        }
+        let mut answer = place.call(&args).refused().says(&format!("tiny.toml:{line}:"));
+        for text in expected {
+            answer = answer.says(text);
+        }
+        assert!(!place.path("results").exists(), "{}", answer.all());
+        assert!(!place.path("out").exists(), "{}", answer.all());
+    }
+    // The same without --out: no numbered folder either.
+    place.call(&["run", "tiny.toml"]).refused();
+    assert_eq!(place.files("."), ["tiny.toml"]);
+}
+
+#[test]
+fn unknown_key() {
+    assert_refused(&[("gauge = ", "guage = ")], "guage", &["guage", "gauge"]);
+}
+
+#[test]
+fn unknown_preset_names_the_near_one() {
+    assert_refused(&[("across-fibre", "across-fiber")], "across-fiber", &["across-fibre"]);
+}
+
+#[test]
+fn negative_modulus() {
+    assert_refused(
+        &[("preset = \"across-fibre\"", "youngs_modulus_kpa = -60.0\npoisson_ratio = 0.45")],
+        "youngs_modulus_kpa",
+        &["-60"],
+    );
+}
+
+#[test]
+fn unstable_constants() {
+    assert_refused(
+        &[("preset = \"across-fibre\"", "c10_kpa = 4.75\nc01_kpa = -4.91\nd_per_mpa = 4.0")],
+        "c01_kpa",
+        &["REFUSED", "shear modulus", "lv2022-refit"],
+    );
+}
+
+#[test]
+fn mesh_too_fine_for_the_memory() {
+    assert_refused(
+        &[("cell_size_mm = 1.2", "cell_size_mm = 0.002")],
+        "cell_size_mm",
+        &["too fine", "GiB", "write a cell_size_mm of"],
+    );
+}
+
+#[test]
+fn needle_outside_the_block() {
+    assert_refused(
+        &[("[[motion.phase]]", "[motion]\nentry_mm = [9.0, 0.0]\n[[motion.phase]]")],
+        "entry_mm",
+        &["outside"],
+    );
+    assert_refused(&[("depth_mm = 3.0", "depth_mm = 30.0")], "depth_mm = 30.0", &["too deep", "at most"]);
+}
+
+#[test]
+fn numbers_that_are_none() {
+    for (from, to) in [
+        ("cell_size_mm = 1.2", "cell_size_mm = nan"),
+        ("speed_mm_s = 2.0", "speed_mm_s = inf"),
+        ("depth_mm = 3.0", "depth_mm = -inf"),
+        ("size_mm = [14.0, 14.0, 9.0]", "size_mm = [14.0, nan, 9.0]"),
+        ("mass_scaling = 40000", "mass_scaling = 1e999"),
+    ] {
+        assert_refused(&[(from, to)], to, &["not a finite number"]);
+    }
+}
+
+#[test]
+fn numbers_out_of_range() {
+    for (from, to) in [
+        ("speed_mm_s = 2.0", "speed_mm_s = 0.0"),
+        ("speed_mm_s = 2.0", "speed_mm_s = -2.0"),
+        ("cell_size_mm = 1.2", "cell_size_mm = 0.0"),
+        ("tip_half_angle_deg = 18.0", "tip_half_angle_deg = 95.0"),
+        ("mass_scaling = 40000", "mass_scaling = 0.5"),
+    ] {
+        assert_refused(&[(from, to)], to, &["write"]);
+    }
+}
+
+#[test]
+fn empty_motion() {
+    let phase = "[[motion.phase]]\nkind = \"insert\"\nspeed_mm_s = 2.0\ndepth_mm = 3.0\n";
+    assert_refused(&[(phase, "[motion]\nphase = []\n")], "phase = []", &["phase"]);
+    let place = Place::new();
+    place.tiny(&[(phase, "")]);
+    place.call(&["run", "tiny.toml"]).refused().says("tiny.toml:").says("motion");
+    assert_eq!(place.files("."), ["tiny.toml"]);
+}
+
+#[test]
+fn not_toml() {
+    assert_refused(&[("title = \"tiny\"", "title = tiny'")], "title", &["not TOML"]);
+}
+
+#[test]
+fn missing_file() {
+    let place = Place::new();
+    place.tiny(&[]);
+    place.call(&["run", "tinny.toml", "--out", "results"]).refused().says("tinny.toml").says("did you mean");
+    // The default scene is not here.
+    place.call(&[]).refused().says("muscle_biopsy.toml");
+    // A folder is no scene.
+    place.call(&["run", ".", "--out", "results"]).refused();
+    assert_eq!(place.files("."), ["tiny.toml"]);
+}
+
+#[test]
+fn a_file_that_is_not_text() {
+    let place = Place::new();
+    std::fs::write(place.path("tiny.toml"), [0xff, 0xfe, 0x00, 0x80]).unwrap();
+    place.call(&["run", "tiny.toml"]).refused().says("tiny.toml");
+}
+
+#[test]
+fn output_folder_that_cannot_be_written_to() {
+    let place = Place::new();
+    place.tiny(&[]);
+    place.write("file", "");
+    for out in ["file", "file/below"] {
+        place.call(&["run", "tiny.toml", "--out", out]).refused().says(out).says("--out");
+    }
+    assert_eq!(place.files("."), ["file", "tiny.toml"]);
+}
+
+/// Permission bits do not stop an administrator, a file system that holds no files does.
+#[cfg(target_os = "linux")]
+#[test]
+fn output_folder_on_a_read_only_file_system() {
+    let place = Place::new();
+    place.tiny(&[]);
+    place.call(&["run", "tiny.toml", "--out", "/proc/results"]).refused().says("/proc/results");
+}
+
+#[cfg(unix)]
+#[test]
+fn output_folder_without_write_permission() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = Place::new();
+    place.tiny(&[]);
+    std::fs::create_dir(place.path("locked")).unwrap();
+    let set = |mode| {
+        std::fs::set_permissions(place.path("locked"), std::fs::Permissions::from_mode(mode)).unwrap();
+    };
+    set(0o555);
+    // An administrator may write all the same: then there is nothing to see here.
+    let may_write = std::fs::write(place.path("locked/probe"), "").is_ok();
+    let answer = place.call(&["run", "tiny.toml", "--out", "locked"]);
+    set(0o755);
+    if may_write {
+        eprintln!("skipped: this user may write to every folder");
+    } else {
+        answer.refused().says("locked");
+        assert!(place.files("locked").is_empty());
+    }
+}
+
+#[test]
+fn wrong_commands_and_options() {
+    let place = Place::new();
+    place.tiny(&[]);
+    let calls: [(&[&str], &str); 6] = [
+        (&["run", "tiny.toml", "--frob"], "--frob"),
+        (&["frobnicate", "tiny.toml"], "tiny.toml"),
+        (&["run", "tiny.toml", "--engine", "tpu"], "auto, gpu or cpu"),
+        (&["run", "tiny.toml", "--out"], "--out"),
+        (&["bench", "--max-cells", "many"], "many"),
+        (&["schema", "tiny.toml"], "tiny.toml"),
+    ];
+    for (args, text) in calls {
+        let answer = place.call(args).ended(2).says("error: ").says(text);
+        assert!(!answer.stderr.contains("error: error:"), "{}", answer.all());
+    }
+    // A word that is no command is taken as a scene file; the message says so.
+    place.call(&["frobnicate"]).refused().says("frobnicate").says("scene file");
+    assert_eq!(place.files("."), ["tiny.toml"]);
+}
+
+#[test]
+fn wrong_overrides() {
+    let place = Place::new();
+    place.tiny(&[]);
+    for (text, expected) in [
+        ("tissue.cell_size_mm", "there is no `=`"),
+        ("tissue.cellsize_mm=1", "unknown field"),
+        ("tissue.cell_size_mm=", "no value"),
+        ("tissue.cell_size_mm=-1", "-1"),
+        ("tissue.cell_size_mm=nan", "not a finite number"),
+        ("motion.phase.7.depth_mm=2", "no index"),
+        ("tissue=3", "--set tissue=3"),
+    ] {
+        place.call(&["run", "tiny.toml", "--set", text, "--out", "results"]).refused().says("--set").says(expected);
+    }
+    assert_eq!(place.files("."), ["tiny.toml"]);
+}
+
+#[test]
+fn printed_table_of_the_paper() {
+    let place = Place::new();
+    let scene = repository().join("scenes/lv2022/table1_as_printed.toml");
+    for command in ["check", "run"] {
+        let answer = place.call(&[command, scene.to_str().unwrap()]).refused();
+        assert_eq!(answer.stderr.matches("REFUSED").count(), 3, "{}", answer.all());
+        assert_eq!(answer.stderr.matches("way out: ").count(), 3, "{}", answer.all());
+        answer.says("table1_as_printed.toml:").says("lv2022-refit");
+    }
+    assert!(place.files(".").is_empty());
+}
+
+#[test]
+fn wrong_adapter_name_lists_the_right_ones() {
+    let place = Place::new();
+    if !place.has_adapter() {
+        return;
+    }
+    place.tiny(&[]);
+    let listed = place.call(&["adapters"]).ended(0).stdout;
+    let first = listed.lines().next().unwrap().trim_start_matches("* ").to_string();
+    for engine in ["auto", "gpu"] {
+        for args in [
+            vec!["run", "tiny.toml", "--out", "results", "--engine", engine],
+            vec!["check", "tiny.toml", "--engine", engine],
+        ] {
+            place
+                .call_with(&args, &[("WGPU_ADAPTER_NAME", "no such adapter")])
+                .refused()
+                .says("WGPU_ADAPTER_NAME=no such adapter")
+                .says(&first);
+        }
+    }
+    assert_eq!(place.files("."), ["tiny.toml"]);
+}
+
+#[test]
+fn wrong_backend_name() {
+    let place = Place::new();
+    place.tiny(&[]);
+    for engine in ["auto", "gpu"] {
+        place
+            .call_with(
+                &["run", "tiny.toml", "--out", "results", "--engine", engine],
+                &[("WGPU_BACKEND", "vulkan,direct3d")],
+            )
+            .refused()
+            .says("direct3d")
+            .says("vulkan, metal, dx12, gl");
+    }
+    place.call_with(&["adapters"], &[("WGPU_BACKEND", "direct3d")]).refused();
+    assert_eq!(place.files("."), ["tiny.toml"]);
+}
+
+/// Drivers that are not there: neither Vulkan nor EGL finds one.
+#[cfg(target_os = "linux")]
+const NO_DRIVERS: [(&str, &str); 3] = [
+    ("VK_ICD_FILENAMES", "/nonexistent.json"),
+    ("VK_DRIVER_FILES", "/nonexistent.json"),
+    ("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json"),
+];
+
+#[cfg(target_os = "linux")]
+#[test]
+fn without_an_adapter() {
+    let place = Place::new();
+    place.tiny(&[]);
+    let answer = place.call_with(&["adapters"], &NO_DRIVERS).ended(0);
+    if answer.stdout.starts_with("no adapter found") {
+        assert!(answer.stdout.contains("way out: "), "{}", answer.all());
+        // auto: a notice and the CPU engine.
+        let answer = place.call_with(&["run", "tiny.toml", "--out", "results"], &NO_DRIVERS).ended(0);
+        let answer = answer.says("note: running on the CPU engine").says("no GPU adapter found");
+        assert_eq!(place.summary("results")["engine"], "cpu", "{}", answer.all());
+        assert!(place.files("results").iter().any(|f| f == "stress_03.00mm.png"));
+        // gpu: an error.
+        let answer = place.call_with(&["run", "tiny.toml", "--out", "other", "--engine", "gpu"], &NO_DRIVERS);
+        answer.refused().says("no GPU adapter found");
+        assert!(!place.path("other").exists());
+    } else {
+        eprintln!("skipped: an adapter is found without drivers\n{}", answer.stdout);
+    }
+    // A backend that this system does not have was asked for by name: an error even with auto.
+    for engine in ["auto", "gpu"] {
+        place
+            .call_with(
+                &["run", "tiny.toml", "--out", "other", "--engine", engine],
+                &[("WGPU_BACKEND", "dx12")],
+            )
+            .refused()
+            .says("no GPU adapter found");
+        assert!(!place.path("other").exists());
+    }
+}
