@@ -74,15 +74,17 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
     let half = 0.5 * params.mass_damping * params.dt;
     var next = (old.xyz * (1.0 - half) + force * (params.dt / mass)) / (1.0 + half);
+    var held = select(0u, params.fixed_x_min, i == 0u) | select(0u, params.fixed_x_max, i + 1u == params.nodes_x);
+    held |= select(0u, params.fixed_y_min, j == 0u) | select(0u, params.fixed_y_max, j + 1u == params.nodes_y);
+    held |= select(0u, params.fixed_z_min, k == 0u) | select(0u, params.fixed_z_max, k + 1u == params.nodes_z);
+    let is_free = vec3<f32>((vec3<u32>(held) & vec3<u32>(1u, 2u, 4u)) == vec3<u32>(0u));
+    // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
+    next *= is_free;
     let speed = length(next);
     if (speed > params.speed_limit) {
         next *= params.speed_limit / speed;
         atomicAdd(&clamped_nodes, 1u);
     }
-    var held = select(0u, params.fixed_x_min, i == 0u) | select(0u, params.fixed_x_max, i + 1u == params.nodes_x);
-    held |= select(0u, params.fixed_y_min, j == 0u) | select(0u, params.fixed_y_max, j + 1u == params.nodes_y);
-    held |= select(0u, params.fixed_z_min, k == 0u) | select(0u, params.fixed_z_max, k + 1u == params.nodes_z);
-    let is_free = vec3<f32>((vec3<u32>(held) & vec3<u32>(1u, 2u, 4u)) == vec3<u32>(0u));
     var prescribed = vec3<f32>(0.0);
 #ifdef DRIVEN_FACES
     prescribed = prescribed_velocity(i, j, k) * (1.0 - is_free);
@@ -93,7 +95,7 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let reaction = (mass / params.dt) * (prescribed - old.xyz) - force;
     node_work[node] += params.dt * dot(reaction * (1.0 - is_free), middle);
 #endif
-    next = next * is_free + prescribed;
+    next += prescribed;
 #ifdef NODE_WORK
 #ifdef LOADED_FACES
     node_work[node] += params.dt * 0.5 * dot(load, old.xyz + next);

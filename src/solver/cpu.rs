@@ -613,6 +613,13 @@ impl CpuEngine {
                 }
                 let old = *v;
                 let mut new = (old * (1.0 - 0.5 * alpha * dt) + force * (dt / mass)) / (1.0 + 0.5 * alpha * dt);
+                // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
+                let fixed = fixed_components(&model, node);
+                for a in 0..3 {
+                    if fixed[a] {
+                        new[a] = 0.0;
+                    }
+                }
                 let speed = new.length();
                 let mut clamped = 0;
                 if speed > limit {
@@ -621,7 +628,6 @@ impl CpuEngine {
                 }
                 let mut free_mid = 0.5 * (old + new);
                 let mut work = 0.0;
-                let fixed = fixed_components(&model, node);
                 if fixed.contains(&true) {
                     let prescribed = prescribed_velocity(&model, node, input, dt);
                     for a in 0..3 {

@@ -101,7 +101,7 @@ fn numbers_out_of_range() {
 #[test]
 fn empty_motion() {
     let phase = "[[motion.phase]]\nkind = \"insert\"\nspeed_mm_s = 2.0\ndepth_mm = 3.0\n";
-    assert_refused(&[(phase, "[motion]\nphase = []\n")], "phase = []", &["phase"]);
+    assert_refused(&[(phase, "[motion]\nphase = []\n")], "[motion]", &["phase"]);
     let place = Place::new();
     place.tiny(&[(phase, "")]);
     place.call(&["run", "tiny.toml"]).refused().says("tiny.toml:").says("motion");

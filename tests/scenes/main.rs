@@ -63,6 +63,8 @@ struct Run {
 fn run(name: &str, overrides: &[&str], engine: EngineChoice) -> Run {
     let begin = std::time::Instant::now();
     let mut simulation = Simulation::new(load(name, overrides), engine).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let on = simulation.engine().info().engine.clone();
+    assert_eq!(on, if engine == EngineChoice::Cpu { "cpu" } else { "gpu" });
     let mut records = Vec::new();
     while let Some(record) = simulation.next_frame().unwrap_or_else(|e| panic!("{name}: {e}")) {
         records.push(record);

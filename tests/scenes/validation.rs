@@ -108,7 +108,8 @@ fn sphere_on_a_block() {
     let thick = hertz * (1.0 + 1.133 * chi + 1.283 * chi.powi(2) + 0.769 * chi.powi(3) + 0.0975 * chi.powi(4));
     let held: Vec<f64> = run.records.iter().rev().take(5).map(|r| r.force.axial).collect();
     let force = held.iter().sum::<f64>() / held.len() as f64;
-    assert_near("force at 1 mm against Hertz [N]", force, hertz, 0.15);
+    println!("force at 1 mm: {:+.2} % of Hertz", 100.0 * (force / hertz - 1.0));
+    assert!(force > hertz, "a finite block is stiffer than a half space");
     assert_near("force at 1 mm against the block of finite thickness [N]", force, thick, 0.10);
 }
 
@@ -122,7 +123,9 @@ fn free_vibration_of_a_column() {
     let mesh = simulation.model.mesh.clone();
     let top: Vec<usize> = (0..mesh.node_count()).filter(|&n| mesh.node_coordinates(n)[2] == mesh.nodes()[2] - 1).collect();
     let mut curve = vec![(0.0, 0.0)];
+    let mut damped = 0.0;
     while let Some(record) = simulation.next_frame().unwrap() {
+        damped = record.energy.damping;
         let state = simulation.engine().read_state().unwrap();
         let mean = top.iter().map(|&n| state.displacement[n].z).sum::<f64>() / top.len() as f64;
         curve.push((record.time, mean));
@@ -144,10 +147,20 @@ fn free_vibration_of_a_column() {
     assert_near("first crossing [s]", crossings[0], 0.25 * period, 0.01);
     let measured = (crossings[crossings.len() - 1] - crossings[0]) / (crossings.len() - 1) as f64;
     assert_near("period [s]", measured, period, 0.005);
-    // No decay: the swing of the last period against that of the first.
-    let swing = |from: f64| {
-        let part: Vec<f64> = curve.iter().filter(|p| (from..from + period).contains(&p.0)).map(|p| p.1).collect();
-        part.iter().copied().fold(0.0, f64::max) - part.iter().copied().fold(f64::INFINITY, f64::min)
+    // No decay. The corners of the triangular swing become round, because the mesh lets the high harmonics lag; the
+    // first harmonic keeps its amplitude. Least squares over two periods at either end.
+    let amplitude = |from: f64| {
+        let omega = std::f64::consts::TAU / period;
+        let part: Vec<(f64, f64)> =
+            curve.iter().copied().filter(|p| (from..from + 2.0 * period).contains(&p.0)).collect();
+        let sum = |f: &dyn Fn(f64) -> f64| {
+            2.0 * part.iter().map(|p| (p.1 - rest) * f(omega * p.0)).sum::<f64>() / part.len() as f64
+        };
+        sum(&f64::cos).hypot(sum(&f64::sin))
     };
-    assert_near("last swing over the first", swing(curve[curve.len() - 1].0 - period) / swing(0.0), 1.0, 0.02);
+    let (first, last) = (amplitude(0.0), amplitude(curve[curve.len() - 1].0 - 2.0 * period));
+    // A triangular wave of height s0 H / M has the first harmonic 8/pi^2 of it.
+    assert_near("first harmonic [m]", first, 8.0 / std::f64::consts::PI.powi(2) * rest, 0.02);
+    assert_near("last over first amplitude", last / first, 1.0, 0.02);
+    assert_eq!(damped, 0.0, "damping is off");
 }
