@@ -39,12 +39,12 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     if (node >= layer * params.nodes_z) {
         return;
     }
-    let k = node / layer;
-    let j = (node - k * layer) / params.nodes_x;
+    let k = quotient(node, layer);
+    let j = quotient(node - k * layer, params.nodes_x);
     let i = node - k * layer - j * params.nodes_x;
 
     // One strip, or two where the node lies on the plane between them.
-    let above = k / params.strip_layers;
+    let above = quotient(k, params.strip_layers);
     let last = min(above, params.strip_count - 1u);
     let first = select(last, above - 1u, k > 0u && above * params.strip_layers == k);
     let stride = params.padded_columns;
@@ -74,9 +74,11 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
     let half = 0.5 * params.mass_damping * params.dt;
     var next = (old.xyz * (1.0 - half) + force * (params.dt / mass)) / (1.0 + half);
-    let speed = length(next);
-    if (speed > params.speed_limit) {
-        next *= params.speed_limit / speed;
+    // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
+    let square = dot(next, next);
+    let fast = square > params.speed_limit * params.speed_limit;
+    for (var once = select(1u, 0u, fast); once == 0u; once++) {
+        next *= params.speed_limit * inverseSqrt(square);
         atomicAdd(&clamped_nodes, 1u);
     }
     var held = select(0u, params.fixed_x_min, i == 0u) | select(0u, params.fixed_x_max, i + 1u == params.nodes_x);

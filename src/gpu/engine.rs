@@ -225,6 +225,29 @@ impl GpuEngine {
         self.buffers.iter().map(|(n, b)| (*n, b.size())).collect()
     }
 
+    /// Wall and process CPU time of one dispatch of every stage [s], each repeated `repeats` times by itself. The state
+    /// means nothing afterwards.
+    pub fn time_stages(&mut self, repeats: u32) -> Result<Vec<(Stage, f64, Option<f64>)>> {
+        while self.collect_oldest(true)? {}
+        let mut times = Vec::new();
+        for kernel in &self.kernels {
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                for _ in 0..repeats {
+                    kernel.encode(&mut pass, 0);
+                }
+            }
+            let (begin, cpu) = (std::time::Instant::now(), crate::process::cpu_seconds());
+            self.gpu.queue.submit([encoder.finish()]);
+            self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| Error::Device(e.to_string()))?;
+            let wall = begin.elapsed().as_secs_f64() / f64::from(repeats);
+            let cpu = crate::process::cpu_seconds().zip(cpu).map(|(b, a)| (b - a) / f64::from(repeats));
+            times.push((kernel.stage, wall, cpu));
+        }
+        Ok(times)
+    }
+
     fn collect_oldest(&mut self, wait: bool) -> Result<bool> {
         let Some(front) = self.in_flight.front() else { return Ok(false) };
         let poll = if wait {
@@ -590,6 +613,9 @@ fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Para
 fn puncture_params(model: &Model) -> PunctureParams {
     model.puncture.as_ref().map_or(PunctureParams::zeroed(), |plan| {
         let p = plan.params;
+        // s0 depends on z alone, and an anchor acts on the two node planes around it.
+        let tallest = model.mesh.lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
         PunctureParams {
             puncture_force: p.puncture_force as f32,
             cutting_force: p.cutting_force as f32,
@@ -601,8 +627,8 @@ fn puncture_params(model: &Model) -> PunctureParams {
             entry_fade: p.entry_fade as f32,
             needle_radius: plan.needle.radius as f32,
             tip_length: plan.needle.tip_length as f32,
+            anchor_reach: anchor_reach as f32,
             path_cell_count: plan.cells.len() as u32,
-            _pad: 0,
         }
     })
 }
