@@ -23,7 +23,7 @@ use crate::scene::{
 use crate::solver::cpu::CpuEngine;
 use crate::solver::engine::{Engine, FramePlan, StepInput};
 use crate::solver::simulation::EngineChoice;
-use crate::solver::stable_dt::stable_step;
+use crate::solver::stable_dt::wave_speed_bound;
 
 /// What the command line chooses.
 #[derive(Debug, Clone)]
@@ -164,7 +164,7 @@ impl Subject {
         let scene = scene(cells, needle);
         let mesh = uniform_mesh(cells, scene.tissue.cell_size);
         let model = Arc::new(Model::new(scene, mesh));
-        let dt = 0.8 * stable_step(&model).wave_speed;
+        let dt = 0.8 * wave_speed_bound(&model);
         let engine: Box<dyn Engine> = match gpu {
             Some(gpu) => Box::new(GpuEngine::new(model.clone(), gpu.clone(), dt, max_steps)?),
             None => Box::new(CpuEngine::new(model.clone(), dt)),

@@ -6,6 +6,7 @@ use std::time::Instant;
 use crate::error::Result;
 use crate::material::describe_verdict;
 use crate::scene::{Face, Scene, Tool};
+use crate::solver::stable_dt::power_iteration;
 use crate::solver::simulation::{EngineChoice, Simulation};
 
 /// Wall time that the trial of the prediction may take [s].
@@ -92,8 +93,8 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     line(format!("mass scaling {}", model.mass_scaling()));
     line(format!(
         "stable step  {:.3} us (wave-speed bound; power iteration {:.3} us)",
-        simulation.stable.wave_speed * 1e6,
-        simulation.stable.power_iteration * 1e6
+        simulation.stable_dt * 1e6,
+        power_iteration(&model) * 1e6
     ));
     line(format!(
         "step         {:.3} us{}, {} steps, {} frames, {:.3} s simulated",

@@ -124,7 +124,7 @@ pub fn run(
         cells: mesh.cell_count() as u64,
         nodes: mesh.node_count() as u64,
         dt_s: simulation.dt,
-        stable_dt_s: simulation.stable.limit(),
+        stable_dt_s: simulation.stable_dt,
         mass_scaling: simulation.model.mass_scaling(),
         steps,
         simulated_s: simulated,

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use bytemuck::Zeroable;
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::kernel::{Kernel, Reflected, STEP_INPUT, reflect};
@@ -138,8 +139,9 @@ impl GpuEngine {
         let layers = if gpu.is_software() { 8 } else { 4 };
         let strips = Strips::new(model.mesh.cells(), layers);
         let defines = defines(&model.effects, !model.node_load.is_empty(), model.has_driven_faces());
+        // Composing, validating and compiling go side by side: they are most of the time to the first step.
         let reflected = stages(&model.effects)
-            .into_iter()
+            .into_par_iter()
             .map(|stage| reflect(stage, &defines))
             .collect::<Result<Vec<Reflected>>>()?;
         let measure_threads = measure_threads(&model);
@@ -162,7 +164,7 @@ impl GpuEngine {
             buffers.insert(*name, buffer);
         }
         let kernels = reflected
-            .into_iter()
+            .into_par_iter()
             .map(|r| {
                 let threads = threads(r.stage, &model, &strips, measure_threads);
                 Kernel::new(&gpu.device, r, &buffers, size_of::<StepInput>() as u64, threads)
