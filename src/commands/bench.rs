@@ -319,9 +319,7 @@ fn copy_bandwidth(gpu: &Gpu) -> Result<f64> {
         }
         let begin = Instant::now();
         gpu.queue.submit([encoder.finish()]);
-        gpu.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| crate::Error::Device(e.to_string()))?;
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| crate::Error::Device(e.to_string()))?;
         best = best.min(begin.elapsed().as_secs_f64());
     }
     Ok(2.0 * 20.0 * SIZE as f64 / best)

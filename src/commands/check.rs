@@ -6,8 +6,8 @@ use std::time::Instant;
 use crate::error::Result;
 use crate::material::describe_verdict;
 use crate::scene::{Face, Scene, Tool};
-use crate::solver::stable_dt::power_iteration;
 use crate::solver::simulation::{EngineChoice, Simulation};
+use crate::solver::stable_dt::power_iteration;
 
 /// Wall time that the trial of the prediction may take [s].
 const TRIAL: f64 = 0.5;
@@ -61,7 +61,8 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         .into_iter()
         .map(|f| {
             let c = &scene.faces[f as usize];
-            let fixed: String = ["x", "y", "z"].into_iter().zip(c.fixed).filter(|(_, on)| *on).map(|(n, _)| n).collect();
+            let fixed: String =
+                ["x", "y", "z"].into_iter().zip(c.fixed).filter(|(_, on)| *on).map(|(n, _)| n).collect();
             let moved = if c.drive.is_some() { " moved" } else { "" };
             let loaded = if c.traction.is_some() { " loaded" } else { "" };
             let held = if fixed.is_empty() { "free".into() } else { format!("{fixed} held") };

@@ -31,11 +31,8 @@ fn adapters_of(backends: wgpu::Backends) -> Result<Vec<wgpu::Adapter>> {
     if let Ok(wanted) = std::env::var("WGPU_BACKEND") {
         // wgpu skips names that it does not know; a mistyped one must not silently mean "all" or "none".
         const KNOWN: [&str; 9] = ["vulkan", "vk", "metal", "mtl", "dx12", "d3d12", "gl", "opengl", "gles"];
-        let unknown: Vec<&str> = wanted
-            .split(',')
-            .map(str::trim)
-            .filter(|w| !KNOWN.contains(&w.to_lowercase().as_str()))
-            .collect();
+        let unknown: Vec<&str> =
+            wanted.split(',').map(str::trim).filter(|w| !KNOWN.contains(&w.to_lowercase().as_str())).collect();
         if !unknown.is_empty() {
             return Err(Error::Adapter {
                 message: format!("WGPU_BACKEND: there is no backend `{}`", unknown.join("`, `")),
@@ -79,9 +76,7 @@ impl Gpu {
         let wanted = std::env::var("WGPU_ADAPTER_NAME").ok().filter(|w| !w.is_empty());
         let adapter = match &wanted {
             None => found.first(),
-            Some(name) => found
-                .iter()
-                .find(|a| a.get_info().name.to_lowercase().contains(&name.to_lowercase())),
+            Some(name) => found.iter().find(|a| a.get_info().name.to_lowercase().contains(&name.to_lowercase())),
         };
         let Some(adapter) = adapter else {
             return Err(match wanted {

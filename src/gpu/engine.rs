@@ -67,13 +67,7 @@ impl Strips {
     fn new(cells: [usize; 3], layers: u32) -> Self {
         let [x, y, z] = cells.map(|c| c as u32);
         let layers = layers.clamp(1, z);
-        Strips {
-            layers,
-            count: z.div_ceil(layers),
-            columns: x * y,
-            padded_columns: (x + 2) * (y + 2),
-            cells_x: x,
-        }
+        Strips { layers, count: z.div_ceil(layers), columns: x * y, padded_columns: (x + 2) * (y + 2), cells_x: x }
     }
 
     fn slots(&self) -> u64 {
@@ -456,14 +450,7 @@ fn vec4(v: DVec3) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
 }
 
-fn contents(
-    name: &str,
-    model: &Model,
-    strips: &Strips,
-    dt: f64,
-    measure_threads: u32,
-    max_steps: usize,
-) -> Contents {
+fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads: u32, max_steps: usize) -> Contents {
     let nodes = model.mesh.node_count() as u64;
     let contacts = model.contact_nodes.len().max(1) as u64;
     let zeros = |count: u64, size: usize| Contents::Zeros(count * size as u64);
@@ -575,11 +562,7 @@ fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Para
     let [cx, cy, cz] = model.mesh.cells().map(|c| c as u32);
     let law = model.scene.material.law;
     let solver = &model.scene.solver;
-    let fixed: Vec<u32> = model
-        .faces()
-        .iter()
-        .map(|f| (0..3).map(|a| u32::from(f.fixed[a]) << a).sum())
-        .collect();
+    let fixed: Vec<u32> = model.faces().iter().map(|f| (0..3).map(|a| u32::from(f.fixed[a]) << a).sum()).collect();
     Params {
         cells_x: cx,
         cells_y: cy,
@@ -853,11 +836,8 @@ impl Engine for GpuEngine {
             for k in first..=(first + strips.layers).min(nz as u32) {
                 for (j, i, corner) in (0..ny).flat_map(|j| (0..nx).flat_map(move |i| (0..4).map(move |c| (j, i, c)))) {
                     let f = slots[strips.slot(strip, k, corner, i as u32, j as u32) as usize];
-                    let node = self.model.mesh.node_index(
-                        i + (corner & 1) as usize,
-                        j + (corner >> 1) as usize,
-                        k as usize,
-                    );
+                    let node =
+                        self.model.mesh.node_index(i + (corner & 1) as usize, j + (corner >> 1) as usize, k as usize);
                     force[node] -= DVec3::new(f[0].into(), f[1].into(), f[2].into());
                 }
             }

@@ -45,13 +45,7 @@ impl Kinematics {
             time += duration;
             depth = target;
         }
-        Kinematics {
-            entry: motion.entry,
-            direction: motion.direction,
-            pieces,
-            end: time,
-            end_depth: depth,
-        }
+        Kinematics { entry: motion.entry, direction: motion.direction, pieces, end: time, end_depth: depth }
     }
 
     /// Length of the motion [s].

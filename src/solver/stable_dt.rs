@@ -59,11 +59,7 @@ pub fn power_iteration(model: &Model) -> f64 {
         let scale = 1e-5 * smallest / largest;
         let u: Vec<DVec3> = mode.iter().map(|v| *v * scale).collect();
         let force = elements.internal_forces(model, &u, &[]);
-        let next: Vec<DVec3> = force
-            .par_iter()
-            .zip(&model.node_mass)
-            .map(|(f, m)| *f / (*m * scale))
-            .collect();
+        let next: Vec<DVec3> = force.par_iter().zip(&model.node_mass).map(|(f, m)| *f / (*m * scale)).collect();
         // Rayleigh quotient with the mass matrix.
         let (mut top, mut bottom) = (0.0, 0.0);
         for ((v, a), m) in mode.iter().zip(&next).zip(&model.node_mass) {
