@@ -14,7 +14,7 @@ missing=()
 command -v cc >/dev/null || missing+=(gcc libc6-dev)
 if [ "$(uname -s)" = Linux ]; then
     # The loader: any directory that the linker cache knows.
-    { ldconfig -p 2>/dev/null || /sbin/ldconfig -p; } | grep -q 'libvulkan\.so\.1' || missing+=(libvulkan1)
+    { ldconfig -p 2>/dev/null || /sbin/ldconfig -p; } | grep 'libvulkan\.so\.1' >/dev/null || missing+=(libvulkan1)
     # A driver: a manifest where the loader looks, or one named by the user.
     shopt -s nullglob
     manifests=(/usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json /usr/local/share/vulkan/icd.d/*.json

@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::error::Result;
 use crate::material::describe_verdict;
 use crate::scene::{Face, Scene, Tool};
-use crate::solver::simulation::{EngineChoice, Simulation};
+use crate::solver::simulation::{EngineChoice, Simulation, tool_mach};
 use crate::solver::stable_dt::power_iteration;
 
 /// Wall time that the trial of the prediction may take [s].
@@ -81,13 +81,10 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
             k.deepest() * 1e3,
             k.top_speed() * 1e3
         ));
-        let mach = k.top_speed() / wave(law.shear_modulus()) * model.mass_scaling().sqrt();
-        line(format!(
-            "             tool speed over scaled shear wave speed {mach:.4}{}",
-            if mach > 0.1 { ": inertia will show in the force; lower the mass scaling" } else { "" }
-        ));
+        let mach = tool_mach(&model).unwrap_or(0.0);
+        line(format!("             tool speed over scaled shear wave speed {mach:.4}"));
     }
-    line(format!("effects      {}", if scene.effects.keys().is_empty() { "none" } else { "" }));
+    line(format!("effects      {}", if scene.effects.keys().is_empty() { "none" } else { "only these run:" }));
     for effect in scene.effects.active() {
         line(format!("  {:<13}{}; cost: {}", effect.key, effect.summary, effect.cost));
     }

@@ -77,6 +77,12 @@ pub fn choose_step(model: &Model, stable_dt: f64) -> (f64, u64) {
     (frame / steps, steps as u64)
 }
 
+/// Largest tool speed over the shear wave speed at the scaled density; `None` without a tool.
+pub fn tool_mach(model: &Model) -> Option<f64> {
+    let wave = (model.scene.material.law.shear_modulus() / model.scaled_density()).sqrt();
+    model.kinematics.as_ref().map(|k| k.top_speed() / wave)
+}
+
 impl Simulation {
     /// Prepares a scene: mesh, model, stable step, engine.
     ///
@@ -118,6 +124,12 @@ impl Simulation {
                 dt * 1e6,
                 stable_dt * 1e6,
                 limit * 1e6
+            ));
+        }
+        if let Some(mach) = tool_mach(&model).filter(|m| *m > 0.1) {
+            notices.push(format!(
+                "the tool moves at {mach:.2} of the scaled shear wave speed: inertia will show in the force; lower \
+                 solver.mass_scaling (\"auto\" keeps it below 0.03)"
             ));
         }
         let engine: Box<dyn Engine> = match &device {
