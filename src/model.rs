@@ -140,7 +140,7 @@ impl Model {
         };
         let needle = needle.clone();
         let path = PlannedPath { entry: self.scene.motion.entry, direction: self.scene.motion.direction };
-        let deepest = self.kinematics.as_ref().map_or(0.0, Kinematics::deepest);
+        let deepest = self.scene.motion.deepest();
         let mesh = &self.mesh;
         let cells = path_cells(mesh, &path, params.softened_radius, deepest);
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the needle radius.
@@ -211,6 +211,22 @@ impl Model {
     /// Conditions of the faces.
     pub fn faces(&self) -> &[FaceCondition; 6] {
         &self.scene.faces
+    }
+
+    /// Which displacement components of a node are held or driven by a face.
+    pub fn fixed_components(&self, node: usize) -> [bool; 3] {
+        let c = self.mesh.node_coordinates(node);
+        let n = self.mesh.nodes();
+        let mut fixed = [false; 3];
+        for face in Face::ALL {
+            let a = face.axis();
+            if c[a] == if face.is_max() { n[a] - 1 } else { 0 } {
+                for (f, g) in fixed.iter_mut().zip(self.faces()[face as usize].fixed) {
+                    *f |= g;
+                }
+            }
+        }
+        fixed
     }
 
     /// True where a face moves by prescription.

@@ -86,7 +86,7 @@ fn the_main_scene_is_read_in_si() {
     assert!((scene.material.law.c10 - 9520.0).abs() < 1e-9);
     assert!((scene.material.law.bulk_modulus - 5.0e5).abs() < 1e-6);
     assert!((scene.motion.deepest() - 12.0e-3).abs() < 1e-12);
-    assert!((scene.motion.duration() - 12.5).abs() < 1e-9);
+    assert!((stylet::needle::Kinematics::new(&scene.motion).duration() - 12.5).abs() < 1e-9);
     assert_eq!(scene.outputs.pictures_at.len(), 4);
     assert_eq!(scene.faces[5].fixed, [false; 3]);
     assert_eq!(scene.faces[4].fixed, [true; 3]);

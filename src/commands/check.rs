@@ -78,8 +78,8 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
             "motion       {} phases, {:.3} s, to {:.2} mm, at most {:.2} mm/s",
             scene.motion.phases.len(),
             k.duration(),
-            k.deepest() * 1e3,
-            k.top_speed() * 1e3
+            scene.motion.deepest() * 1e3,
+            scene.motion.largest_speed() * 1e3
         ));
         let mach = tool_mach(&model).unwrap_or(0.0);
         line(format!("             tool speed over scaled shear wave speed {mach:.4}"));

@@ -53,12 +53,6 @@ impl Kinematics {
         self.end
     }
 
-    /// Largest depth that is reached [m].
-    pub fn deepest(&self) -> f64 {
-        let ends = self.pieces.iter().map(|p| p.1);
-        ends.fold(self.end_depth, f64::max)
-    }
-
     /// First time at which the tool gets as deep as `depth` [s]; `None` where it never does.
     pub fn time_of_depth(&self, depth: f64) -> Option<f64> {
         let ends = self.pieces.iter().skip(1).map(|p| p.0).chain([self.end]);
@@ -66,11 +60,6 @@ impl Kinematics {
             let reached = from + rate * (end - start) >= depth - 1e-9;
             (rate > 0.0 && from <= depth && reached).then(|| (start + (depth - from) / rate).min(end))
         })
-    }
-
-    /// Largest speed of the motion [m/s].
-    pub fn top_speed(&self) -> f64 {
-        self.pieces.iter().map(|p| p.2.abs()).fold(0.0, f64::max)
     }
 
     /// Pose at `time` [s]; after the end the tool stands still.

@@ -197,22 +197,6 @@ impl Motion {
             Phase::Hold { .. } => largest,
         })
     }
-
-    /// Time that all phases take [s].
-    pub fn duration(&self) -> f64 {
-        let mut at = 0.0;
-        let mut time = 0.0;
-        for phase in &self.phases {
-            match *phase {
-                Phase::Insert { speed, depth } | Phase::Withdraw { speed, depth } => {
-                    time += (depth - at).abs() / speed;
-                    at = depth;
-                }
-                Phase::Hold { duration } => time += duration,
-            }
-        }
-        time
-    }
 }
 
 /// One phase of the motion. Depth is measured along the direction from the entry point [m].

@@ -6,7 +6,6 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
-use super::stable_dt::fixed_components;
 use crate::error::{Error, Result};
 use crate::material::MooneyRivlin;
 use crate::material::mooney_rivlin::{cofactor, jacobian_minus_one};
@@ -594,7 +593,7 @@ impl CpuEngine {
                 }
                 let mut free_mid = 0.5 * (old + new);
                 let mut work = 0.0;
-                let fixed = fixed_components(&model, node);
+                let fixed = model.fixed_components(node);
                 if fixed.contains(&true) {
                     let prescribed = prescribed_velocity(&model, node, input, dt);
                     for a in 0..3 {

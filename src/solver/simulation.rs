@@ -80,7 +80,7 @@ pub fn choose_step(model: &Model, stable_dt: f64) -> (f64, u64) {
 /// Largest tool speed over the shear wave speed at the scaled density; `None` without a tool.
 pub fn tool_mach(model: &Model) -> Option<f64> {
     let wave = (model.scene.material.law.shear_modulus() / model.scaled_density()).sqrt();
-    model.kinematics.as_ref().map(|k| k.top_speed() / wave)
+    model.kinematics.is_some().then(|| model.scene.motion.largest_speed() / wave)
 }
 
 impl Simulation {

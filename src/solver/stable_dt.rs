@@ -45,7 +45,7 @@ pub fn power_iteration(model: &Model) -> f64 {
     let mut omega_squared = 0.0;
     for _ in 0..ITERATIONS {
         for (node, value) in mode.iter_mut().enumerate() {
-            let fixed = fixed_components(model, node);
+            let fixed = model.fixed_components(node);
             for a in 0..3 {
                 if fixed[a] {
                     value[a] = 0.0;
@@ -71,20 +71,4 @@ pub fn power_iteration(model: &Model) -> f64 {
         mode = next.into_iter().map(|v| v / largest).collect();
     }
     2.0 / omega_squared.sqrt()
-}
-
-/// Which displacement components of a node are held or driven by a face.
-pub fn fixed_components(model: &Model, node: usize) -> [bool; 3] {
-    let c = model.mesh.node_coordinates(node);
-    let n = model.mesh.nodes();
-    let mut fixed = [false; 3];
-    for face in crate::scene::Face::ALL {
-        let a = face.axis();
-        if c[a] == if face.is_max() { n[a] - 1 } else { 0 } {
-            for (f, g) in fixed.iter_mut().zip(model.faces()[face as usize].fixed) {
-                *f |= g;
-            }
-        }
-    }
-    fixed
 }
