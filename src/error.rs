@@ -26,35 +26,21 @@ pub enum Error {
     Device(String),
     /// The simulation left the range in which its numbers mean something.
     #[error("run stopped in frame {frame} (step {step}, t = {time_s:.6} s): {message}")]
-    Diverged {
-        frame: u64,
-        step: u64,
-        time_s: f64,
-        message: String,
-    },
+    Diverged { frame: u64, step: u64, time_s: f64, message: String },
     /// A file could not be written or read.
     #[error("{path}: {source}")]
-    File {
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    File { path: PathBuf, source: std::io::Error },
 }
 
 impl Error {
     /// A wrong input with its way out.
     pub fn input(message: impl Into<String>, way_out: impl Into<String>) -> Self {
-        Error::Input {
-            message: message.into(),
-            way_out: way_out.into(),
-        }
+        Error::Input { message: message.into(), way_out: way_out.into() }
     }
 
     /// A file error with the path that it concerns.
     pub fn file(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
-        Error::File {
-            path: path.into(),
-            source,
-        }
+        Error::File { path: path.into(), source }
     }
 
     /// Exit code of the program: 2 where the user's input is wrong, 1 otherwise.

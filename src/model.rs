@@ -80,12 +80,9 @@ impl Model {
     pub fn new(scene: Scene, mesh: BlockMesh) -> Self {
         let scaling = scene.effects.mass_scaling.map_or(1.0, |m| m.factor);
         let density = scene.material.density * scaling;
-        let node_mass = (0..mesh.node_count())
-            .map(|n| density * mesh.node_volume(n))
-            .collect();
+        let node_mass = (0..mesh.node_count()).map(|n| density * mesh.node_volume(n)).collect();
         let (node_load, load_ramp) = nodal_loads(&scene, &mesh);
-        let kinematics =
-            (!scene.motion.phases.is_empty()).then(|| Kinematics::new(&scene.motion));
+        let kinematics = (!scene.motion.phases.is_empty()).then(|| Kinematics::new(&scene.motion));
         let mut model = Model {
             effects: scene.effects.clone(),
             node_mass,
@@ -138,16 +135,12 @@ impl Model {
     }
 
     fn plan_puncture(&mut self) {
-        let (Some(params), Some(Tool::Needle(needle))) = (self.effects.puncture, &self.scene.tool)
-        else {
+        let (Some(params), Some(Tool::Needle(needle))) = (self.effects.puncture, &self.scene.tool) else {
             return;
         };
         let needle = needle.clone();
-        let path = PlannedPath {
-            entry: self.scene.motion.entry,
-            direction: self.scene.motion.direction,
-        };
-        let deepest = self.kinematics.as_ref().map_or(0.0, Kinematics::deepest);
+        let path = PlannedPath { entry: self.scene.motion.entry, direction: self.scene.motion.direction };
+        let deepest = self.scene.motion.deepest();
         let mesh = &self.mesh;
         let cells = path_cells(mesh, &path, params.softened_radius, deepest);
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the needle radius.
@@ -220,6 +213,22 @@ impl Model {
         &self.scene.faces
     }
 
+    /// Which displacement components of a node are held or driven by a face.
+    pub fn fixed_components(&self, node: usize) -> [bool; 3] {
+        let c = self.mesh.node_coordinates(node);
+        let n = self.mesh.nodes();
+        let mut fixed = [false; 3];
+        for face in Face::ALL {
+            let a = face.axis();
+            if c[a] == if face.is_max() { n[a] - 1 } else { 0 } {
+                for (f, g) in fixed.iter_mut().zip(self.faces()[face as usize].fixed) {
+                    *f |= g;
+                }
+            }
+        }
+        fixed
+    }
+
     /// True where a face moves by prescription.
     pub fn has_driven_faces(&self) -> bool {
         self.scene.faces.iter().any(|f| f.drive.is_some())
@@ -247,17 +256,12 @@ fn tip_anchors(path: &PlannedPath, radius: f64) -> Vec<TipAnchor> {
             (e1 * angle.cos() + e2 * angle.sin()) * r
         })
     };
-    let offsets = std::iter::once(DVec3::ZERO)
-        .chain(ring(6, 0.5 * radius))
-        .chain(ring(12, radius));
+    let offsets = std::iter::once(DVec3::ZERO).chain(ring(6, 0.5 * radius)).chain(ring(12, radius));
     offsets
         .map(|o| {
             // The line entry + o + t s meets z = 0 at s = -o.z / t.z.
             let axial_offset = -o.z / path.direction.z;
-            TipAnchor {
-                surface: path.entry + o + path.direction * axial_offset,
-                axial_offset,
-            }
+            TipAnchor { surface: path.entry + o + path.direction * axial_offset, axial_offset }
         })
         .collect()
 }
@@ -277,11 +281,7 @@ fn path_cells(mesh: &BlockMesh, path: &PlannedPath, radius: f64, deepest: f64) -
             let (mut inside, mut start, mut end) = (0usize, f64::INFINITY, f64::NEG_INFINITY);
             for n in 0..SAMPLES.pow(3) {
                 let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
-                let at = DVec3::new(
-                    part(n % SAMPLES),
-                    part(n / SAMPLES % SAMPLES),
-                    part(n / SAMPLES.pow(2)),
-                );
+                let at = DVec3::new(part(n % SAMPLES), part(n / SAMPLES % SAMPLES), part(n / SAMPLES.pow(2)));
                 let (r0, s0) = path.material_coordinates(low + at * size);
                 if r0 < radius {
                     inside += 1;
@@ -301,10 +301,7 @@ fn path_cells(mesh: &BlockMesh, path: &PlannedPath, radius: f64, deepest: f64) -
 
 /// Nodal forces of all face tractions at full ramp [N], and the ramp time [s].
 fn nodal_loads(scene: &Scene, mesh: &BlockMesh) -> (Vec<DVec3>, f64) {
-    let loaded: Vec<Face> = Face::ALL
-        .into_iter()
-        .filter(|&f| scene.faces[f as usize].traction.is_some())
-        .collect();
+    let loaded: Vec<Face> = Face::ALL.into_iter().filter(|&f| scene.faces[f as usize].traction.is_some()).collect();
     if loaded.is_empty() {
         return (Vec::new(), 0.0);
     }
@@ -317,12 +314,8 @@ fn nodal_loads(scene: &Scene, mesh: &BlockMesh) -> (Vec<DVec3>, f64) {
         let axis = face.axis();
         let plane = if face.is_max() { mesh.nodes()[axis] - 1 } else { 0 };
         let lines = &mesh.lines[axis];
-        let half = 0.5
-            * if face.is_max() {
-                lines[lines.len() - 1] - lines[lines.len() - 2]
-            } else {
-                lines[1] - lines[0]
-            };
+        let half =
+            0.5 * if face.is_max() { lines[lines.len() - 1] - lines[lines.len() - 2] } else { lines[1] - lines[0] };
         for (node, force) in load.iter_mut().enumerate() {
             if mesh.node_coordinates(node)[axis] == plane {
                 *force += traction * (mesh.node_volume(node) / half);

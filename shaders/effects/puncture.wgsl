@@ -15,8 +15,9 @@ struct PunctureParams {
     // Radius and cone length of the needle [m].
     needle_radius: f32,
     tip_length: f32,
+    // Nodes farther than this from the tip coordinate along the path are on no cell that holds an anchor [m].
+    anchor_reach: f32,
     path_cell_count: u32,
-    _pad: u32,
 }
 
 // Material line parallel to the path: where it enters the surface [m], w: unused.

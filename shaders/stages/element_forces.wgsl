@@ -31,10 +31,10 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     if (thread >= params.column_count * params.strip_count) {
         return;
     }
-    let column = thread % params.column_count;
-    let strip = thread / params.column_count;
-    let i = column % params.cells_x;
-    let j = column / params.cells_x;
+    let strip = quotient(thread, params.column_count);
+    let column = thread - strip * params.column_count;
+    let j = quotient(column, params.cells_x);
+    let i = column - j * params.cells_x;
     let first = strip * params.strip_layers;
     let last = min(first + params.strip_layers, params.cells_z);
 

@@ -39,12 +39,12 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     if (node >= layer * params.nodes_z) {
         return;
     }
-    let k = node / layer;
-    let j = (node - k * layer) / params.nodes_x;
+    let k = quotient(node, layer);
+    let j = quotient(node - k * layer, params.nodes_x);
     let i = node - k * layer - j * params.nodes_x;
 
     // One strip, or two where the node lies on the plane between them.
-    let above = k / params.strip_layers;
+    let above = quotient(k, params.strip_layers);
     let last = min(above, params.strip_count - 1u);
     let first = select(last, above - 1u, k > 0u && above * params.strip_layers == k);
     let stride = params.padded_columns;
@@ -80,9 +80,11 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let is_free = vec3<f32>((vec3<u32>(held) & vec3<u32>(1u, 2u, 4u)) == vec3<u32>(0u));
     // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
     next *= is_free;
-    let speed = length(next);
-    if (speed > params.speed_limit) {
-        next *= params.speed_limit / speed;
+    // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
+    let square = dot(next, next);
+    let fast = square > params.speed_limit * params.speed_limit;
+    for (var once = select(1u, 0u, fast); once == 0u; once++) {
+        next *= params.speed_limit * inverseSqrt(square);
         atomicAdd(&clamped_nodes, 1u);
     }
     var prescribed = vec3<f32>(0.0);

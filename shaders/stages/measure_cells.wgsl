@@ -24,8 +24,8 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     sums.min_jacobian = 1e30;
     sums.min_corner_jacobian = 1e30;
     for (var index = thread; index < count; index += params.measure_threads) {
-        let k = index / layer;
-        let j = (index - k * layer) / params.cells_x;
+        let k = quotient(index, layer);
+        let j = quotient(index - k * layer, params.cells_x);
         let cell = vec3<u32>(index - k * layer - j * params.cells_x, j, k);
         var u: array<vec3<f32>, 8>;
         // Relative to the first corner in integers: differences stay exact.

@@ -15,10 +15,12 @@
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
 
-// Share of the tip springs that acts on a grid node, along the insertion direction [N].
-fn tip_share(grid: vec3<u32>) -> f32 {
+// Share of the tip springs that acts on a grid node, along the insertion direction [N]. The loop is empty for nodes
+// that no anchor can reach.
+fn tip_share(grid: vec3<u32>, rest_axial: f32) -> f32 {
     var force = 0.0;
-    for (var anchor = 0u; anchor < ANCHOR_COUNT; anchor++) {
+    let near = abs(rest_axial - tip_state.coordinate) <= puncture.anchor_reach;
+    for (var anchor = select(ANCHOR_COUNT, 0u, near); anchor < ANCHOR_COUNT; anchor++) {
         let cell = tip_anchor_loads[anchor].cell.xyz;
         let local = tip_anchor_loads[anchor].local.xyz;
         let weight = select(vec3<f32>(0.0), 1.0 - local, grid == cell)
@@ -35,16 +37,18 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         return;
     }
     let contact = contact_nodes[index];
-    let x = contact.rest.xyz + vec3<f32>(node_displacement[contact.node].xyz) * DISPLACEMENT_UNIT;
-    let lever = x - step_input.tip.xyz;
-    let tip = step_input.direction.xyz * tip_share(contact.grid.xyz);
+    let lever = contact.rest.xyz + vec3<f32>(node_displacement[contact.node].xyz) * DISPLACEMENT_UNIT
+        - step_input.tip.xyz;
+    let tip = step_input.direction.xyz * tip_share(contact.grid.xyz, contact.rest_axial);
+    let d = -step_input.direction.xyz;
+    let s = dot(lever, d);
+    let passed = contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0;
     var normal = vec3<f32>(0.0);
     var tangential = vec3<f32>(0.0);
     var stored = 0.0;
-    let d = -step_input.direction.xyz;
-    let s = dot(lever, d);
-    var memory = contact_memory[index];
-    if (contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0) {
+    // Loops that run once or not at all: software adapters skip them, where they would walk through an `if`.
+    for (var once = select(1u, 0u, passed); once == 0u; once++) {
+        var memory = contact_memory[index];
         let radial = lever - d * s;
         let r = length(radial);
         let e = radial * select(0.0, 1.0 / r, r > 1e-9);
@@ -69,10 +73,9 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let damping = 2.0 * puncture.contact_damping * sqrt(k * contact.mass);
         let pressure = select(0.0, max(0.0, k * depth - damping * vn), depth > 0.0);
         normal = n * pressure;
-        if (depth > 0.0) {
-            stored = 0.5 * k * depth * depth;
-            contact_sums[index].damping_dissipation += (k * depth - pressure) * vn * params.dt;
-        }
+        stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
+        contact_sums[index].damping_dissipation +=
+            select(0.0, (k * depth - pressure) * vn * params.dt, depth > 0.0);
 #ifdef FRICTION
         let kt = friction.stiffness_ratio * k;
         let grown = clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);
@@ -84,14 +87,16 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         contact_sums[index].sliding_dissipation += kt * dot(stretch, trial - stretch);
         stored += 0.5 * kt * dot(stretch, stretch);
 #endif
-    } else {
-        memory.stick = vec4<f32>(0.0);
-        memory.overlap = 0.0;
-        memory.axial_on = 0.0;
-        memory.touching = 0.0;
+        contact_memory[index] = memory;
     }
-    contact_memory[index] = memory;
+    let total = tip + normal + tangential;
+    for (var once = select(1u, 0u, dot(total, total) > 0.0); once == 0u; once++) {
+        corner_force[contact.slot] += vec4<f32>(total, 0.0);
+        book_contact(index, tip, normal, tangential, lever);
+    }
     contact_sums[index].stored = stored;
-    corner_force[contact.slot] += vec4<f32>(tip + normal + tangential, 0.0);
-    book_contact(index, tip, normal, tangential, lever);
+    // A node that the needle has left forgets.
+    for (var once = select(0u, 1u, passed); once == 0u && contact_memory[index].touching != 0.0; once++) {
+        contact_memory[index] = ContactMemory();
+    }
 }

@@ -23,7 +23,7 @@ use crate::scene::{
 use crate::solver::cpu::CpuEngine;
 use crate::solver::engine::{Engine, FramePlan, StepInput};
 use crate::solver::simulation::EngineChoice;
-use crate::solver::stable_dt::stable_step;
+use crate::solver::stable_dt::wave_speed_bound;
 
 /// What the command line chooses.
 #[derive(Debug, Clone)]
@@ -164,7 +164,7 @@ impl Subject {
         let scene = scene(cells, needle);
         let mesh = uniform_mesh(cells, scene.tissue.cell_size);
         let model = Arc::new(Model::new(scene, mesh));
-        let dt = 0.8 * stable_step(&model).wave_speed;
+        let dt = 0.8 * wave_speed_bound(&model);
         let engine: Box<dyn Engine> = match gpu {
             Some(gpu) => Box::new(GpuEngine::new(model.clone(), gpu.clone(), dt, max_steps)?),
             None => Box::new(CpuEngine::new(model.clone(), dt)),
@@ -319,9 +319,7 @@ fn copy_bandwidth(gpu: &Gpu) -> Result<f64> {
         }
         let begin = Instant::now();
         gpu.queue.submit([encoder.finish()]);
-        gpu.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| crate::Error::Device(e.to_string()))?;
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| crate::Error::Device(e.to_string()))?;
         best = best.min(begin.elapsed().as_secs_f64());
     }
     Ok(2.0 * 20.0 * SIZE as f64 / best)

@@ -6,7 +6,8 @@ use std::time::Instant;
 use crate::error::Result;
 use crate::material::describe_verdict;
 use crate::scene::{Face, Scene, Tool};
-use crate::solver::simulation::{EngineChoice, Simulation};
+use crate::solver::simulation::{EngineChoice, Simulation, tool_mach};
+use crate::solver::stable_dt::power_iteration;
 
 /// Wall time that the trial of the prediction may take [s].
 const TRIAL: f64 = 0.5;
@@ -60,7 +61,8 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         .into_iter()
         .map(|f| {
             let c = &scene.faces[f as usize];
-            let fixed: String = ["x", "y", "z"].into_iter().zip(c.fixed).filter(|(_, on)| *on).map(|(n, _)| n).collect();
+            let fixed: String =
+                ["x", "y", "z"].into_iter().zip(c.fixed).filter(|(_, on)| *on).map(|(n, _)| n).collect();
             let moved = if c.drive.is_some() { " moved" } else { "" };
             let loaded = if c.traction.is_some() { " loaded" } else { "" };
             let held = if fixed.is_empty() { "free".into() } else { format!("{fixed} held") };
@@ -76,24 +78,21 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
             "motion       {} phases, {:.3} s, to {:.2} mm, at most {:.2} mm/s",
             scene.motion.phases.len(),
             k.duration(),
-            k.deepest() * 1e3,
-            k.top_speed() * 1e3
+            scene.motion.deepest() * 1e3,
+            scene.motion.largest_speed() * 1e3
         ));
-        let mach = k.top_speed() / wave(law.shear_modulus()) * model.mass_scaling().sqrt();
-        line(format!(
-            "             tool speed over scaled shear wave speed {mach:.4}{}",
-            if mach > 0.1 { ": inertia will show in the force; lower the mass scaling" } else { "" }
-        ));
+        let mach = tool_mach(&model).unwrap_or(0.0);
+        line(format!("             tool speed over scaled shear wave speed {mach:.4}"));
     }
-    line(format!("effects      {}", if scene.effects.keys().is_empty() { "none" } else { "" }));
+    line(format!("effects      {}", if scene.effects.keys().is_empty() { "none" } else { "only these run:" }));
     for effect in scene.effects.active() {
         line(format!("  {:<13}{}; cost: {}", effect.key, effect.summary, effect.cost));
     }
     line(format!("mass scaling {}", model.mass_scaling()));
     line(format!(
         "stable step  {:.3} us (wave-speed bound; power iteration {:.3} us)",
-        simulation.stable.wave_speed * 1e6,
-        simulation.stable.power_iteration * 1e6
+        simulation.stable_dt * 1e6,
+        power_iteration(&model) * 1e6
     ));
     line(format!(
         "step         {:.3} us{}, {} steps, {} frames, {:.3} s simulated",

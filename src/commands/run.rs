@@ -46,12 +46,7 @@ struct Moment {
 /// # Errors
 /// The input errors of [`Simulation::new`] and of the output folder come before anything is written. A run that fails
 /// half-way writes all results up to there, with the reason in `summary.json`, and returns the error.
-pub fn run(
-    scene: Scene,
-    options: &RunOptions,
-    program_start: Instant,
-    interrupted: &AtomicBool,
-) -> Result<RunOutcome> {
+pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupted: &AtomicBool) -> Result<RunOutcome> {
     for notice in &scene.notices {
         eprintln!("note: {notice}");
     }
@@ -124,7 +119,7 @@ pub fn run(
         cells: mesh.cell_count() as u64,
         nodes: mesh.node_count() as u64,
         dt_s: simulation.dt,
-        stable_dt_s: simulation.stable.limit(),
+        stable_dt_s: simulation.stable_dt,
         mass_scaling: simulation.model.mass_scaling(),
         steps,
         simulated_s: simulated,
@@ -166,13 +161,12 @@ fn moments(simulation: &Simulation) -> Vec<Moment> {
     };
     let has_tool = simulation.model.kinematics.is_some();
     let name = |v: f64| if has_tool { PictureMoment::Depth(v) } else { PictureMoment::Time(v) };
-    let pictures = outputs.pictures_at.iter().filter_map(|v| {
-        Some(Moment { frame: frame_of(*v)?, picture: Some(name(*v)), field: false })
-    });
-    let fields = outputs
-        .fields_at
+    let pictures = outputs
+        .pictures_at
         .iter()
-        .filter_map(|v| Some(Moment { frame: frame_of(*v)?, picture: None, field: true }));
+        .filter_map(|v| Some(Moment { frame: frame_of(*v)?, picture: Some(name(*v)), field: false }));
+    let fields =
+        outputs.fields_at.iter().filter_map(|v| Some(Moment { frame: frame_of(*v)?, picture: None, field: true }));
     pictures.chain(fields).collect()
 }
 

@@ -30,10 +30,6 @@ pub struct Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Params {
-            coefficient: 0.3,
-            stiffness_ratio: 0.5,
-            fade_length: 0.8e-3,
-        }
+        Params { coefficient: 0.3, stiffness_ratio: 0.5, fade_length: 0.8e-3 }
     }
 }

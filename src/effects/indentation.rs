@@ -25,9 +25,6 @@ pub struct Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Params {
-            stiffness_factor: 2.35,
-            contact_damping: 0.2,
-        }
+        Params { stiffness_factor: 2.35, contact_damping: 0.2 }
     }
 }

@@ -32,13 +32,8 @@ pub struct Effect {
 }
 
 /// All effects. The order is the order of their blocks in the stages.
-pub const EFFECTS: [Effect; 5] = [
-    mass_scaling::EFFECT,
-    gravity::EFFECT,
-    puncture::EFFECT,
-    indentation::EFFECT,
-    friction::EFFECT,
-];
+pub const EFFECTS: [Effect; 5] =
+    [mass_scaling::EFFECT, gravity::EFFECT, puncture::EFFECT, indentation::EFFECT, friction::EFFECT];
 
 impl EffectSet {
     /// Which effects are on, in the order of [`EFFECTS`].
@@ -54,10 +49,7 @@ impl EffectSet {
 
     /// The effects that are on, in the order of [`EFFECTS`].
     pub fn active(&self) -> impl Iterator<Item = &'static Effect> + '_ {
-        EFFECTS
-            .iter()
-            .zip(self.presence())
-            .filter_map(|(effect, on)| on.then_some(effect))
+        EFFECTS.iter().zip(self.presence()).filter_map(|(effect, on)| on.then_some(effect))
     }
 
     /// Keys of the effects that are on.

@@ -114,8 +114,8 @@ fn include(
             "import" if active => include(files, argument, file, number, defines, included, out)?,
             "import" => {}
             "ifdef" | "ifndef" => {
-                let known = SCENE_DEFINES.contains(&argument)
-                    || crate::effects::EFFECTS.iter().any(|e| e.define == argument);
+                let known =
+                    SCENE_DEFINES.contains(&argument) || crate::effects::EFFECTS.iter().any(|e| e.define == argument);
                 if !known {
                     return fail(file, number, format!("unknown name `{argument}` in #{word}"));
                 }

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use bytemuck::Zeroable;
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::kernel::{Kernel, Reflected, STEP_INPUT, reflect};
@@ -66,13 +67,7 @@ impl Strips {
     fn new(cells: [usize; 3], layers: u32) -> Self {
         let [x, y, z] = cells.map(|c| c as u32);
         let layers = layers.clamp(1, z);
-        Strips {
-            layers,
-            count: z.div_ceil(layers),
-            columns: x * y,
-            padded_columns: (x + 2) * (y + 2),
-            cells_x: x,
-        }
+        Strips { layers, count: z.div_ceil(layers), columns: x * y, padded_columns: (x + 2) * (y + 2), cells_x: x }
     }
 
     fn slots(&self) -> u64 {
@@ -138,8 +133,9 @@ impl GpuEngine {
         let layers = if gpu.is_software() { 8 } else { 4 };
         let strips = Strips::new(model.mesh.cells(), layers);
         let defines = defines(&model.effects, !model.node_load.is_empty(), model.has_driven_faces());
+        // Composing, validating and compiling go side by side: they are most of the time to the first step.
         let reflected = stages(&model.effects)
-            .into_iter()
+            .into_par_iter()
             .map(|stage| reflect(stage, &defines))
             .collect::<Result<Vec<Reflected>>>()?;
         let measure_threads = measure_threads(&model);
@@ -162,7 +158,7 @@ impl GpuEngine {
             buffers.insert(*name, buffer);
         }
         let kernels = reflected
-            .into_iter()
+            .into_par_iter()
             .map(|r| {
                 let threads = threads(r.stage, &model, &strips, measure_threads);
                 Kernel::new(&gpu.device, r, &buffers, size_of::<StepInput>() as u64, threads)
@@ -223,6 +219,29 @@ impl GpuEngine {
     /// Names and sizes of all device buffers [bytes].
     pub fn buffer_sizes(&self) -> Vec<(&'static str, u64)> {
         self.buffers.iter().map(|(n, b)| (*n, b.size())).collect()
+    }
+
+    /// Wall and process CPU time of one dispatch of every stage [s], each repeated `repeats` times by itself. The state
+    /// means nothing afterwards.
+    pub fn time_stages(&mut self, repeats: u32) -> Result<Vec<(Stage, f64, Option<f64>)>> {
+        while self.collect_oldest(true)? {}
+        let mut times = Vec::new();
+        for kernel in &self.kernels {
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                for _ in 0..repeats {
+                    kernel.encode(&mut pass, 0);
+                }
+            }
+            let (begin, cpu) = (std::time::Instant::now(), crate::process::cpu_seconds());
+            self.gpu.queue.submit([encoder.finish()]);
+            self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| Error::Device(e.to_string()))?;
+            let wall = begin.elapsed().as_secs_f64() / f64::from(repeats);
+            let cpu = crate::process::cpu_seconds().zip(cpu).map(|(b, a)| (b - a) / f64::from(repeats));
+            times.push((kernel.stage, wall, cpu));
+        }
+        Ok(times)
     }
 
     fn collect_oldest(&mut self, wait: bool) -> Result<bool> {
@@ -431,14 +450,7 @@ fn vec4(v: DVec3) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
 }
 
-fn contents(
-    name: &str,
-    model: &Model,
-    strips: &Strips,
-    dt: f64,
-    measure_threads: u32,
-    max_steps: usize,
-) -> Contents {
+fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads: u32, max_steps: usize) -> Contents {
     let nodes = model.mesh.node_count() as u64;
     let contacts = model.contact_nodes.len().max(1) as u64;
     let zeros = |count: u64, size: usize| Contents::Zeros(count * size as u64);
@@ -550,11 +562,7 @@ fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Para
     let [cx, cy, cz] = model.mesh.cells().map(|c| c as u32);
     let law = model.scene.material.law;
     let solver = &model.scene.solver;
-    let fixed: Vec<u32> = model
-        .faces()
-        .iter()
-        .map(|f| (0..3).map(|a| u32::from(f.fixed[a]) << a).sum())
-        .collect();
+    let fixed: Vec<u32> = model.faces().iter().map(|f| (0..3).map(|a| u32::from(f.fixed[a]) << a).sum()).collect();
     Params {
         cells_x: cx,
         cells_y: cy,
@@ -590,6 +598,9 @@ fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Para
 fn puncture_params(model: &Model) -> PunctureParams {
     model.puncture.as_ref().map_or(PunctureParams::zeroed(), |plan| {
         let p = plan.params;
+        // s0 depends on z alone, and an anchor acts on the two node planes around it.
+        let tallest = model.mesh.lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
         PunctureParams {
             puncture_force: p.puncture_force as f32,
             cutting_force: p.cutting_force as f32,
@@ -601,8 +612,8 @@ fn puncture_params(model: &Model) -> PunctureParams {
             entry_fade: p.entry_fade as f32,
             needle_radius: plan.needle.radius as f32,
             tip_length: plan.needle.tip_length as f32,
+            anchor_reach: anchor_reach as f32,
             path_cell_count: plan.cells.len() as u32,
-            _pad: 0,
         }
     })
 }
@@ -825,11 +836,8 @@ impl Engine for GpuEngine {
             for k in first..=(first + strips.layers).min(nz as u32) {
                 for (j, i, corner) in (0..ny).flat_map(|j| (0..nx).flat_map(move |i| (0..4).map(move |c| (j, i, c)))) {
                     let f = slots[strips.slot(strip, k, corner, i as u32, j as u32) as usize];
-                    let node = self.model.mesh.node_index(
-                        i + (corner & 1) as usize,
-                        j + (corner >> 1) as usize,
-                        k as usize,
-                    );
+                    let node =
+                        self.model.mesh.node_index(i + (corner & 1) as usize, j + (corner >> 1) as usize, k as usize);
                     force[node] -= DVec3::new(f[0].into(), f[1].into(), f[2].into());
                 }
             }

@@ -36,12 +36,10 @@ pub fn reflect(stage: Stage, defines: &BTreeSet<&'static str>) -> Result<Reflect
         let line = e.location(&composed.source).map_or(0, |l| l.line_number as usize);
         fail(format!("{}\n{}", composed.place(line), e.emit_to_string(&composed.source)))
     })?;
-    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
-        .validate(&module)
-        .map_err(|e| {
-            let line = e.location(&composed.source).map_or(0, |l| l.line_number as usize);
-            fail(format!("{}\n{}", composed.place(line), e.emit_to_string(&composed.source)))
-        })?;
+    let info = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).map_err(|e| {
+        let line = e.location(&composed.source).map_or(0, |l| l.line_number as usize);
+        fail(format!("{}\n{}", composed.place(line), e.emit_to_string(&composed.source)))
+    })?;
     let entry = module
         .entry_points
         .iter()
@@ -132,11 +130,8 @@ impl Kernel {
                     resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }),
                 });
             }
-            let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label,
-                layout: &layout,
-                entries: &resources,
-            });
+            let bind_group =
+                device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout: &layout, entries: &resources });
             groups.push(Some((bind_group, members.iter().any(|b| b.name == STEP_INPUT))));
             layouts.push(Some(layout));
         }

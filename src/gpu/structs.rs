@@ -97,8 +97,8 @@ shared_structs! {
         entry_fade: f32,
         needle_radius: f32,
         tip_length: f32,
+        anchor_reach: f32,
         path_cell_count: u32,
-        _pad: u32,
     }
     /// shaders/effects/puncture.wgsl
     struct TipAnchor {

@@ -22,19 +22,15 @@ pub fn describe_verdict(law: &MooneyRivlin) -> String {
         kpa(law.bulk_modulus)
     );
     let limited = |side: &str, limit: f64| {
-        format!(
-            "stable only while every principal stretch stays {side} {} ({constants}; {moduli})",
-            four_digits(limit)
-        )
+        format!("stable only while every principal stretch stays {side} {} ({constants}; {moduli})", four_digits(limit))
     };
     match law.verdict() {
         Verdict::Stable => format!("stable for every deformation ({constants}; {moduli})"),
         Verdict::StableBelow(limit) => limited("below", limit),
         Verdict::StableAbove(limit) => limited("above", limit),
-        Verdict::Unstable if law.bulk_modulus <= 0.0 => format!(
-            "unstable at rest: bulk modulus {} kPa is not positive ({constants})",
-            kpa(law.bulk_modulus)
-        ),
+        Verdict::Unstable if law.bulk_modulus <= 0.0 => {
+            format!("unstable at rest: bulk modulus {} kPa is not positive ({constants})", kpa(law.bulk_modulus))
+        }
         Verdict::Unstable => format!(
             "unstable at rest: c10 + c01 = {} kPa, shear modulus {} kPa is not positive ({constants})",
             kpa(law.c10 + law.c01),
@@ -55,25 +51,15 @@ mod tests {
     use super::*;
 
     fn law(c10: f64, c01: f64) -> MooneyRivlin {
-        MooneyRivlin {
-            c10: c10 * 1e3,
-            c01: c01 * 1e3,
-            bulk_modulus: 5.0e5,
-        }
+        MooneyRivlin { c10: c10 * 1e3, c01: c01 * 1e3, bulk_modulus: 5.0e5 }
     }
 
     #[test]
     fn the_verdict_names_constants_and_limit() {
-        assert!(
-            describe_verdict(&law(2.3, 1.0))
-                .starts_with("stable for every deformation (c10 2.3 kPa")
-        );
+        assert!(describe_verdict(&law(2.3, 1.0)).starts_with("stable for every deformation (c10 2.3 kPa"));
         assert!(describe_verdict(&law(2.0, -1.0)).contains("below 1.414 "));
         assert!(describe_verdict(&law(-1.0, 4.0)).contains("above 0.5 "));
-        assert!(
-            describe_verdict(&law(4.75, -4.91))
-                .contains("c10 + c01 = -0.16 kPa, shear modulus -0.32 kPa")
-        );
+        assert!(describe_verdict(&law(4.75, -4.91)).contains("c10 + c01 = -0.16 kPa, shear modulus -0.32 kPa"));
     }
 
     #[test]

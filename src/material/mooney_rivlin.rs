@@ -63,11 +63,7 @@ pub fn jacobian_minus_one(h: DMat3) -> f64 {
 
 /// cof F = J F^-T, by cross products of the columns.
 pub fn cofactor(f: DMat3) -> DMat3 {
-    DMat3::from_cols(
-        f.y_axis.cross(f.z_axis),
-        f.z_axis.cross(f.x_axis),
-        f.x_axis.cross(f.y_axis),
-    )
+    DMat3::from_cols(f.y_axis.cross(f.z_axis), f.z_axis.cross(f.x_axis), f.x_axis.cross(f.y_axis))
 }
 
 impl MooneyRivlin {
@@ -75,11 +71,7 @@ impl MooneyRivlin {
     ///
     /// `shear_modulus` mu0 [Pa], `bulk_modulus` [Pa], `share` 0..1.
     pub fn from_moduli(shear_modulus: f64, bulk_modulus: f64, share: f64) -> Self {
-        MooneyRivlin {
-            c10: 0.5 * shear_modulus * share,
-            c01: 0.5 * shear_modulus * (1.0 - share),
-            bulk_modulus,
-        }
+        MooneyRivlin { c10: 0.5 * shear_modulus * share, c01: 0.5 * shear_modulus * (1.0 - share), bulk_modulus }
     }
 
     /// Ground-state shear modulus mu0 = 2 (c10 + c01) [Pa].
@@ -127,9 +119,7 @@ impl MooneyRivlin {
         let (a, _) = isochoric_factor(j, -2.0 / 3.0);
         let (b, _) = isochoric_factor(j, -4.0 / 3.0);
         let (i1, i2) = invariants(f);
-        self.c10 * (a * i1 - 3.0)
-            + self.c01 * (b * i2 - 3.0)
-            + 0.5 * self.bulk_modulus * dj * dj
+        self.c10 * (a * i1 - 3.0) + self.c01 * (b * i2 - 3.0) + 0.5 * self.bulk_modulus * dj * dj
     }
 
     /// First Piola-Kirchhoff stress P [Pa] for the displacement gradient H = F - I.
@@ -154,16 +144,13 @@ impl MooneyRivlin {
 
 /// First and second invariant of C = F^T F; `I2 = |cof F|^2`.
 fn invariants(f: DMat3) -> (f64, f64) {
-    let square = |m: DMat3| {
-        m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared()
-    };
+    let square = |m: DMat3| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();
     (square(f), square(cofactor(f)))
 }
 
 /// Von Mises equivalent of a symmetric stress [Pa].
 pub fn von_mises(sigma: DMat3) -> f64 {
     let d = DVec3::new(sigma.x_axis.x, sigma.y_axis.y, sigma.z_axis.z);
-    let shear =
-        sigma.x_axis.y.powi(2) + sigma.y_axis.z.powi(2) + sigma.z_axis.x.powi(2);
+    let shear = sigma.x_axis.y.powi(2) + sigma.y_axis.z.powi(2) + sigma.z_axis.x.powi(2);
     (0.5 * ((d.x - d.y).powi(2) + (d.y - d.z).powi(2) + (d.z - d.x).powi(2)) + 3.0 * shear).sqrt()
 }

@@ -43,19 +43,12 @@ impl BlockMesh {
         let end = motion.deepest_point();
         let lateral = |axis: usize| {
             let entry = motion.entry[axis];
-            let zone = [
-                entry.min(end[axis]) - tissue.fine_radius,
-                entry.max(end[axis]) + tissue.fine_radius,
-            ];
+            let zone = [entry.min(end[axis]) - tissue.fine_radius, entry.max(end[axis]) + tissue.fine_radius];
             let anchor = entry - tissue.axis_offset_cells[axis] * h;
             graded_lines([-half[axis], half[axis]], zone, anchor, h, tissue.growth)
         };
         BlockMesh {
-            lines: [
-                lateral(0),
-                lateral(1),
-                depth_lines(tissue.size.z, -end.z + FINE_BELOW_PATH, h, tissue.growth),
-            ],
+            lines: [lateral(0), lateral(1), depth_lines(tissue.size.z, -end.z + FINE_BELOW_PATH, h, tissue.growth)],
         }
     }
 }
@@ -63,9 +56,7 @@ impl BlockMesh {
 /// Uniform lines from `low` to `high` with an edge as close to `h` as whole cells allow.
 fn uniform_lines(low: f64, high: f64, h: f64) -> Vec<f64> {
     let count = ((high - low) / h).round().max(1.0) as usize;
-    let mut lines: Vec<f64> = (0..count)
-        .map(|k| low + (high - low) * k as f64 / count as f64)
-        .collect();
+    let mut lines: Vec<f64> = (0..count).map(|k| low + (high - low) * k as f64 / count as f64).collect();
     lines.push(high);
     lines
 }
@@ -74,21 +65,14 @@ fn uniform_lines(low: f64, high: f64, h: f64) -> Vec<f64> {
 fn graded_lines(block: [f64; 2], zone: [f64; 2], anchor: f64, h: f64, growth: f64) -> Vec<f64> {
     let inside = |x: f64| (x - anchor) / h;
     // A line may touch a face; the tolerance keeps one that misses it by rounding.
-    let first = inside(zone[0])
-        .round()
-        .max((inside(block[0]) - 1e-9).ceil());
-    let last = inside(zone[1])
-        .round()
-        .min((inside(block[1]) + 1e-9).floor());
+    let first = inside(zone[0]).round().max((inside(block[0]) - 1e-9).ceil());
+    let last = inside(zone[1]).round().min((inside(block[1]) + 1e-9).floor());
     let below = series_to_face(|give_up| first + give_up - inside(block[0]), growth);
     let above = series_to_face(|give_up| inside(block[1]) - (last - give_up), growth);
     let (Some((first_up, below)), Some((last_down, above))) = (below, above) else {
         return uniform_lines(block[0], block[1], h);
     };
-    let (first, last) = (
-        first as i64 + first_up as i64,
-        last as i64 - last_down as i64,
-    );
+    let (first, last) = (first as i64 + first_up as i64, last as i64 - last_down as i64);
     if last <= first {
         return uniform_lines(block[0], block[1], h);
     }
@@ -118,8 +102,7 @@ fn depth_lines(size: f64, fine_depth: f64, h: f64, growth: f64) -> Vec<f64> {
     if size - fine * h < 2.0 * h {
         return uniform_lines(-size, 0.0, h);
     }
-    let Some((give_up, edges)) = series_to_face(|give_up| size / h - (fine - give_up), growth)
-    else {
+    let Some((give_up, edges)) = series_to_face(|give_up| size / h - (fine - give_up), growth) else {
         return uniform_lines(-size, 0.0, h);
     };
     let fine = fine as usize - give_up;
@@ -139,9 +122,8 @@ fn depth_lines(size: f64, fine_depth: f64, h: f64, growth: f64) -> Vec<f64> {
 /// Edges (in units of the fine edge) of a geometric series that fills the distance to a face, and the number of fine
 /// lines given up for it. `distance(n)`: distance in fine edges when n lines are given up.
 fn series_to_face(distance: impl Fn(f64) -> f64, growth: f64) -> Option<(usize, Vec<f64>)> {
-    (0..=LINES_TO_GIVE_UP).find_map(|give_up| {
-        series_edges(distance(give_up as f64), growth).map(|edges| (give_up, edges))
-    })
+    (0..=LINES_TO_GIVE_UP)
+        .find_map(|give_up| series_edges(distance(give_up as f64), growth).map(|edges| (give_up, edges)))
 }
 
 /// Edges `r, r^2, .., r^n` that sum to `distance`; `None` where every such series has a bad shape.
@@ -189,10 +171,7 @@ mod tests {
         Motion {
             entry: DVec3::new(entry[0] * 1e-3, entry[1] * 1e-3, 0.0),
             direction: direction.normalize(),
-            phases: vec![Phase::Insert {
-                speed: 2e-3,
-                depth: depth * 1e-3,
-            }],
+            phases: vec![Phase::Insert { speed: 2e-3, depth: depth * 1e-3 }],
         }
     }
 
@@ -210,16 +189,10 @@ mod tests {
             let edges = edges(lines);
             for pair in edges.windows(2) {
                 let ratio = (pair[1] / pair[0]).max(pair[0] / pair[1]);
-                assert!(
-                    ratio <= tissue.growth * 1.3 + 1e-9,
-                    "axis {axis}: ratio {ratio} in {edges:?}"
-                );
+                assert!(ratio <= tissue.growth * 1.3 + 1e-9, "axis {axis}: ratio {ratio} in {edges:?}");
             }
             let smallest = edges.iter().cloned().fold(f64::INFINITY, f64::min);
-            assert!(
-                smallest >= 0.7 * tissue.cell_size - 1e-12,
-                "axis {axis}: {edges:?}"
-            );
+            assert!(smallest >= 0.7 * tissue.cell_size - 1e-12, "axis {axis}: {edges:?}");
         }
     }
 
@@ -258,8 +231,7 @@ mod tests {
                 for cell in [0.4, 0.6, 0.83] {
                     let tissue = tissue([20.0, 23.7, 30.0 + 0.37 * step as f64], cell, growth);
                     let slanted = DVec3::new(if x > 0.0 { -0.4 } else { 0.4 }, 0.3, -1.0);
-                    let mesh =
-                        BlockMesh::for_tissue(&tissue, Some(&motion([x, 0.0], slanted, 8.0)));
+                    let mesh = BlockMesh::for_tissue(&tissue, Some(&motion([x, 0.0], slanted, 8.0)));
                     assert_shape(&mesh, &tissue);
                 }
             }

@@ -45,24 +45,12 @@ impl Kinematics {
             time += duration;
             depth = target;
         }
-        Kinematics {
-            entry: motion.entry,
-            direction: motion.direction,
-            pieces,
-            end: time,
-            end_depth: depth,
-        }
+        Kinematics { entry: motion.entry, direction: motion.direction, pieces, end: time, end_depth: depth }
     }
 
     /// Length of the motion [s].
     pub fn duration(&self) -> f64 {
         self.end
-    }
-
-    /// Largest depth that is reached [m].
-    pub fn deepest(&self) -> f64 {
-        let ends = self.pieces.iter().map(|p| p.1);
-        ends.fold(self.end_depth, f64::max)
     }
 
     /// First time at which the tool gets as deep as `depth` [s]; `None` where it never does.
@@ -72,11 +60,6 @@ impl Kinematics {
             let reached = from + rate * (end - start) >= depth - 1e-9;
             (rate > 0.0 && from <= depth && reached).then(|| (start + (depth - from) / rate).min(end))
         })
-    }
-
-    /// Largest speed of the motion [m/s].
-    pub fn top_speed(&self) -> f64 {
-        self.pieces.iter().map(|p| p.2.abs()).fold(0.0, f64::max)
     }
 
     /// Pose at `time` [s]; after the end the tool stands still.

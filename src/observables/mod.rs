@@ -44,22 +44,12 @@ pub struct EnergyAccount {
 impl EnergyAccount {
     /// Sum of everything that external work turned into [J].
     pub fn accounted(&self) -> f64 {
-        self.elastic
-            + self.kinetic
-            + self.hourglass
-            + self.damping
-            + self.friction
-            + self.cutting
-            + self.contact
+        self.elastic + self.kinetic + self.hourglass + self.damping + self.friction + self.cutting + self.contact
     }
 
     /// (external - accounted) / largest external work; 0 while nothing has happened.
     pub fn imbalance(&self) -> f64 {
-        if self.external_max > 0.0 {
-            (self.external - self.accounted()) / self.external_max
-        } else {
-            0.0
-        }
+        if self.external_max > 0.0 { (self.external - self.accounted()) / self.external_max } else { 0.0 }
     }
 }
 

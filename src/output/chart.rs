@@ -39,12 +39,7 @@ struct Curve {
 }
 
 /// Writes the chart, whole or not at all.
-pub fn write_force_chart(
-    path: &Path,
-    title: &str,
-    records: &[FrameRecord],
-    figures: &CurveFigures,
-) -> Result<()> {
+pub fn write_force_chart(path: &Path, title: &str, records: &[FrameRecord], figures: &CurveFigures) -> Result<()> {
     let text = force_chart(title, records, figures)
         .map_err(|reason| Error::file(path, std::io::Error::other(format!("chart: {reason}"))))?;
     whole_file::write(path, text.as_bytes())
@@ -56,12 +51,9 @@ pub fn force_chart(
     records: &[FrameRecord],
     figures: &CurveFigures,
 ) -> std::result::Result<String, Box<dyn std::error::Error>> {
-    let finite: Vec<&FrameRecord> = records
-        .iter()
-        .filter(|r| r.depth.is_finite() && r.time.is_finite() && r.force.axial.is_finite())
-        .collect();
-    let over_depth =
-        range(finite.iter().map(|r| r.depth)).is_some_and(|(a, b)| b - a > LEAST_TRAVEL);
+    let finite: Vec<&FrameRecord> =
+        records.iter().filter(|r| r.depth.is_finite() && r.time.is_finite() && r.force.axial.is_finite()).collect();
+    let over_depth = range(finite.iter().map(|r| r.depth)).is_some_and(|(a, b)| b - a > LEAST_TRAVEL);
     let abscissa = |r: &FrameRecord| if over_depth { r.depth * 1e3 } else { r.time };
     let curves = curves(&finite, over_depth, abscissa);
 
@@ -74,8 +66,7 @@ pub fn force_chart(
 
     let mut text = String::new();
     {
-        let root =
-            SVGBackend::with_string(&mut text, (fine(SIZE.0), fine(SIZE.1))).into_drawing_area();
+        let root = SVGBackend::with_string(&mut text, (fine(SIZE.0), fine(SIZE.1))).into_drawing_area();
         root.fill(&WHITE)?;
         let (head, body) = root.split_vertically(fine(HEAD));
         draw_head(&head, title, &curves)?;
@@ -89,11 +80,7 @@ pub fn force_chart(
             .build_cartesian_2d(x_min..x_max, y_min..y_max)?;
         chart
             .configure_mesh()
-            .x_desc(if over_depth {
-                "depth of the tip [mm]"
-            } else {
-                "time [s]"
-            })
+            .x_desc(if over_depth { "depth of the tip [mm]" } else { "time [s]" })
             .y_desc("force on the tissue [N]")
             .axis_desc_style(("sans-serif", fine(17)))
             .label_style(("sans-serif", fine(15)))
@@ -107,10 +94,7 @@ pub fn force_chart(
             .set_all_tick_mark_size(fine(5))
             .max_light_lines(5)
             .draw()?;
-        chart.draw_series(LineSeries::new(
-            [(x_min, 0.0), (x_max, 0.0)],
-            BLACK.mix(0.6).stroke_width(fine(1)),
-        ))?;
+        chart.draw_series(LineSeries::new([(x_min, 0.0), (x_max, 0.0)], BLACK.mix(0.6).stroke_width(fine(1))))?;
         for curve in &curves {
             let style = curve.colour.stroke_width(curve.width);
             match curve.dash {
@@ -127,29 +111,17 @@ pub fn force_chart(
                 }
             }
         }
-        if let (true, Some(depth), Some(force)) =
-            (over_depth, figures.puncture_depth, figures.puncture_force)
-        {
+        if let (true, Some(depth), Some(force)) = (over_depth, figures.puncture_depth, figures.puncture_force) {
             let at = (depth * 1e3, force);
             chart.draw_series([Circle::new(at, fine(5), INWARD.filled())])?;
             chart.draw_series([Circle::new(at, fine(5), BLACK.stroke_width(fine(1)))])?;
             // Left of the peak the force is still below it: the text stands free there, unless the peak is near the axis.
             let near_axis = (at.0 - x_min) < 0.25 * (x_max - x_min);
-            let (anchor, shift) = if near_axis {
-                (HPos::Left, 10 * FINER as i32)
-            } else {
-                (HPos::Right, -10 * FINER as i32)
-            };
-            let style = ("sans-serif", fine(15))
-                .into_font()
-                .color(&BLACK)
-                .pos(Pos::new(anchor, VPos::Bottom));
+            let (anchor, shift) =
+                if near_axis { (HPos::Left, 10 * FINER as i32) } else { (HPos::Right, -10 * FINER as i32) };
+            let style = ("sans-serif", fine(15)).into_font().color(&BLACK).pos(Pos::new(anchor, VPos::Bottom));
             chart.draw_series([EmptyElement::at(at)
-                + Text::new(
-                    format!("puncture {force:.2} N at {:.2} mm", at.0),
-                    (shift, -6 * FINER as i32),
-                    style,
-                )])?;
+                + Text::new(format!("puncture {force:.2} N at {:.2} mm", at.0), (shift, -6 * FINER as i32), style)])?;
         }
         root.present()?;
     }
@@ -158,46 +130,28 @@ pub fn force_chart(
     Ok(text.replacen(&drawn, &shown, 1))
 }
 
-fn curves(
-    records: &[&FrameRecord],
-    over_depth: bool,
-    abscissa: impl Fn(&FrameRecord) -> f64,
-) -> Vec<Curve> {
+fn curves(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRecord) -> f64) -> Vec<Curve> {
     let deepest = records
         .iter()
         .enumerate()
         .max_by(|a, b| a.1.depth.total_cmp(&b.1.depth).then(b.0.cmp(&a.0)))
         .map_or(0, |(i, _)| i);
-    let turn = if over_depth {
-        deepest
-    } else {
-        records.len().saturating_sub(1)
-    };
+    let turn = if over_depth { deepest } else { records.len().saturating_sub(1) };
     let inward = records.get(..=turn).unwrap_or(&[]);
-    let outward = records
-        .get(turn..)
-        .filter(|rest| rest.len() > 1)
-        .unwrap_or(&[]);
+    let outward = records.get(turn..).filter(|rest| rest.len() > 1).unwrap_or(&[]);
     let part = |label, colour, dash, value: fn(&FrameRecord) -> f64| Curve {
         label,
         colour,
         width: FINER * 3 / 2,
         dash,
-        points: inward
-            .iter()
-            .map(|r| (abscissa(r), value(r)))
-            .filter(|p| p.1.is_finite())
-            .collect(),
+        points: inward.iter().map(|r| (abscissa(r), value(r))).filter(|p| p.1.is_finite()).collect(),
     };
     let axial = |label, colour, dash, records: &[&FrameRecord]| Curve {
         label,
         colour,
         width: FINER * 3,
         dash,
-        points: records
-            .iter()
-            .map(|r| (abscissa(r), r.force.axial))
-            .collect(),
+        points: records.iter().map(|r| (abscissa(r), r.force.axial)).collect(),
     };
     let mut curves = vec![
         part("cutting", CUTTING, Some((7, 3)), |r| r.force.cutting),
@@ -205,12 +159,7 @@ fn curves(
         part("friction", FRICTION, Some((2, 3)), |r| r.force.friction),
     ];
     if !outward.is_empty() {
-        curves.push(axial(
-            "axial, after full depth",
-            OUTWARD,
-            Some((9, 5)),
-            outward,
-        ));
+        curves.push(axial("axial, after full depth", OUTWARD, Some((9, 5)), outward));
     }
     let label = if over_depth { "axial, way in" } else { "axial" };
     curves.push(axial(label, INWARD, None, inward));
@@ -228,45 +177,28 @@ fn draw_head<DB: DrawingBackend>(
     let place = |x: i32, y: i32| (x * FINER as i32, y * FINER as i32);
     let longest = (SIZE.0 as usize - 100) / 10;
     let title: String = if title.chars().count() > longest {
-        title
-            .chars()
-            .take(longest - 3)
-            .chain("...".chars())
-            .collect()
+        title.chars().take(longest - 3).chain("...".chars()).collect()
     } else {
         title.to_string()
     };
-    head.draw_text(
-        &title,
-        &("sans-serif", fine(21)).into_font().color(&BLACK),
-        place(78, 16),
-    )?;
+    head.draw_text(&title, &("sans-serif", fine(21)).into_font().color(&BLACK), place(78, 16))?;
     let mut x = 78;
     let y = 62;
     // The two main lines first.
     for curve in curves.iter().rev() {
         let style = curve.colour.stroke_width(curve.width);
         match curve.dash {
-            None => head.draw(&PathElement::new(
-                vec![place(x, y), place(x + SAMPLE, y)],
-                style,
-            ))?,
+            None => head.draw(&PathElement::new(vec![place(x, y), place(x + SAMPLE, y)], style))?,
             Some((dash, gap)) => {
                 let mut start = x;
                 while start < x + SAMPLE {
                     let end = (start + dash as i32).min(x + SAMPLE);
-                    head.draw(&PathElement::new(
-                        vec![place(start, y), place(end, y)],
-                        style,
-                    ))?;
+                    head.draw(&PathElement::new(vec![place(start, y), place(end, y)], style))?;
                     start += (dash + gap) as i32;
                 }
             }
         }
-        let label = ("sans-serif", fine(15))
-            .into_font()
-            .color(&BLACK)
-            .pos(Pos::new(HPos::Left, VPos::Center));
+        let label = ("sans-serif", fine(15)).into_font().color(&BLACK).pos(Pos::new(HPos::Left, VPos::Center));
         head.draw_text(curve.label, &label, place(x + SAMPLE + 8, y))?;
         x += SAMPLE + 8 + (curve.label.chars().count() * CHARACTER_WIDTH) as i32 + 22;
     }
@@ -279,12 +211,10 @@ fn fine(pixels: u32) -> u32 {
 }
 
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    values
-        .filter(|v| v.is_finite())
-        .fold(None, |range, v| match range {
-            None => Some((v, v)),
-            Some((low, high)) => Some((low.min(v), high.max(v))),
-        })
+    values.filter(|v| v.is_finite()).fold(None, |range, v| match range {
+        None => Some((v, v)),
+        Some((low, high)) => Some((low.min(v), high.max(v))),
+    })
 }
 
 fn widened(low: f64, high: f64, fraction: f64) -> (f64, f64) {
@@ -297,13 +227,5 @@ fn widened(low: f64, high: f64, fraction: f64) -> (f64, f64) {
 fn tick(value: f64, span: f64) -> String {
     let decimals = (1.0 - span.log10()).ceil().clamp(0.0, 9.0) as usize;
     let text = format!("{value:.decimals$}");
-    if text
-        .trim_start_matches('-')
-        .bytes()
-        .all(|b| matches!(b, b'0' | b'.'))
-    {
-        "0".into()
-    } else {
-        text
-    }
+    if text.trim_start_matches('-').bytes().all(|b| matches!(b, b'0' | b'.')) { "0".into() } else { text }
 }

@@ -49,24 +49,14 @@ impl CurveFigures {
     /// Reads the figures off the records of a run, in order of time.
     pub fn from_records(records: &[FrameRecord]) -> Self {
         let curve: Vec<Point> = frames_on_the_way_in(records)
-            .map(|r| Point {
-                depth: r.depth,
-                force: r.force.axial,
-            })
+            .map(|r| Point { depth: r.depth, force: r.force.axial })
             .filter(|p| p.force.is_finite())
             .collect();
         let Some(end) = curve.last() else {
             return Self::default();
         };
-        let peak_force = curve
-            .iter()
-            .map(|p| p.force)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let at_end: Vec<f64> = curve
-            .iter()
-            .filter(|p| p.depth >= end.depth - END_TRAVEL)
-            .map(|p| p.force)
-            .collect();
+        let peak_force = curve.iter().map(|p| p.force).fold(f64::NEG_INFINITY, f64::max);
+        let at_end: Vec<f64> = curve.iter().filter(|p| p.depth >= end.depth - END_TRAVEL).map(|p| p.force).collect();
         let mut figures = Self {
             peak_force: Some(peak_force),
             max_depth: Some(end.depth),
@@ -75,10 +65,7 @@ impl CurveFigures {
         };
         if let Some(puncture) = find_puncture(&curve, peak_force) {
             let peak = curve[puncture];
-            let after = window_after(&curve, puncture)
-                .iter()
-                .map(|p| p.force)
-                .fold(peak.force, f64::min);
+            let after = window_after(&curve, puncture).iter().map(|p| p.force).fold(peak.force, f64::min);
             figures.puncture_force = Some(peak.force);
             figures.puncture_depth = Some(peak.depth);
             figures.force_after_puncture = Some(after);
@@ -144,10 +131,7 @@ fn find_puncture(curve: &[Point], largest: f64) -> Option<usize> {
                 _ => [curve[i - 1].force, curve[i].force, curve[i + 1].force],
             };
             force.sort_by(f64::total_cmp);
-            Point {
-                depth: curve[i].depth,
-                force: force[1],
-            }
+            Point { depth: curve[i].depth, force: force[1] }
         })
         .collect();
     let candidate = (0..smooth.len()).find(|&i| {
@@ -155,19 +139,13 @@ fn find_puncture(curve: &[Point], largest: f64) -> Option<usize> {
         if here.force <= 0.0 || here.force < LEAST_PEAK * largest {
             return false;
         }
-        let above_before = smooth[..i]
-            .iter()
-            .rev()
-            .take_while(|p| p.depth >= here.depth - DROP_TRAVEL)
-            .any(|p| p.force > here.force);
+        let above_before =
+            smooth[..i].iter().rev().take_while(|p| p.depth >= here.depth - DROP_TRAVEL).any(|p| p.force > here.force);
         if above_before {
             return false;
         }
         let drop = (DROP_FRACTION * here.force).max(NOISE_FACTOR * noise);
-        window_after(&smooth, i)
-            .iter()
-            .take_while(|p| p.force <= here.force)
-            .any(|p| p.force <= here.force - drop)
+        window_after(&smooth, i).iter().take_while(|p| p.force <= here.force).any(|p| p.force <= here.force - drop)
     })?;
     // The median flattens a sharp peak: take the largest of the three frames themselves.
     let nearby = candidate.saturating_sub(1)..=(candidate + 1).min(curve.len() - 1);
@@ -177,10 +155,7 @@ fn find_puncture(curve: &[Point], largest: f64) -> Option<usize> {
 /// Standard deviation of the frame-to-frame noise [N], from the median size of the second differences: a smooth curve
 /// contributes little to them, and the few frames around a puncture do not move a median.
 fn frame_noise(curve: &[Point]) -> f64 {
-    let mut second: Vec<f64> = curve
-        .windows(3)
-        .map(|w| (w[0].force - 2.0 * w[1].force + w[2].force).abs())
-        .collect();
+    let mut second: Vec<f64> = curve.windows(3).map(|w| (w[0].force - 2.0 * w[1].force + w[2].force).abs()).collect();
     second.sort_by(f64::total_cmp);
     // 1.4826: median of |x| to standard deviation; the second difference of white noise has variance 6.
     1.4826 * second[second.len() / 2] / 6f64.sqrt()
@@ -214,20 +189,11 @@ mod tests {
     /// Records with a depth step of 0.05 mm and the given force law [m -> N].
     fn insertion(max_depth: f64, force: impl Fn(f64) -> f64) -> Vec<FrameRecord> {
         let step = 0.05e-3;
-        (0..=(max_depth / step).round() as usize)
-            .map(|i| record(i as f64 * step, force(i as f64 * step)))
-            .collect()
+        (0..=(max_depth / step).round() as usize).map(|i| record(i as f64 * step, force(i as f64 * step))).collect()
     }
 
     fn record(depth: f64, axial: f64) -> FrameRecord {
-        FrameRecord {
-            depth,
-            force: ForceParts {
-                axial,
-                ..Default::default()
-            },
-            ..Default::default()
-        }
+        FrameRecord { depth, force: ForceParts { axial, ..Default::default() }, ..Default::default() }
     }
 
     /// Rise to 1 N at 3 mm, fall to 0.6 N within 0.2 mm, then 50 N/m.
@@ -251,10 +217,7 @@ mod tests {
 
     fn near(value: Option<f64>, expected: f64, tolerance: f64) {
         let value = value.expect("a figure");
-        assert!(
-            (value - expected).abs() <= tolerance,
-            "{value} instead of {expected}"
-        );
+        assert!((value - expected).abs() <= tolerance, "{value} instead of {expected}");
     }
 
     #[test]
@@ -310,24 +273,20 @@ mod tests {
     #[test]
     fn a_slow_fall_is_no_puncture() {
         // 10 % over 1 mm.
-        let figures = CurveFigures::from_records(&insertion(4e-3, |d| {
-            if d < 3e-3 {
-                d / 3e-3
-            } else {
-                1.0 - 100.0 * (d - 3e-3)
-            }
-        }));
+        let figures =
+            CurveFigures::from_records(&insertion(
+                4e-3,
+                |d| {
+                    if d < 3e-3 { d / 3e-3 } else { 1.0 - 100.0 * (d - 3e-3) }
+                },
+            ));
         assert_eq!(figures.puncture_force, None);
     }
 
     #[test]
     fn the_first_of_two_drops_counts() {
         let second = |d: f64| {
-            if d < 8e-3 {
-                punctured(d)
-            } else {
-                punctured(d) - 0.4
-            }
+            if d < 8e-3 { punctured(d) } else { punctured(d) - 0.4 }
         };
         let figures = CurveFigures::from_records(&insertion(12e-3, second));
         near(figures.puncture_depth, 3e-3, 1e-9);
@@ -362,11 +321,7 @@ mod tests {
         let mut records = insertion(12e-3, punctured);
         records[60].force.axial = f64::NAN;
         records[61].depth = f64::NAN;
-        near(
-            CurveFigures::from_records(&records).puncture_depth,
-            3e-3,
-            0.11e-3,
-        );
+        near(CurveFigures::from_records(&records).puncture_depth, 3e-3, 0.11e-3);
         let one = CurveFigures::from_records(&[record(0.0, 0.5)]);
         assert_eq!(one.peak_force, Some(0.5));
         assert_eq!(one.slope_after_puncture, None);

@@ -16,13 +16,7 @@ pub const FIELD_COLLECTION: &str = "frames.pvd";
 /// Folder of the VTU files `frame_00012.vtu`.
 pub const FIELD_FOLDER: &str = "frames";
 
-const SINGLE_FILES: [&str; 5] = [
-    FORCE_TABLE,
-    ENERGY_TABLE,
-    SUMMARY,
-    FORCE_CHART,
-    FIELD_COLLECTION,
-];
+const SINGLE_FILES: [&str; 5] = [FORCE_TABLE, ENERGY_TABLE, SUMMARY, FORCE_CHART, FIELD_COLLECTION];
 
 /// Where numbered folders go when the user names none.
 const DEFAULT_BASE: &str = "out";
@@ -59,11 +53,7 @@ impl OutputFolder {
         let results = existing_results(path).map_err(|reason| not_usable(path, &reason))?;
         if !results.is_empty() && !force {
             return Err(Error::input(
-                format!(
-                    "folder {} holds results of another run: {}",
-                    path.display(),
-                    listing(path, &results)
-                ),
+                format!("folder {} holds results of another run: {}", path.display(), listing(path, &results)),
                 "give another folder with --out, leave --out away for a new numbered one, or replace the results with --force",
             ));
         }
@@ -76,9 +66,7 @@ impl OutputFolder {
         if !results.is_empty() && is_empty_folder(&fields) {
             fs::remove_dir(&fields).map_err(|reason| not_usable(&fields, &reason))?;
         }
-        Ok(Self {
-            path: path.to_path_buf(),
-        })
+        Ok(Self { path: path.to_path_buf() })
     }
 
     /// The next numbered folder `<base>/<scene>/001`, `002`, ... after the highest number that is there.
@@ -149,9 +137,7 @@ fn not_usable(path: &Path, reason: &io::Error) -> Error {
 /// Creates and removes an empty file: permission bits alone do not tell whether a file system can be written to.
 fn probe_writable(path: &Path) -> Result<()> {
     let probe = path.join(format!(".write_test_{}{UNFINISHED}", std::process::id()));
-    fs::write(&probe, b"")
-        .and_then(|()| fs::remove_file(&probe))
-        .map_err(|reason| not_usable(path, &reason))
+    fs::write(&probe, b"").and_then(|()| fs::remove_file(&probe)).map_err(|reason| not_usable(path, &reason))
 }
 
 fn is_empty_folder(path: &Path) -> bool {
@@ -190,24 +176,18 @@ fn is_result_file(name: &str) -> bool {
 
 /// `stress_<number>mm.png`, `stress_<number>s.png`, with `_<number>` before the ending where a moment repeats.
 fn is_picture_file(name: &str) -> bool {
-    let Some(middle) = name
-        .strip_prefix("stress_")
-        .and_then(|rest| rest.strip_suffix(".png"))
-    else {
+    let Some(middle) = name.strip_prefix("stress_").and_then(|rest| rest.strip_suffix(".png")) else {
         return false;
     };
     let (moment, repeat) = match middle.split_once('_') {
         Some((moment, repeat)) => (moment, Some(repeat)),
         None => (middle, None),
     };
-    let number = moment
-        .strip_suffix("mm")
-        .or_else(|| moment.strip_suffix('s'));
+    let number = moment.strip_suffix("mm").or_else(|| moment.strip_suffix('s'));
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     number.is_some_and(|n| {
         let n = n.strip_prefix('-').unwrap_or(n);
-        n.split_once('.')
-            .is_some_and(|(whole, part)| digits(whole) && digits(part))
+        n.split_once('.').is_some_and(|(whole, part)| digits(whole) && digits(part))
     }) && repeat.is_none_or(digits)
 }
 
@@ -222,36 +202,16 @@ fn is_field_file(name: &str) -> bool {
 /// The first few names for a message.
 fn listing(path: &Path, files: &[PathBuf]) -> String {
     const SHOWN: usize = 4;
-    let names: Vec<String> = files
-        .iter()
-        .take(SHOWN)
-        .map(|file| {
-            file.strip_prefix(path)
-                .unwrap_or(file)
-                .display()
-                .to_string()
-        })
-        .collect();
+    let names: Vec<String> =
+        files.iter().take(SHOWN).map(|file| file.strip_prefix(path).unwrap_or(file).display().to_string()).collect();
     let more = files.len().saturating_sub(SHOWN);
-    if more > 0 {
-        format!("{} and {more} more", names.join(", "))
-    } else {
-        names.join(", ")
-    }
+    if more > 0 { format!("{} and {more} more", names.join(", ")) } else { names.join(", ") }
 }
 
 /// A scene name as one folder name: letters, digits, `-`, `_` and inner dots stay, everything else becomes `_`.
 fn safe_name(scene_name: &str) -> String {
-    let name: String = scene_name
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect();
+    let name: String =
+        scene_name.chars().map(|c| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '_' }).collect();
     match name.trim_matches('.') {
         "" => "scene".to_string(),
         trimmed => trimmed.to_string(),
@@ -295,9 +255,7 @@ mod tests {
 
     #[test]
     fn picture_names_are_recognised_as_results() {
-        let folder = OutputFolder {
-            path: PathBuf::from("nowhere"),
-        };
+        let folder = OutputFolder { path: PathBuf::from("nowhere") };
         for moment in [
             PictureMoment::Depth(0.006),
             PictureMoment::Depth(-0.00125),

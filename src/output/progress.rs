@@ -34,18 +34,14 @@ impl Progress {
             .progress_chars("=> ");
         let bar = ProgressBar::with_draw_target(Some(ticks(total_simulated)), target);
         bar.set_style(style);
-        Self {
-            bar,
-            total: total_simulated,
-        }
+        Self { bar, total: total_simulated }
     }
 
     /// Shows one frame; `real_time_factor` is simulated time over wall time.
     pub fn update(&self, record: &FrameRecord, real_time_factor: f64) {
         let left = (self.total - record.time).max(0.0) / real_time_factor;
         self.bar.set_position(ticks(record.time));
-        self.bar
-            .set_message(message(record, real_time_factor, left));
+        self.bar.set_message(message(record, real_time_factor, left));
     }
 
     /// Removes the line.
@@ -125,19 +121,13 @@ mod tests {
     }
 
     fn line(columns: u16) -> String {
-        let terminal = OneLine {
-            columns,
-            text: Arc::default(),
-        };
+        let terminal = OneLine { columns, text: Arc::default() };
         let target = ProgressDrawTarget::term_like_with_hz(Box::new(terminal.clone()), 255);
         let progress = Progress::on(target, 12.0);
         let record = FrameRecord {
             time: 6.0,
             depth: 12e-3,
-            force: ForceParts {
-                axial: 1.294,
-                ..Default::default()
-            },
+            force: ForceParts { axial: 1.294, ..Default::default() },
             ..Default::default()
         };
         progress.update(&record, 0.5);
@@ -151,10 +141,7 @@ mod tests {
     #[test]
     fn fits_into_80_and_40_columns() {
         let wide = line(80);
-        assert_eq!(
-            wide.trim_end(),
-            "=====>      50% 12.0mm 1.29N 12s left   0.50 x real time   t = 6.00 s"
-        );
+        assert_eq!(wide.trim_end(), "=====>      50% 12.0mm 1.29N 12s left   0.50 x real time   t = 6.00 s");
         let narrow = line(40);
         assert!(narrow.trim_end().chars().count() <= 40, "{narrow:?}");
         assert!(narrow.contains("12.0mm 1.29N 12s left"), "{narrow:?}");

@@ -144,31 +144,18 @@ impl Summary {
             inward = records.iter().collect();
         }
         self.kinetic_to_internal = median(inward.iter().map(|r| kinetic_to_internal(&r.energy)));
-        self.hourglass_to_internal =
-            median(inward.iter().map(|r| hourglass_to_internal(&r.energy)));
+        self.hourglass_to_internal = median(inward.iter().map(|r| hourglass_to_internal(&r.energy)));
         let internal = |r: &FrameRecord| r.energy.elastic + r.energy.hourglass;
         let telling = TELLING_ENERGY * records.iter().map(internal).fold(0.0, f64::max);
-        self.hourglass_to_internal_max = largest(
-            records
-                .iter()
-                .filter(|r| internal(r) >= telling)
-                .map(|r| hourglass_to_internal(&r.energy)),
-        );
-        self.clamped_nodes = records
-            .iter()
-            .map(|r| u64::from(r.health.clamped_nodes))
-            .sum();
-        self.inverted_cells = records
-            .iter()
-            .map(|r| u64::from(r.health.inverted_cells))
-            .max()
-            .unwrap_or(0);
+        self.hourglass_to_internal_max =
+            largest(records.iter().filter(|r| internal(r) >= telling).map(|r| hourglass_to_internal(&r.energy)));
+        self.clamped_nodes = records.iter().map(|r| u64::from(r.health.clamped_nodes)).sum();
+        self.inverted_cells = records.iter().map(|r| u64::from(r.health.inverted_cells)).max().unwrap_or(0);
     }
 
     /// Writes `summary.json`, whole or not at all.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut text = serde_json::to_string_pretty(self)
-            .map_err(|source| Error::file(path, source.into()))?;
+        let mut text = serde_json::to_string_pretty(self).map_err(|source| Error::file(path, source.into()))?;
         text.push('\n');
         whole_file::write(path, text.as_bytes())
     }
@@ -187,13 +174,7 @@ impl Summary {
 
 /// Largest value, 0 of none, NaN if any value is NaN (`f64::max` would drop it).
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(0.0, |a: f64, b| {
-        if a.is_nan() || b.is_nan() {
-            f64::NAN
-        } else {
-            a.max(b)
-        }
-    })
+    values.fold(0.0, |a: f64, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) })
 }
 
 /// Median, 0 of none, NaN if any value is NaN.
@@ -207,11 +188,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     }
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
-    if values.len() % 2 == 1 {
-        values[middle]
-    } else {
-        0.5 * (values[middle - 1] + values[middle])
-    }
+    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
 #[cfg(test)]
@@ -234,17 +211,10 @@ mod tests {
 
     #[test]
     fn status_is_one_string() {
-        for status in [
-            Status::Ok,
-            Status::Interrupted,
-            Status::Failed("an inverted cell".into()),
-        ] {
+        for status in [Status::Ok, Status::Interrupted, Status::Failed("an inverted cell".into())] {
             let text = serde_json::to_string(&status).unwrap();
             assert_eq!(serde_json::from_str::<Status>(&text).unwrap(), status);
         }
-        assert_eq!(
-            serde_json::to_string(&Status::Failed("x".into())).unwrap(),
-            "\"failed: x\""
-        );
+        assert_eq!(serde_json::to_string(&Status::Failed("x".into())).unwrap(), "\"failed: x\"");
     }
 }

@@ -80,10 +80,7 @@ struct Table {
 impl Table {
     fn create(path: PathBuf, columns: &[&str]) -> Result<Self> {
         let file = File::create(&path).map_err(|source| Error::file(&path, source))?;
-        let mut table = Self {
-            path,
-            writer: csv::Writer::from_writer(file),
-        };
+        let mut table = Self { path, writer: csv::Writer::from_writer(file) };
         table.write_row(columns)?;
         Ok(table)
     }
@@ -162,20 +159,10 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
 /// Nine significant digits, trailing zeros left away; an exponent where the plain form would be long.
 pub fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
-        return if value == 0.0 {
-            "0".into()
-        } else {
-            value.to_string()
-        };
+        return if value == 0.0 { "0".into() } else { value.to_string() };
     }
-    let rounded: f64 = format!("{value:.8e}")
-        .parse()
-        .expect("a number that was just formatted can be parsed");
-    if (1e-4..1e9).contains(&rounded.abs()) {
-        format!("{rounded}")
-    } else {
-        format!("{rounded:e}")
-    }
+    let rounded: f64 = format!("{value:.8e}").parse().expect("a number that was just formatted can be parsed");
+    if (1e-4..1e9).contains(&rounded.abs()) { format!("{rounded}") } else { format!("{rounded:e}") }
 }
 
 #[cfg(test)]
@@ -196,17 +183,9 @@ mod tests {
 
     #[test]
     fn ratios_are_zero_without_internal_energy() {
-        let energy = EnergyAccount {
-            kinetic: 1.0,
-            ..Default::default()
-        };
+        let energy = EnergyAccount { kinetic: 1.0, ..Default::default() };
         assert_eq!(kinetic_to_internal(&energy), 0.0);
-        let energy = EnergyAccount {
-            kinetic: 1.0,
-            elastic: 3.0,
-            hourglass: 1.0,
-            ..Default::default()
-        };
+        let energy = EnergyAccount { kinetic: 1.0, elastic: 3.0, hourglass: 1.0, ..Default::default() };
         assert_eq!(kinetic_to_internal(&energy), 0.25);
         assert_eq!(hourglass_to_internal(&energy), 0.25);
     }

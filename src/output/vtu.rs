@@ -26,10 +26,7 @@ pub struct FieldFiles {
 impl FieldFiles {
     /// Nothing is written before the first frame.
     pub fn new(folder: &OutputFolder) -> Self {
-        Self {
-            folder: folder.clone(),
-            written: Vec::new(),
-        }
+        Self { folder: folder.clone(), written: Vec::new() }
     }
 
     /// Writes one frame, then the collection with it; returns the path of the frame.
@@ -41,10 +38,7 @@ impl FieldFiles {
         whole_file::write(&path, vtu(mesh, snapshot).as_bytes())?;
         self.written.retain(|(_, other)| *other != name);
         self.written.push((snapshot.time, name));
-        whole_file::write(
-            &self.folder.file(FIELD_COLLECTION),
-            collection(&self.written).as_bytes(),
-        )?;
+        whole_file::write(&self.folder.file(FIELD_COLLECTION), collection(&self.written).as_bytes())?;
         Ok(path)
     }
 }
@@ -52,11 +46,7 @@ impl FieldFiles {
 /// Text of one VTU file. Empty cell fields are left out.
 pub fn vtu(mesh: &BlockMesh, snapshot: &FieldSnapshot) -> String {
     let (nodes, cells) = (mesh.node_count(), mesh.cell_count());
-    assert_eq!(
-        snapshot.displacement.len(),
-        nodes,
-        "a snapshot holds one displacement per node"
-    );
+    assert_eq!(snapshot.displacement.len(), nodes, "a snapshot holds one displacement per node");
     let points = (0..nodes).flat_map(|n| mesh.rest_position(n).to_array());
     let displacement = snapshot.displacement.iter().flat_map(|u| u.to_array());
     let connectivity = (0..cells).flat_map(|c| mesh.cell_nodes(c));
@@ -111,11 +101,7 @@ fn floats(values: impl Iterator<Item = f64>) -> Vec<u8> {
 
 fn integers(values: impl Iterator<Item = usize>) -> Vec<u8> {
     values
-        .flat_map(|v| {
-            i32::try_from(v)
-                .expect("a mesh that fits into memory has fewer than 2^31 corners")
-                .to_le_bytes()
-        })
+        .flat_map(|v| i32::try_from(v).expect("a mesh that fits into memory has fewer than 2^31 corners").to_le_bytes())
         .collect()
 }
 
@@ -134,8 +120,7 @@ fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
-        let word =
-            chunk.iter().fold(0u32, |word, &b| word << 8 | u32::from(b)) << (8 * (3 - chunk.len()));
+        let word = chunk.iter().fold(0u32, |word, &b| word << 8 | u32::from(b)) << (8 * (3 - chunk.len()));
         for digit in 0..4 {
             if digit <= chunk.len() {
                 text.push(ALPHABET[(word >> (18 - 6 * digit) & 63) as usize] as char);

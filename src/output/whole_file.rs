@@ -17,13 +17,11 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
         file.write_all(bytes)?;
         file.sync_all()
     });
-    written
-        .and_then(|()| fs::rename(&unfinished, path))
-        .map_err(|source| {
-            // The first error is the one to report; what is left of the temporary file is of no use.
-            let _ = fs::remove_file(&unfinished);
-            Error::file(path, source)
-        })
+    written.and_then(|()| fs::rename(&unfinished, path)).map_err(|source| {
+        // The first error is the one to report; what is left of the temporary file is of no use.
+        let _ = fs::remove_file(&unfinished);
+        Error::file(path, source)
+    })
 }
 
 /// `force.svg` -> `force.svg.part`.

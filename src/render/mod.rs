@@ -33,9 +33,7 @@ impl Image {
     /// Red, green, blue, alpha of one pixel.
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
         let at = 4 * (y as usize * self.width as usize + x as usize);
-        self.rgba[at..at + 4]
-            .try_into()
-            .expect("a slice of four bytes")
+        self.rgba[at..at + 4].try_into().expect("a slice of four bytes")
     }
 
     /// Writes the picture, whole or not at all.
@@ -56,11 +54,7 @@ pub fn draw(
         Some((device, queue)) => offscreen::render_on_device(device, queue, &picture)?,
         None => raster::render_on_processor(&picture),
     };
-    Ok(Image {
-        width: picture.width,
-        height: picture.height,
-        rgba,
-    })
+    Ok(Image { width: picture.width, height: picture.height, rgba })
 }
 
 /// Writes four bytes per pixel (sRGB) as a PNG file, whole or not at all.

@@ -22,11 +22,7 @@ struct Viewport {
 }
 
 /// Four bytes per pixel (sRGB), rows from the top.
-pub fn render_on_device(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    picture: &Picture,
-) -> Result<Vec<u8>> {
+pub fn render_on_device(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result<Vec<u8>> {
     let largest = device.limits().max_texture_dimension_2d;
     if picture.width > largest || picture.height > largest {
         return Err(Error::input(
@@ -46,11 +42,7 @@ pub fn render_on_device(
 }
 
 fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result<Vec<u8>> {
-    let size = wgpu::Extent3d {
-        width: picture.width,
-        height: picture.height,
-        depth_or_array_layers: 1,
-    };
+    let size = wgpu::Extent3d { width: picture.width, height: picture.height, depth_or_array_layers: 1 };
     let texture = |label, sample_count, usage| {
         device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
@@ -63,16 +55,8 @@ fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result
             view_formats: &[],
         })
     };
-    let samples = texture(
-        "stress_picture samples",
-        SAMPLES,
-        wgpu::TextureUsages::RENDER_ATTACHMENT,
-    );
-    let target = texture(
-        "stress_picture",
-        1,
-        wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-    );
+    let samples = texture("stress_picture samples", SAMPLES, wgpu::TextureUsages::RENDER_ATTACHMENT);
+    let target = texture("stress_picture", 1, wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC);
     let row_bytes = 4 * picture.width;
     let padded_row = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let readback = device.create_buffer(&wgpu::BufferDescriptor {
@@ -84,10 +68,7 @@ fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result
 
     let shader = parsed_shader()?;
     let pipeline = pipeline(device);
-    let viewport = Viewport {
-        size: [picture.width as f32, picture.height as f32],
-        _pad: [0.0; 2],
-    };
+    let viewport = Viewport { size: [picture.width as f32, picture.height as f32], _pad: [0.0; 2] };
     let uniform = |label, contents: &[u8]| {
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some(label),
@@ -101,14 +82,8 @@ fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result
         label: Some("stress_picture"),
         layout: &pipeline.get_bind_group_layout(0),
         entries: &[
-            wgpu::BindGroupEntry {
-                binding: binding(&shader, "viewport")?,
-                resource: viewport.as_entire_binding(),
-            },
-            wgpu::BindGroupEntry {
-                binding: binding(&shader, "colour_table")?,
-                resource: table.as_entire_binding(),
-            },
+            wgpu::BindGroupEntry { binding: binding(&shader, "viewport")?, resource: viewport.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: binding(&shader, "colour_table")?, resource: table.as_entire_binding() },
         ],
     });
     let vertices: Vec<(wgpu::Buffer, u32)> = picture
@@ -124,9 +99,7 @@ fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result
         })
         .collect();
 
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-        label: Some("stress_picture"),
-    });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("stress_picture") });
     {
         let [r, g, b, a] = picture.background.map(f64::from);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -153,11 +126,7 @@ fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result
         target.as_image_copy(),
         wgpu::TexelCopyBufferInfo {
             buffer: &readback,
-            layout: wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(padded_row),
-                rows_per_image: None,
-            },
+            layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded_row), rows_per_image: None },
         },
         size,
     );
@@ -168,36 +137,19 @@ fn draw(device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) -> Result
         // The receiver is gone only if this function has returned with another error.
         let _ = sender.send(mapped);
     });
-    let failed = |reason: &dyn std::fmt::Display| {
-        Error::Device(format!("stress picture, read-back: {reason}"))
-    };
-    device
-        .poll(wgpu::PollType::wait_indefinitely())
-        .map_err(|reason| failed(&reason))?;
-    receiver
-        .recv()
-        .map_err(|reason| failed(&reason))?
-        .map_err(|reason| failed(&reason))?;
-    let mapped = readback
-        .get_mapped_range(..)
-        .map_err(|reason| failed(&reason))?;
-    Ok(mapped
-        .chunks(padded_row as usize)
-        .flat_map(|row| &row[..row_bytes as usize])
-        .copied()
-        .collect())
+    let failed = |reason: &dyn std::fmt::Display| Error::Device(format!("stress picture, read-back: {reason}"));
+    device.poll(wgpu::PollType::wait_indefinitely()).map_err(|reason| failed(&reason))?;
+    receiver.recv().map_err(|reason| failed(&reason))?.map_err(|reason| failed(&reason))?;
+    let mapped = readback.get_mapped_range(..).map_err(|reason| failed(&reason))?;
+    Ok(mapped.chunks(padded_row as usize).flat_map(|row| &row[..row_bytes as usize]).copied().collect())
 }
 
 fn shader_error(message: String) -> Error {
-    Error::Shader {
-        stage: "stress_picture".into(),
-        message,
-    }
+    Error::Shader { stage: "stress_picture".into(), message }
 }
 
 fn parsed_shader() -> Result<naga::Module> {
-    naga::front::wgsl::parse_str(SHADER)
-        .map_err(|reason| shader_error(reason.emit_to_string(SHADER)))
+    naga::front::wgsl::parse_str(SHADER).map_err(|reason| shader_error(reason.emit_to_string(SHADER)))
 }
 
 /// Binding number of a variable of the shader, by its name.
@@ -233,10 +185,7 @@ fn pipeline(device: &wgpu::Device) -> wgpu::RenderPipeline {
         },
         primitive: wgpu::PrimitiveState::default(),
         depth_stencil: None,
-        multisample: wgpu::MultisampleState {
-            count: SAMPLES,
-            ..Default::default()
-        },
+        multisample: wgpu::MultisampleState { count: SAMPLES, ..Default::default() },
         fragment: Some(wgpu::FragmentState {
             module: &module,
             entry_point: Some("colour_pixel"),
@@ -268,17 +217,9 @@ mod tests {
         let naga::TypeInner::Struct { members, span } = &viewport.inner else {
             panic!("Viewport is no struct");
         };
-        let found: Vec<(&str, usize)> = members
-            .iter()
-            .map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize))
-            .collect();
-        assert_eq!(
-            found,
-            [
-                ("size", offset_of!(Viewport, size)),
-                ("_pad", offset_of!(Viewport, _pad)),
-            ]
-        );
+        let found: Vec<(&str, usize)> =
+            members.iter().map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize)).collect();
+        assert_eq!(found, [("size", offset_of!(Viewport, size)), ("_pad", offset_of!(Viewport, _pad)),]);
         assert_eq!(*span as usize, size_of::<Viewport>());
     }
 

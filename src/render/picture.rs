@@ -101,10 +101,7 @@ impl Picture {
     pub fn table_colour(&self, value: f32) -> [f32; 4] {
         let at = value.clamp(0.0, 1.0) * 255.0;
         let low = at as usize;
-        let (a, b) = (
-            self.colour_table[low],
-            self.colour_table[(low + 1).min(255)],
-        );
+        let (a, b) = (self.colour_table[low], self.colour_table[(low + 1).min(255)]);
         std::array::from_fn(|i| a[i] + (at - low as f32) * (b[i] - a[i]))
     }
 }
@@ -127,33 +124,20 @@ const OPENED_FIELD_WEIGHT: f32 = 0.25;
 
 impl Colour {
     fn linear(self, alpha: f32) -> [f32; 4] {
-        [
-            decode_srgb(self.0),
-            decode_srgb(self.1),
-            decode_srgb(self.2),
-            alpha,
-        ]
+        [decode_srgb(self.0), decode_srgb(self.1), decode_srgb(self.2), alpha]
     }
 }
 
 /// sRGB byte to linear light (IEC 61966-2-1).
 fn decode_srgb(byte: u8) -> f32 {
     let c = f32::from(byte) / 255.0;
-    if c <= 0.04045 {
-        c / 12.92
-    } else {
-        ((c + 0.055) / 1.055).powf(2.4)
-    }
+    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
 /// Linear light to sRGB byte (IEC 61966-2-1).
 pub(super) fn encode_srgb(linear: f32) -> u8 {
     let c = linear.clamp(0.0, 1.0);
-    let encoded = if c <= 0.003_130_8 {
-        12.92 * c
-    } else {
-        1.055 * c.powf(1.0 / 2.4) - 0.055
-    };
+    let encoded = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
     (255.0 * encoded).round() as u8
 }
 
@@ -200,10 +184,7 @@ impl Layout {
         let plot_height = (view.y * pixels_per_metre).clamp(least, most);
         let height = (plot_height + unit * (TITLE_STRIP + CAPTION_STRIP)).round();
         // Spare height goes above the tissue, where the tool is.
-        let centre = DVec2::new(
-            0.5 * (low.x + high.x),
-            low.y + 0.5 * plot_height / pixels_per_metre,
-        );
+        let centre = DVec2::new(0.5 * (low.x + high.x), low.y + 0.5 * plot_height / pixels_per_metre);
         Self {
             size: (width, height as u32),
             unit,
@@ -221,10 +202,7 @@ impl Layout {
     /// Plane [m] to picture [px].
     fn place(&self, point: DVec2) -> DVec2 {
         let p = (point - self.centre) * self.pixels_per_metre;
-        DVec2::new(
-            0.5 * (self.plot.left + self.plot.right) + p.x,
-            0.5 * (self.plot.top + self.plot.bottom) - p.y,
-        )
+        DVec2::new(0.5 * (self.plot.left + self.plot.right) + p.x, 0.5 * (self.plot.top + self.plot.bottom) - p.y)
     }
 }
 
@@ -268,25 +246,12 @@ struct StressScale {
 impl StressScale {
     fn new(chosen: Option<f64>, slice: &Slice) -> Self {
         // Opened cells are drawn pale: they set no scale.
-        let largest = slice
-            .triangles
-            .iter()
-            .filter(|t| !t.opened)
-            .flat_map(|t| t.von_mises)
-            .fold(0.0, f64::max);
+        let largest = slice.triangles.iter().filter(|t| !t.opened).flat_map(|t| t.von_mises).fold(0.0, f64::max);
         match chosen {
-            Some(top) if top > 0.0 => Self {
-                top,
-                steps: 4,
-                exceeded: largest > top,
-            },
+            Some(top) if top > 0.0 => Self { top, steps: 4, exceeded: largest > top },
             _ => {
                 let (top, steps) = rounded_up(largest);
-                Self {
-                    top,
-                    steps,
-                    exceeded: false,
-                }
+                Self { top, steps, exceeded: false }
             }
         }
     }
@@ -294,17 +259,8 @@ impl StressScale {
 
 /// The next of 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten, and into how many steps it divides well.
 fn rounded_up(value: f64) -> (f64, usize) {
-    const STEPS: [(f64, usize); 9] = [
-        (1.0, 5),
-        (1.5, 3),
-        (2.0, 4),
-        (3.0, 3),
-        (4.0, 4),
-        (5.0, 5),
-        (6.0, 3),
-        (8.0, 4),
-        (10.0, 5),
-    ];
+    const STEPS: [(f64, usize); 9] =
+        [(1.0, 5), (1.5, 3), (2.0, 4), (3.0, 3), (4.0, 4), (5.0, 5), (6.0, 3), (8.0, 4), (10.0, 5)];
     if !(value > 0.0 && value.is_finite()) {
         return (1e3, 5);
     }
@@ -368,15 +324,7 @@ impl Canvas {
             return;
         };
         let across = 0.5 * width * along.perp();
-        self.polygon(
-            &[
-                ends[0] + across,
-                ends[1] + across,
-                ends[1] - across,
-                ends[0] - across,
-            ],
-            colour,
-        );
+        self.polygon(&[ends[0] + across, ends[1] + across, ends[1] - across, ends[0] - across], colour);
     }
 
     /// A line with round ends, opaque.
@@ -384,11 +332,8 @@ impl Canvas {
         let colour = colour.linear(1.0);
         self.line(ends, width, colour);
         for end in ends {
-            let disc: Vec<DVec2> = (0..8)
-                .map(|i| {
-                    end + 0.5 * width * DVec2::from_angle(std::f64::consts::TAU * i as f64 / 8.0)
-                })
-                .collect();
+            let disc: Vec<DVec2> =
+                (0..8).map(|i| end + 0.5 * width * DVec2::from_angle(std::f64::consts::TAU * i as f64 / 8.0)).collect();
             self.polygon(&disc, colour);
         }
     }
@@ -402,41 +347,20 @@ impl Canvas {
     }
 }
 
-fn draw_tissue(
-    canvas: &mut Canvas,
-    layout: &Layout,
-    slice: &Slice,
-    scale: &StressScale,
-    cell_size: f64,
-) {
+fn draw_tissue(canvas: &mut Canvas, layout: &Layout, slice: &Slice, scale: &StressScale, cell_size: f64) {
     for t in &slice.triangles {
-        let (colour, weight) = if t.opened {
-            (OPENED.linear(1.0), OPENED_FIELD_WEIGHT)
-        } else {
-            (WHITE.linear(1.0), 1.0)
-        };
+        let (colour, weight) =
+            if t.opened { (OPENED.linear(1.0), OPENED_FIELD_WEIGHT) } else { (WHITE.linear(1.0), 1.0) };
         for (point, stress) in t.points.iter().zip(t.von_mises) {
-            canvas.vertex(
-                layout.place(*point),
-                colour,
-                (stress / scale.top).clamp(0.0, 1.0) as f32,
-                weight,
-            );
+            canvas.vertex(layout.place(*point), colour, (stress / scale.top).clamp(0.0, 1.0) as f32, weight);
         }
     }
     // Cell edges fade out where cells are only a few pixels wide.
     let cell_pixels = cell_size * layout.pixels_per_metre / layout.unit;
     let alpha = 0.07 * ((cell_pixels - 3.0) / 9.0).clamp(0.0, 1.0) as f32;
-    for (border, width, colour) in [
-        (false, 1.0, WHITE.linear(alpha)),
-        (true, 2.0, INK.linear(1.0)),
-    ] {
+    for (border, width, colour) in [(false, 1.0, WHITE.linear(alpha)), (true, 2.0, INK.linear(1.0))] {
         for l in slice.lines.iter().filter(|l| l.border == border) {
-            canvas.line(
-                l.points.map(|p| layout.place(p)),
-                width * layout.unit,
-                colour,
-            );
+            canvas.line(l.points.map(|p| layout.place(p)), width * layout.unit, colour);
         }
     }
 }
@@ -463,23 +387,13 @@ impl ToolDrawing {
     fn new(scene: &Scene, snapshot: &FieldSnapshot, plane: &Plane) -> Option<Self> {
         let (tip, direction) = snapshot.tool_pose?;
         let shape = match scene.tool.as_ref()? {
-            Tool::Needle(needle) => ToolShape::Rod {
-                radius: needle.radius,
-                cone: needle.tip_length,
-            },
-            Tool::FlatPunch { radius, .. } => ToolShape::Rod {
-                radius: *radius,
-                cone: 0.0,
-            },
+            Tool::Needle(needle) => ToolShape::Rod { radius: needle.radius, cone: needle.tip_length },
+            Tool::FlatPunch { radius, .. } => ToolShape::Rod { radius: *radius, cone: 0.0 },
             Tool::Sphere { radius } => ToolShape::Sphere { radius: *radius },
         };
         let back = DVec2::new(-direction.dot(plane.right), -direction.dot(plane.up));
         let tip = plane.project(tip);
-        tip.is_finite().then_some(Self {
-            tip,
-            back: back.try_normalize().unwrap_or(DVec2::Y),
-            shape,
-        })
+        tip.is_finite().then_some(Self { tip, back: back.try_normalize().unwrap_or(DVec2::Y), shape })
     }
 
     /// True where the tool covers a point of the plane [m].
@@ -502,18 +416,10 @@ impl ToolDrawing {
                 self.draw_rod(canvas, layout, radius, cone, length);
             }
             ToolShape::Sphere { radius } => {
-                let stem = Self {
-                    tip: self.tip + radius * self.back,
-                    ..*self
-                };
+                let stem = Self { tip: self.tip + radius * self.back, ..*self };
                 stem.draw_rod(canvas, layout, 0.25 * radius, 0.0, length);
                 let centre = layout.place(self.tip + radius * self.back);
-                draw_ball(
-                    canvas,
-                    centre,
-                    radius * layout.pixels_per_metre,
-                    layout.unit,
-                );
+                draw_ball(canvas, centre, radius * layout.pixels_per_metre, layout.unit);
             }
         }
     }
@@ -521,31 +427,19 @@ impl ToolDrawing {
     fn draw_rod(&self, canvas: &mut Canvas, layout: &Layout, radius: f64, cone: f64, length: f64) {
         const STRIPS: usize = 16;
         let side = self.back.perp();
-        let at = |t: f64, along: f64, width: f64| {
-            layout.place(self.tip + along * self.back + t * width * side)
-        };
+        let at = |t: f64, along: f64, width: f64| layout.place(self.tip + along * self.back + t * width * side);
         // Shading runs from the left side of the rod in the picture to its right one.
         let left_is = if side.x > 0.0 { -1.0 } else { 1.0 };
         for strip in 0..STRIPS {
             let t = [strip, strip + 1].map(|i| 2.0 * i as f64 / STRIPS as f64 - 1.0);
             let [a, b] = t.map(|t| steel(-left_is * t));
             canvas.patch(
-                [
-                    at(t[0], cone, radius),
-                    at(t[1], cone, radius),
-                    at(t[1], length, radius),
-                    at(t[0], length, radius),
-                ],
+                [at(t[0], cone, radius), at(t[1], cone, radius), at(t[1], length, radius), at(t[0], length, radius)],
                 [a, b, b, a],
             );
             if cone > 0.0 {
                 canvas.patch(
-                    [
-                        at(0.0, 0.0, radius),
-                        at(0.0, 0.0, radius),
-                        at(t[1], cone, radius),
-                        at(t[0], cone, radius),
-                    ],
+                    [at(0.0, 0.0, radius), at(0.0, 0.0, radius), at(t[1], cone, radius), at(t[0], cone, radius)],
                     [a, b, b, a],
                 );
             }
@@ -591,12 +485,8 @@ fn draw_ball(canvas: &mut Canvas, centre: DVec2, radius: f64, unit: f64) {
     };
     for sector in 0..SECTORS {
         for ring in 0..RINGS {
-            let corners = [
-                point(ring, sector),
-                point(ring, sector + 1),
-                point(ring + 1, sector + 1),
-                point(ring + 1, sector),
-            ];
+            let corners =
+                [point(ring, sector), point(ring, sector + 1), point(ring + 1, sector + 1), point(ring + 1, sector)];
             canvas.patch(corners.map(|p| centre + radius * p), corners.map(shade));
         }
         let rim = [point(RINGS, sector), point(RINGS, sector + 1)];
@@ -608,29 +498,12 @@ fn draw_ball(canvas: &mut Canvas, centre: DVec2, radius: f64, unit: f64) {
 fn draw_frame(canvas: &mut Canvas, layout: &Layout) {
     let (width, height) = (f64::from(layout.size.0), f64::from(layout.size.1));
     let plot = layout.plot;
-    let page = Rectangle {
-        left: 0.0,
-        top: 0.0,
-        right: width,
-        bottom: height,
-    };
+    let page = Rectangle { left: 0.0, top: 0.0, right: width, bottom: height };
     for margin in [
-        Rectangle {
-            bottom: plot.top,
-            ..page
-        },
-        Rectangle {
-            top: plot.bottom,
-            ..page
-        },
-        Rectangle {
-            right: plot.left,
-            ..page
-        },
-        Rectangle {
-            left: plot.right,
-            ..page
-        },
+        Rectangle { bottom: plot.top, ..page },
+        Rectangle { top: plot.bottom, ..page },
+        Rectangle { right: plot.left, ..page },
+        Rectangle { left: plot.right, ..page },
     ] {
         canvas.rectangle(margin, PAGE);
     }
@@ -650,60 +523,29 @@ fn outline(canvas: &mut Canvas, r: Rectangle, width: f64) {
     }
 }
 
-fn draw_texts(
-    canvas: &mut Canvas,
-    layout: &Layout,
-    scene: &Scene,
-    snapshot: &FieldSnapshot,
-    slice: &Slice,
-) {
+fn draw_texts(canvas: &mut Canvas, layout: &Layout, scene: &Scene, snapshot: &FieldSnapshot, slice: &Slice) {
     let unit = layout.unit;
     let (width, height) = (f64::from(layout.size.0), f64::from(layout.size.1));
-    let title = if scene.title.is_empty() {
-        &scene.name
-    } else {
-        &scene.title
-    };
+    let title = if scene.title.is_empty() { &scene.name } else { &scene.title };
     let capital = 15.0 * unit;
     let room = width - 2.0 * unit * LEFT_MARGIN;
-    canvas.text(
-        &stroke_font::shortened(title, capital, room),
-        DVec2::new(layout.plot.left, 35.0 * unit),
-        capital,
-        INK,
-    );
+    canvas.text(&stroke_font::shortened(title, capital, room), DVec2::new(layout.plot.left, 35.0 * unit), capital, INK);
 
     let baseline = height - 17.0 * unit;
     let bar_left = draw_scale_bar(canvas, layout, baseline);
     let mut caption = String::new();
     if snapshot.tool_pose.is_some() {
-        caption += &format!(
-            "depth {:.1} mm   force {:.2} N   ",
-            snapshot.depth * 1e3,
-            snapshot.axial_force
-        );
+        caption += &format!("depth {:.1} mm   force {:.2} N   ", snapshot.depth * 1e3, snapshot.axial_force);
     }
     let decimals = if snapshot.time < 1.0 { 3 } else { 2 };
-    caption += &format!(
-        "t = {:.decimals$} s   cells {} mm",
-        snapshot.time,
-        three_digits(scene.tissue.cell_size * 1e3)
-    );
+    caption += &format!("t = {:.decimals$} s   cells {} mm", snapshot.time, three_digits(scene.tissue.cell_size * 1e3));
     let capital = 11.5 * unit;
     let room = bar_left - layout.plot.left - 20.0 * unit;
-    canvas.text(
-        &stroke_font::shortened(&caption, capital, room),
-        DVec2::new(layout.plot.left, baseline),
-        capital,
-        INK,
-    );
+    canvas.text(&stroke_font::shortened(&caption, capital, room), DVec2::new(layout.plot.left, baseline), capital, INK);
     if slice.cells_left_out > 0 {
         canvas.text(
             &format!("{} cells not drawn: no number", slice.cells_left_out),
-            DVec2::new(
-                layout.plot.left + 10.0 * unit,
-                layout.plot.top + 22.0 * unit,
-            ),
+            DVec2::new(layout.plot.left + 10.0 * unit, layout.plot.top + 22.0 * unit),
             capital,
             WARNING,
         );
@@ -715,24 +557,14 @@ fn draw_scale_bar(canvas: &mut Canvas, layout: &Layout, baseline: f64) -> f64 {
     let unit = layout.unit;
     let longest = 0.26 * (layout.plot.right - layout.plot.left) / layout.pixels_per_metre;
     let power = 10f64.powf(longest.log10().floor());
-    let length = [5.0, 2.0, 1.0]
-        .map(|factor| factor * power)
-        .into_iter()
-        .find(|&l| l <= longest)
-        .unwrap_or(power);
+    let length = [5.0, 2.0, 1.0].map(|factor| factor * power).into_iter().find(|&l| l <= longest).unwrap_or(power);
     let y = baseline - 5.0 * unit;
     let right = layout.plot.right;
     let left = right - length * layout.pixels_per_metre;
     for ends in [
         [DVec2::new(left, y), DVec2::new(right, y)],
-        [
-            DVec2::new(left, y - 6.0 * unit),
-            DVec2::new(left, y + 6.0 * unit),
-        ],
-        [
-            DVec2::new(right, y - 6.0 * unit),
-            DVec2::new(right, y + 6.0 * unit),
-        ],
+        [DVec2::new(left, y - 6.0 * unit), DVec2::new(left, y + 6.0 * unit)],
+        [DVec2::new(right, y - 6.0 * unit), DVec2::new(right, y + 6.0 * unit)],
     ] {
         canvas.round_line(ends, 2.0 * unit, INK);
     }
@@ -752,20 +584,12 @@ fn draw_colour_bar(canvas: &mut Canvas, layout: &Layout, scale: &StressScale) {
         _ => (1.0, "Pa"),
     };
     let capital = 10.5 * unit;
-    for (line, text) in ["von Mises".to_string(), format!("stress, {name}")]
-        .iter()
-        .enumerate()
-    {
+    for (line, text) in ["von Mises".to_string(), format!("stress, {name}")].iter().enumerate() {
         let y = layout.plot.top + unit * (11.0 + 20.0 * line as f64);
         canvas.text(text, DVec2::new(left, y), capital, INK);
     }
     let top = layout.plot.top + 54.0 * unit;
-    let bar = Rectangle {
-        left,
-        right: left + 22.0 * unit,
-        top,
-        bottom: top + 0.72 * (layout.plot.bottom - top),
-    };
+    let bar = Rectangle { left, right: left + 22.0 * unit, top, bottom: top + 0.72 * (layout.plot.bottom - top) };
     let corners = [
         (bar.left, bar.bottom, 0.0),
         (bar.right, bar.bottom, 0.0),
@@ -780,24 +604,12 @@ fn draw_colour_bar(canvas: &mut Canvas, layout: &Layout, scale: &StressScale) {
     for step in 0..=scale.steps {
         let share = step as f64 / scale.steps as f64;
         let y = bar.bottom + share * (bar.top - bar.bottom);
-        canvas.round_line(
-            [
-                DVec2::new(bar.right, y),
-                DVec2::new(bar.right + 6.0 * unit, y),
-            ],
-            1.5 * unit,
-            INK,
-        );
+        canvas.round_line([DVec2::new(bar.right, y), DVec2::new(bar.right + 6.0 * unit, y)], 1.5 * unit, INK);
         let mut label = three_digits(scale.top * factor * share);
         if scale.exceeded && step == scale.steps {
             label.insert(0, '≥');
         }
-        canvas.text(
-            &label,
-            DVec2::new(bar.right + 11.0 * unit, y + 0.5 * capital),
-            capital,
-            INK,
-        );
+        canvas.text(&label, DVec2::new(bar.right + 11.0 * unit, y + 0.5 * capital), capital, INK);
     }
 }
 
@@ -822,12 +634,7 @@ fn draw_path_legend(canvas: &mut Canvas, layout: &Layout) {
     canvas.rectangle(swatch, OPENED);
     outline(canvas, swatch, unit);
     let capital = 10.5 * unit;
-    canvas.text(
-        "cut path",
-        DVec2::new(swatch.right + 8.0 * unit, swatch.bottom - 3.0 * unit),
-        capital,
-        INK,
-    );
+    canvas.text("cut path", DVec2::new(swatch.right + 8.0 * unit, swatch.bottom - 3.0 * unit), capital, INK);
 }
 
 /// At most three significant digits, no trailing zeros.
@@ -837,11 +644,7 @@ fn three_digits(value: f64) -> String {
     }
     let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
     let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_string()
-    } else {
-        text
-    }
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
 }
 
 #[cfg(test)]

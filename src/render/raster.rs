@@ -17,11 +17,7 @@ const BAND: usize = 64;
 pub fn render_on_processor(picture: &Picture) -> Vec<u8> {
     let (width, height) = (picture.width as usize, picture.height as usize);
     let mut bytes = Vec::with_capacity(4 * width * height);
-    let background = [
-        picture.background[0],
-        picture.background[1],
-        picture.background[2],
-    ];
+    let background = [picture.background[0], picture.background[1], picture.background[2]];
     for top in (0..height).step_by(BAND) {
         let rows = BAND.min(height - top);
         let mut band = vec![[background; SAMPLES.len()]; width * rows];
@@ -61,14 +57,7 @@ fn counts_on_edge(from: Point, to: Point) -> bool {
 }
 
 /// Draws one triangle into a band of rows.
-fn fill(
-    band: &mut [[[f32; 3]; 4]],
-    picture: &Picture,
-    triangle: &[Vertex],
-    top: usize,
-    rows: usize,
-    width: usize,
-) {
+fn fill(band: &mut [[[f32; 3]; 4]], picture: &Picture, triangle: &[Vertex], top: usize, rows: usize, width: usize) {
     let near = |v: &Vertex| v.position.iter().all(|x| x.abs() <= FARTHEST);
     if !triangle.iter().all(near) {
         return;
@@ -90,32 +79,21 @@ fn fill(
         return;
     }
     let [a, b, c] = at;
-    let on_edge = [
-        counts_on_edge(b, c),
-        counts_on_edge(c, a),
-        counts_on_edge(a, b),
-    ];
+    let on_edge = [counts_on_edge(b, c), counts_on_edge(c, a), counts_on_edge(a, b)];
     // An edge function changes by at most this much from the middle of a pixel to its rim.
     let half = PARTS / 2;
-    let reach = [(b, c), (c, a), (a, b)]
-        .map(|(from, to)| half * ((to[0] - from[0]).abs() + (to[1] - from[1]).abs()));
+    let reach = [(b, c), (c, a), (a, b)].map(|(from, to)| half * ((to[0] - from[0]).abs() + (to[1] - from[1]).abs()));
     let single = single_colour(&corner);
     for row in lines {
         for column in columns.clone() {
             let corner_of_pixel = [column, row].map(|at| at as i64 * PARTS);
             let middle = corner_of_pixel.map(|at| at + half);
-            if edge(b, c, middle) < -reach[0]
-                || edge(c, a, middle) < -reach[1]
-                || edge(a, b, middle) < -reach[2]
-            {
+            if edge(b, c, middle) < -reach[0] || edge(c, a, middle) < -reach[1] || edge(a, b, middle) < -reach[2] {
                 continue;
             }
             let pixel = &mut band[(row - top) * width + column];
             for (sample, offset) in pixel.iter_mut().zip(SAMPLES) {
-                let p = [
-                    corner_of_pixel[0] + offset[0],
-                    corner_of_pixel[1] + offset[1],
-                ];
+                let p = [corner_of_pixel[0] + offset[0], corner_of_pixel[1] + offset[1]];
                 let weight = [edge(b, c, p), edge(c, a, p), edge(a, b, p)];
                 if (0..3).all(|i| weight[i] > 0 || (weight[i] == 0 && on_edge[i])) {
                     let colour = single.unwrap_or_else(|| {
@@ -151,8 +129,7 @@ fn single_colour(corner: &[Vertex; 3]) -> Option<[f32; 4]> {
 /// Colour at a point with the given weights of the corners. The same formula as in the shader.
 fn mixed_colour(picture: &Picture, corner: &[Vertex; 3], share: [f32; 3]) -> [f32; 4] {
     let [a, b, c] = corner;
-    let mean =
-        |values: [f32; 3]| share[0] * values[0] + share[1] * values[1] + share[2] * values[2];
+    let mean = |values: [f32; 3]| share[0] * values[0] + share[1] * values[1] + share[2] * values[2];
     let field = picture.table_colour(mean([a.field_value, b.field_value, c.field_value]));
     let weight = mean([a.field_weight, b.field_weight, c.field_weight]);
     std::array::from_fn(|i| {
@@ -174,13 +151,7 @@ mod tests {
             field_weight: 0.0,
             colour: [1.0, 1.0, 1.0, 0.5],
         };
-        let rim = [
-            (0.0, 0.0),
-            (20.0, 0.0),
-            (20.0, 20.0),
-            (7.3, 20.0),
-            (0.0, 20.0),
-        ];
+        let rim = [(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (7.3, 20.0), (0.0, 20.0)];
         for (x, y) in [(10.0, 10.0), (3.7, 11.125), (10.375, 0.125), (19.9, 19.9)] {
             let mut vertices = Vec::new();
             for i in 0..rim.len() {

@@ -20,14 +20,8 @@ const BESIDE_GRID_LINES: f64 = 0.02;
 const FARTHEST_MOVE: f64 = 2.0;
 
 /// The tetrahedra of a hexahedron, corners in VTK order.
-const TETRAHEDRA: [[usize; 4]; 6] = [
-    [0, 1, 2, 6],
-    [0, 1, 5, 6],
-    [0, 3, 2, 6],
-    [0, 3, 7, 6],
-    [0, 4, 5, 6],
-    [0, 4, 7, 6],
-];
+const TETRAHEDRA: [[usize; 4]; 6] =
+    [[0, 1, 2, 6], [0, 1, 5, 6], [0, 3, 2, 6], [0, 3, 7, 6], [0, 4, 5, 6], [0, 4, 7, 6]];
 
 /// The faces of a hexahedron as pairs of triangles on the same diagonals: axis, at the larger coordinate, triangles.
 const FACES: [(usize, bool, [[usize; 3]; 2]); 6] = [
@@ -56,27 +50,15 @@ impl Plane {
     /// For a needle the plane through its axis and world x; otherwise, and where both coincide, the plane
     /// y = entry.y.
     pub fn of_scene(scene: &Scene, snapshot: &FieldSnapshot) -> Self {
-        let upright = Self {
-            origin: scene.motion.entry,
-            right: DVec3::X,
-            up: DVec3::Z,
-            normal: DVec3::NEG_Y,
-        };
+        let upright = Self { origin: scene.motion.entry, right: DVec3::X, up: DVec3::Z, normal: DVec3::NEG_Y };
         let Some(Tool::Needle(_)) = scene.tool else {
             return upright;
         };
-        let (origin, direction) = snapshot
-            .tool_pose
-            .unwrap_or((scene.motion.entry, scene.motion.direction));
+        let (origin, direction) = snapshot.tool_pose.unwrap_or((scene.motion.entry, scene.motion.direction));
         // World x lies in the plane, so it serves as the axis to the right.
         let up = -direction.reject_from(DVec3::X);
         match up.try_normalize() {
-            Some(up) if origin.is_finite() => Self {
-                origin,
-                right: DVec3::X,
-                up,
-                normal: DVec3::X.cross(up),
-            },
+            Some(up) if origin.is_finite() => Self { origin, right: DVec3::X, up, normal: DVec3::X.cross(up) },
             _ => upright,
         }
     }
@@ -126,10 +108,8 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
     let mut plane = *plane;
     plane.origin -= plane.normal * (BESIDE_GRID_LINES * cell_size);
     let von_mises = smoothed_to_nodes(mesh, &snapshot.von_mises, &snapshot.stiffness);
-    let farthest = FARTHEST_MOVE
-        * (0..3)
-            .map(|a| mesh.lines[a][mesh.lines[a].len() - 1] - mesh.lines[a][0])
-            .fold(0.0, f64::max);
+    let farthest =
+        FARTHEST_MOVE * (0..3).map(|a| mesh.lines[a][mesh.lines[a].len() - 1] - mesh.lines[a][0]).fold(0.0, f64::max);
     let cells = mesh.cells();
     let mut slice = Slice::default();
     for cell in 0..mesh.cell_count() {
@@ -137,8 +117,7 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
         let displacement = nodes.map(|n| snapshot.displacement.get(n).copied().unwrap_or_default());
         // Written so that NaN counts as too far.
         let drawable = displacement.iter().all(|u| u.length() <= farthest);
-        let corner: [DVec3; 8] =
-            std::array::from_fn(|c| mesh.rest_position(nodes[c]) + displacement[c]);
+        let corner: [DVec3; 8] = std::array::from_fn(|c| mesh.rest_position(nodes[c]) + displacement[c]);
         if !drawable {
             slice.cells_left_out += 1;
             continue;
@@ -147,10 +126,7 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
         if height.iter().all(|&h| h >= 0.0) || height.iter().all(|&h| h < 0.0) {
             continue;
         }
-        let opened = snapshot
-            .stiffness
-            .get(cell)
-            .is_some_and(|&s| s < OPENED_BELOW);
+        let opened = snapshot.stiffness.get(cell).is_some_and(|&s| s < OPENED_BELOW);
         let crossing = |a: usize, b: usize| {
             let t = height[a] / (height[a] - height[b]);
             (
@@ -159,8 +135,7 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
             )
         };
         for tetrahedron in TETRAHEDRA {
-            let (above, below): (Vec<usize>, Vec<usize>) =
-                tetrahedron.into_iter().partition(|&c| height[c] >= 0.0);
+            let (above, below): (Vec<usize>, Vec<usize>) = tetrahedron.into_iter().partition(|&c| height[c] >= 0.0);
             let mut push = |corners: [(DVec2, f64); 3]| {
                 slice.triangles.push(SliceTriangle {
                     points: corners.map(|c| c.0),
@@ -173,12 +148,7 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
                     push([crossing(a, b), crossing(a, c), crossing(a, d)]);
                 }
                 (&[a, b], &[c, d]) => {
-                    let quad = [
-                        crossing(a, c),
-                        crossing(a, d),
-                        crossing(b, d),
-                        crossing(b, c),
-                    ];
+                    let quad = [crossing(a, c), crossing(a, d), crossing(b, d), crossing(b, c)];
                     push([quad[0], quad[1], quad[2]]);
                     push([quad[0], quad[2], quad[3]]);
                 }
@@ -200,10 +170,7 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
                     .map(|(a, b)| crossing(a, b).0)
                     .collect();
                 if let &[a, b] = ends.as_slice() {
-                    slice.lines.push(SliceLine {
-                        points: [a, b],
-                        border,
-                    });
+                    slice.lines.push(SliceLine { points: [a, b], border });
                 }
             }
         }
@@ -243,28 +210,13 @@ mod tests {
     use super::*;
 
     fn mesh() -> BlockMesh {
-        let lines = |low: f64, high: f64, n: usize| {
-            (0..=n)
-                .map(|i| low + (high - low) * i as f64 / n as f64)
-                .collect()
-        };
-        BlockMesh {
-            lines: [
-                lines(-0.01, 0.01, 5),
-                lines(-0.01, 0.01, 4),
-                lines(-0.016, 0.0, 4),
-            ],
-        }
+        let lines = |low: f64, high: f64, n: usize| (0..=n).map(|i| low + (high - low) * i as f64 / n as f64).collect();
+        BlockMesh { lines: [lines(-0.01, 0.01, 5), lines(-0.01, 0.01, 4), lines(-0.016, 0.0, 4)] }
     }
 
     fn plane(up: DVec3) -> Plane {
         let up = up.normalize();
-        Plane {
-            origin: DVec3::ZERO,
-            right: DVec3::X,
-            up,
-            normal: DVec3::X.cross(up),
-        }
+        Plane { origin: DVec3::ZERO, right: DVec3::X, up, normal: DVec3::X.cross(up) }
     }
 
     fn area(slice: &Slice) -> f64 {
@@ -280,9 +232,7 @@ mod tests {
 
     fn snapshot(mesh: &BlockMesh, displacement: impl Fn(DVec3) -> DVec3) -> FieldSnapshot {
         FieldSnapshot {
-            displacement: (0..mesh.node_count())
-                .map(|n| displacement(mesh.rest_position(n)))
-                .collect(),
+            displacement: (0..mesh.node_count()).map(|n| displacement(mesh.rest_position(n))).collect(),
             von_mises: vec![7.0; mesh.cell_count()],
             ..Default::default()
         }
@@ -291,29 +241,15 @@ mod tests {
     #[test]
     fn an_upright_cut_has_the_area_of_the_block() {
         let mesh = mesh();
-        let slice = cut(
-            &mesh,
-            &snapshot(&mesh, |_| DVec3::ZERO),
-            &plane(DVec3::Z),
-            4e-3,
-        );
-        assert!(
-            (area(&slice) - 0.02 * 0.016).abs() < 1e-12,
-            "{}",
-            area(&slice)
-        );
+        let slice = cut(&mesh, &snapshot(&mesh, |_| DVec3::ZERO), &plane(DVec3::Z), 4e-3);
+        assert!((area(&slice) - 0.02 * 0.016).abs() < 1e-12, "{}", area(&slice));
         for t in &slice.triangles {
             for value in t.von_mises {
                 assert!((value - 7.0).abs() < 1e-9);
             }
         }
         let length = |border: bool| -> f64 {
-            slice
-                .lines
-                .iter()
-                .filter(|l| l.border == border)
-                .map(|l| l.points[0].distance(l.points[1]))
-                .sum()
+            slice.lines.iter().filter(|l| l.border == border).map(|l| l.points[0].distance(l.points[1])).sum()
         };
         assert!((length(true) - 2.0 * 0.036).abs() < 1e-9);
         // Four inner grid lines upright, three lying.
@@ -344,11 +280,6 @@ mod tests {
         snapshot.displacement[last] = DVec3::splat(1e30);
         let slice = cut(&mesh, &snapshot, &plane(DVec3::Z), 4e-3);
         assert_eq!(slice.cells_left_out, 2);
-        assert!(
-            slice
-                .triangles
-                .iter()
-                .all(|t| t.points.iter().all(|p| p.is_finite()))
-        );
+        assert!(slice.triangles.iter().all(|t| t.points.iter().all(|p| p.is_finite())));
     }
 }

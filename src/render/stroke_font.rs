@@ -98,11 +98,7 @@ fn advance(character: char) -> f64 {
     if character.is_whitespace() {
         return SPACE + LETTER_SPACING;
     }
-    let right = glyph(character)
-        .iter()
-        .flatten()
-        .map(|p| p.x)
-        .fold(0.0, f64::max);
+    let right = glyph(character).iter().flatten().map(|p| p.x).fold(0.0, f64::max);
     right + LETTER_SPACING
 }
 
@@ -119,16 +115,9 @@ fn glyph(character: char) -> Vec<Vec<DVec2>> {
                 None => (stroke, false),
             };
             let digit = |b: u8| f64::from((b as char).to_digit(36).expect("a base-36 digit"));
-            let points: Vec<DVec2> = points
-                .as_bytes()
-                .chunks(2)
-                .map(|pair| DVec2::new(digit(pair[0]), digit(pair[1])))
-                .collect();
-            if smooth {
-                (0..ROUNDS).fold(points, |points, _| cut_corners(&points))
-            } else {
-                points
-            }
+            let points: Vec<DVec2> =
+                points.as_bytes().chunks(2).map(|pair| DVec2::new(digit(pair[0]), digit(pair[1]))).collect();
+            if smooth { (0..ROUNDS).fold(points, |points, _| cut_corners(&points)) } else { points }
         })
         .collect()
 }
@@ -136,10 +125,7 @@ fn glyph(character: char) -> Vec<Vec<DVec2>> {
 /// One round of Chaikin's corner cutting.
 fn cut_corners(points: &[DVec2]) -> Vec<DVec2> {
     let closed = points.first() == points.last();
-    let mut cut: Vec<DVec2> = points
-        .windows(2)
-        .flat_map(|e| [e[0].lerp(e[1], 0.25), e[0].lerp(e[1], 0.75)])
-        .collect();
+    let mut cut: Vec<DVec2> = points.windows(2).flat_map(|e| [e[0].lerp(e[1], 0.25), e[0].lerp(e[1], 0.75)]).collect();
     if closed {
         cut.push(cut[0]);
     } else {
@@ -160,10 +146,7 @@ mod tests {
             let text = strokes(character);
             for stroke in text.split(' ') {
                 let points = stroke.strip_prefix('~').unwrap_or(stroke);
-                assert!(
-                    points.len() % 2 == 0 && points.len() >= 4,
-                    "{character}: {text}"
-                );
+                assert!(points.len() % 2 == 0 && points.len() >= 4, "{character}: {text}");
             }
             for p in glyph(character).iter().flatten() {
                 assert!((0.0..=14.0).contains(&p.x), "{character}");
@@ -183,10 +166,7 @@ mod tests {
     fn long_text_is_shortened() {
         let text = "a very long title that does not fit";
         let short = shortened(text, 10.0, 100.0);
-        assert!(
-            short.ends_with("...") && width(&short, 10.0) <= 100.0,
-            "{short}"
-        );
+        assert!(short.ends_with("...") && width(&short, 10.0) <= 100.0, "{short}");
         assert_eq!(shortened("short", 10.0, 100.0), "short");
         assert_eq!(shortened(text, 10.0, 1.0), "");
     }

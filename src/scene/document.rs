@@ -40,11 +40,7 @@ pub struct Problems<'a> {
 
 impl<'s> Document<'s> {
     /// Parses `source` and applies `overrides` (`key=value`); the error is rendered.
-    pub fn parse(
-        path: &Path,
-        source: &'s str,
-        overrides: &'s [String],
-    ) -> Result<Document<'s>, String> {
+    pub fn parse(path: &Path, source: &'s str, overrides: &'s [String]) -> Result<Document<'s>, String> {
         let mut document = Document {
             name: path.display().to_string(),
             source,
@@ -107,11 +103,7 @@ impl<'s> Document<'s> {
         let mut exact = true;
         loop {
             if let Some(place) = self.places.get(path) {
-                return if exact {
-                    place.value.clone()
-                } else {
-                    place.key.clone()
-                };
+                return if exact { place.value.clone() } else { place.key.clone() };
             }
             exact = false;
             match path.rfind('.') {
@@ -129,51 +121,26 @@ impl<'s> Document<'s> {
         }
         // Only the first line of a span is shown: a table is recognised by its header.
         let end = span.end.clamp(span.start, self.source.len());
-        let first_line = self.source[span.start..end]
-            .find('\n')
-            .map_or(end, |newline| span.start + newline);
+        let first_line = self.source[span.start..end].find('\n').map_or(end, |newline| span.start + newline);
         let diagnostic = Diagnostic::error()
             .with_message(message)
-            .with_labels(vec![
-                Label::primary((), span.start..first_line).with_message(label),
-            ])
+            .with_labels(vec![Label::primary((), span.start..first_line).with_message(label)])
             .with_notes(vec![format!("way out: {way_out}")]);
-        let config = Config {
-            chars: Chars::ascii(),
-            ..Config::default()
-        };
-        term::emit_into_string(
-            &config,
-            &SimpleFile::new(&self.name, self.source),
-            &diagnostic,
-        )
-        .unwrap_or_else(|_| format!("error: {}: {message}\n  = way out: {way_out}\n", self.name))
+        let config = Config { chars: Chars::ascii(), ..Config::default() };
+        term::emit_into_string(&config, &SimpleFile::new(&self.name, self.source), &diagnostic)
+            .unwrap_or_else(|_| format!("error: {}: {message}\n  = way out: {way_out}\n", self.name))
     }
 }
 
 impl<'a> Problems<'a> {
     pub fn new(document: &'a Document<'a>) -> Self {
-        Problems {
-            document,
-            found: Vec::new(),
-        }
+        Problems { document, found: Vec::new() }
     }
 
     /// Adds a problem at the dotted `path` (or the nearest table around it).
-    pub fn report(
-        &mut self,
-        path: &str,
-        message: impl AsRef<str>,
-        label: impl AsRef<str>,
-        way_out: impl AsRef<str>,
-    ) {
+    pub fn report(&mut self, path: &str, message: impl AsRef<str>, label: impl AsRef<str>, way_out: impl AsRef<str>) {
         let span = self.document.span(path);
-        let text = self.document.render(
-            span.clone(),
-            message.as_ref(),
-            label.as_ref(),
-            way_out.as_ref(),
-        );
+        let text = self.document.render(span.clone(), message.as_ref(), label.as_ref(), way_out.as_ref());
         self.found.push((span.start, text));
     }
 
@@ -218,8 +185,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
 fn way_out_of_reading(message: &str) -> String {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     let Some((word, choices)) = quoted.split_first() else {
-        return "write a value of the kind that the message names; `stylet schema` lists all keys"
-            .into();
+        return "write a value of the kind that the message names; `stylet schema` lists all keys".into();
     };
     if message.starts_with("unknown") {
         let list = choices.join(", ");
@@ -256,19 +222,12 @@ fn apply_override<'s>(
     }
     let value = match DeValue::parse(value) {
         Ok(value) => moved_value(value.into_inner(), place),
-        Err(_)
-            if value
-                .chars()
-                .all(|c| c.is_alphanumeric() || "-_./ ".contains(c)) =>
-        {
+        Err(_) if value.chars().all(|c| c.is_alphanumeric() || "-_./ ".contains(c)) => {
             DeValue::String(value.to_string().into())
         }
         Err(error) => {
             return fail(
-                format!(
-                    "the value is not TOML: {}",
-                    error.message().trim().replace('\n', ", ")
-                ),
+                format!("the value is not TOML: {}", error.message().trim().replace('\n', ", ")),
                 "write a number, a word, a list like [1, 2, 3] or a table like {speed_mm_s = 5}; quote it from the shell",
             );
         }
@@ -303,15 +262,10 @@ fn set<'s>(
                     .parse::<usize>()
                     .ok()
                     .and_then(|index| array.get_mut(index))
-                    .ok_or(format!(
-                        "`{first}` in `{path}` is no index of a list of {length} (the first is 0)"
-                    ))?
+                    .ok_or(format!("`{first}` in `{path}` is no index of a list of {length} (the first is 0)"))?
             }
             other => {
-                return Err(format!(
-                    "`{first}` in `{path}` would be inside a {}",
-                    other.type_str()
-                ));
+                return Err(format!("`{first}` in `{path}` would be inside a {}", other.type_str()));
             }
         };
         return set(child, rest, last, value, place, path);
@@ -326,30 +280,21 @@ fn set<'s>(
         DeValue::Array(array) => {
             let length = array.len();
             match last.parse::<usize>() {
-                Ok(index) if index < length => {
-                    *array.get_mut(index).expect("index is below the length") = value
-                }
+                Ok(index) if index < length => *array.get_mut(index).expect("index is below the length") = value,
                 Ok(index) if index == length => array.push(value),
                 _ => {
-                    return Err(format!(
-                        "`{last}` in `{path}` is no index of a list of {length} (the first is 0)"
-                    ));
+                    return Err(format!("`{last}` in `{path}` is no index of a list of {length} (the first is 0)"));
                 }
             }
             Ok(())
         }
-        other => Err(format!(
-            "`{last}` in `{path}` would be inside a {}",
-            other.type_str()
-        )),
+        other => Err(format!("`{last}` in `{path}` would be inside a {}", other.type_str())),
     }
 }
 
 /// `value` with all its spans at `place`.
 fn moved_value<'s>(value: DeValue<'s>, place: &Range<usize>) -> DeValue<'s> {
-    let moved = |item: Spanned<DeValue<'s>>| {
-        Spanned::new(place.clone(), moved_value(item.into_inner(), place))
-    };
+    let moved = |item: Spanned<DeValue<'s>>| Spanned::new(place.clone(), moved_value(item.into_inner(), place));
     match value {
         DeValue::Array(array) => DeValue::Array(array.into_iter().map(moved).collect::<DeArray>()),
         DeValue::Table(table) => DeValue::Table(
@@ -369,20 +314,13 @@ fn one_line(message: &str) -> String {
 
 /// `table.key`, or `key` at the top.
 fn join(path: &str, key: &str) -> String {
-    if path.is_empty() {
-        key.to_string()
-    } else {
-        format!("{path}.{key}")
-    }
+    if path.is_empty() { key.to_string() } else { format!("{path}.{key}") }
 }
 
 /// Notes where everything below `value` stands.
 fn record_places(path: &str, value: &Spanned<DeValue>, places: &mut BTreeMap<String, Place>) {
     let mut record = |path: String, key: Range<usize>, item: &Spanned<DeValue>| {
-        let place = Place {
-            key,
-            value: item.span(),
-        };
+        let place = Place { key, value: item.span() };
         places.insert(path.clone(), place);
         record_places(&path, item, places);
     };

@@ -369,10 +369,7 @@ macro_rules! text_or_table {
                         from_text(StrDeserializer::new(text))
                     }
 
-                    fn visit_map<A: serde::de::MapAccess<'de>>(
-                        self,
-                        map: A,
-                    ) -> Result<$entry, A::Error> {
+                    fn visit_map<A: serde::de::MapAccess<'de>>(self, map: A) -> Result<$entry, A::Error> {
                         Deserialize::deserialize(MapAccessDeserializer::new(map)).map($from_table)
                     }
                 }

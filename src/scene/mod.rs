@@ -95,14 +95,7 @@ pub enum Face {
 }
 
 impl Face {
-    pub const ALL: [Face; 6] = [
-        Face::XMin,
-        Face::XMax,
-        Face::YMin,
-        Face::YMax,
-        Face::ZMin,
-        Face::ZMax,
-    ];
+    pub const ALL: [Face; 6] = [Face::XMin, Face::XMax, Face::YMin, Face::YMax, Face::ZMin, Face::ZMax];
 
     /// Key in the scene file.
     pub fn key(self) -> &'static str {
@@ -203,22 +196,6 @@ impl Motion {
             Phase::Insert { speed, .. } | Phase::Withdraw { speed, .. } => speed.max(largest),
             Phase::Hold { .. } => largest,
         })
-    }
-
-    /// Time that all phases take [s].
-    pub fn duration(&self) -> f64 {
-        let mut at = 0.0;
-        let mut time = 0.0;
-        for phase in &self.phases {
-            match *phase {
-                Phase::Insert { speed, depth } | Phase::Withdraw { speed, depth } => {
-                    time += (depth - at).abs() / speed;
-                    at = depth;
-                }
-                Phase::Hold { duration } => time += duration,
-            }
-        }
-        time
     }
 }
 

@@ -74,9 +74,7 @@ pub fn needle(gauge: &str) -> Option<&'static NeedlePreset> {
 
 /// The needle material called `name`.
 pub fn needle_material(name: &str) -> Option<&'static NeedleMaterial> {
-    needle_materials()
-        .iter()
-        .find(|material| material.name == name)
+    needle_materials().iter().find(|material| material.name == name)
 }
 
 /// Bulk modulus from Poisson's ratio and the shear modulus [Pa]: K = 2 mu (1 + nu) / (3 (1 - 2 nu)).
@@ -85,17 +83,9 @@ pub fn bulk_modulus_from_poisson(shear_modulus: f64, poisson_ratio: f64) -> f64 
 }
 
 /// Law from E [Pa], nu and the share of c10: mu = E / (2 (1 + nu)).
-pub fn law_from_youngs_modulus(
-    youngs_modulus: f64,
-    poisson_ratio: f64,
-    share: f64,
-) -> MooneyRivlin {
+pub fn law_from_youngs_modulus(youngs_modulus: f64, poisson_ratio: f64, share: f64) -> MooneyRivlin {
     let shear = youngs_modulus / (2.0 * (1.0 + poisson_ratio));
-    MooneyRivlin::from_moduli(
-        shear,
-        bulk_modulus_from_poisson(shear, poisson_ratio),
-        share,
-    )
+    MooneyRivlin::from_moduli(shear, bulk_modulus_from_poisson(shear, poisson_ratio), share)
 }
 
 static NEEDLES: LazyLock<(Vec<NeedlePreset>, Vec<NeedleMaterial>)> = LazyLock::new(read_needles);
@@ -119,35 +109,19 @@ fn read_tissues() -> Vec<TissuePreset> {
     #[derive(Deserialize)]
     #[serde(untagged, deny_unknown_fields)]
     enum Constants {
-        MooneyRivlin {
-            c10_kpa: f64,
-            c01_kpa: f64,
-            d_per_mpa: f64,
-        },
-        Moduli {
-            youngs_modulus_kpa: f64,
-            poisson_ratio: f64,
-            c10_share: f64,
-        },
+        MooneyRivlin { c10_kpa: f64, c01_kpa: f64, d_per_mpa: f64 },
+        Moduli { youngs_modulus_kpa: f64, poisson_ratio: f64, c10_share: f64 },
     }
     let library: Library = toml::from_str(include_str!("../../assets/materials.toml"))
         .expect("assets/materials.toml is part of the program and tested");
     let preset = |entry: Entry| TissuePreset {
         law: match entry.constants {
-            Constants::MooneyRivlin {
-                c10_kpa,
-                c01_kpa,
-                d_per_mpa,
-            } => MooneyRivlin {
-                c10: c10_kpa * 1e3,
-                c01: c01_kpa * 1e3,
-                bulk_modulus: 2.0e6 / d_per_mpa,
-            },
-            Constants::Moduli {
-                youngs_modulus_kpa,
-                poisson_ratio,
-                c10_share,
-            } => law_from_youngs_modulus(youngs_modulus_kpa * 1e3, poisson_ratio, c10_share),
+            Constants::MooneyRivlin { c10_kpa, c01_kpa, d_per_mpa } => {
+                MooneyRivlin { c10: c10_kpa * 1e3, c01: c01_kpa * 1e3, bulk_modulus: 2.0e6 / d_per_mpa }
+            }
+            Constants::Moduli { youngs_modulus_kpa, poisson_ratio, c10_share } => {
+                law_from_youngs_modulus(youngs_modulus_kpa * 1e3, poisson_ratio, c10_share)
+            }
         },
         name: entry.name,
         summary: entry.summary,
@@ -211,9 +185,7 @@ mod tests {
     fn every_tissue_preset_is_stable_and_has_an_origin() {
         for preset in tissues() {
             assert_eq!(preset.law.verdict(), Verdict::Stable, "{}", preset.name);
-            assert!(
-                !preset.source.is_empty() && !preset.range.is_empty() && !preset.summary.is_empty()
-            );
+            assert!(!preset.source.is_empty() && !preset.range.is_empty() && !preset.summary.is_empty());
         }
     }
 
@@ -226,20 +198,13 @@ mod tests {
         assert!((law.youngs_modulus() - 19713.26).abs() < 0.01);
         assert!((law.poisson_ratio() - 0.493429).abs() < 1e-6);
         let muscle = tissue("muscle-60kpa").unwrap().law;
-        assert!(
-            (muscle.youngs_modulus() - 60.0e3).abs() < 1e-6
-                && (muscle.poisson_ratio() - 0.45).abs() < 1e-9
-        );
+        assert!((muscle.youngs_modulus() - 60.0e3).abs() < 1e-6 && (muscle.poisson_ratio() - 0.45).abs() < 1e-9);
     }
 
     #[test]
     fn gauges_are_sorted_and_needles_plausible() {
         assert_eq!(needles().len(), 12);
-        assert!(
-            needles()
-                .windows(2)
-                .all(|w| w[0].outer_diameter > w[1].outer_diameter)
-        );
+        assert!(needles().windows(2).all(|w| w[0].outer_diameter > w[1].outer_diameter));
         assert!(needle("16G").is_some() && needle_material("steel-304").is_some());
     }
 }

@@ -6,7 +6,6 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
-use super::stable_dt::fixed_components;
 use crate::error::{Error, Result};
 use crate::material::MooneyRivlin;
 use crate::material::mooney_rivlin::{cofactor, jacobian_minus_one};
@@ -100,15 +99,7 @@ impl Elements {
 
     /// Bound of the stiffness that a cell adds to each of its corners [N/m]:
     /// `V (kappa |cof B|max sum|cof B| + 4/3 mu0 max(1, I1/3) |B| sum|B|)` and the hourglass stiffness.
-    pub fn stiffness_bound(
-        &self,
-        model: &Model,
-        cell: usize,
-        cof: DMat3,
-        bulk: f64,
-        i1_third: f64,
-        q2: f64,
-    ) -> f64 {
+    pub fn stiffness_bound(&self, model: &Model, cell: usize, cof: DMat3, bulk: f64, i1_third: f64, q2: f64) -> f64 {
         let size = model.mesh.cell_size(cell);
         let volume = size.x * size.y * size.z;
         let inv = 0.25 / size;
@@ -126,13 +117,7 @@ impl Elements {
 
     /// Forces of the cell on its corners with the minus sign of the motion left out (f_int) and the stiffness bound.
     /// `stiffness` scales elastic and hourglass parts.
-    fn corner_forces(
-        &self,
-        model: &Model,
-        cell: usize,
-        u: &[DVec3; 8],
-        stiffness: f64,
-    ) -> ([DVec3; 8], f64) {
+    fn corner_forces(&self, model: &Model, cell: usize, u: &[DVec3; 8], stiffness: f64) -> ([DVec3; 8], f64) {
         let size = model.mesh.cell_size(cell);
         let volume = size.x * size.y * size.z;
         let h = Self::displacement_gradient(u, size);
@@ -163,16 +148,8 @@ impl Elements {
         let edge = volume.cbrt();
         let e2 = edge * edge;
         // Edges that meet in a corner, each along its axis: node order of `cell_nodes`.
-        const NEIGHBOURS: [[usize; 3]; 8] = [
-            [1, 3, 4],
-            [0, 2, 5],
-            [3, 1, 6],
-            [2, 0, 7],
-            [5, 7, 0],
-            [4, 6, 1],
-            [7, 5, 2],
-            [6, 4, 3],
-        ];
+        const NEIGHBOURS: [[usize; 3]; 8] =
+            [[1, 3, 4], [0, 2, 5], [3, 1, 6], [2, 0, 7], [5, 7, 0], [4, 6, 1], [7, 5, 2], [6, 4, 3]];
         let corner_jacobian = (0..8)
             .map(|i| {
                 let column = |a: usize| {
@@ -193,12 +170,7 @@ impl Elements {
     }
 
     /// Internal nodal forces f_int [N] of a displacement field; `stiffness` per cell, empty = all intact.
-    pub fn internal_forces(
-        &self,
-        model: &Model,
-        u: &[DVec3],
-        stiffness: &[f64],
-    ) -> Vec<DVec3> {
+    pub fn internal_forces(&self, model: &Model, u: &[DVec3], stiffness: &[f64]) -> Vec<DVec3> {
         let mesh = &model.mesh;
         let corner: Vec<[DVec3; 8]> = (0..mesh.cell_count())
             .into_par_iter()
@@ -363,8 +335,8 @@ impl CpuEngine {
         let mut springs = gaps(a);
         let force: f64 = springs.iter().map(|s| spring * s.0).sum();
         let p = &plan.params;
-        let threshold = p.cutting_force
-            + (p.puncture_force - p.cutting_force) * (1.0 - a / p.transition_length).max(0.0);
+        let threshold =
+            p.cutting_force + (p.puncture_force - p.cutting_force) * (1.0 - a / p.transition_length).max(0.0);
         if force > threshold {
             let lambda = springs.iter().map(|s| s.1).sum::<f64>() / springs.len() as f64;
             let speed = pose.velocity.length();
@@ -395,9 +367,11 @@ impl CpuEngine {
             if factor < old {
                 // Half a step back: the mean of the energies before and after the step, as the leapfrog work has it.
                 let half = 0.5 * self.dt;
-                let u = self.model.mesh.cell_nodes(cell).map(|n| {
-                    self.state.displacement[n] - self.state.velocity[n] * half
-                });
+                let u = self
+                    .model
+                    .mesh
+                    .cell_nodes(cell)
+                    .map(|n| self.state.displacement[n] - self.state.velocity[n] * half);
                 let m = self.elements.measure(&self.model.mesh, cell, &u, 1.0);
                 self.sums.softening_dissipation += (old - factor) * (m.elastic + m.hourglass);
                 self.state.stiffness[cell] = factor;
@@ -411,8 +385,7 @@ impl CpuEngine {
         self.cells.par_iter_mut().with_min_len(256).enumerate().for_each(|(cell, out)| {
             let nodes = model.mesh.cell_nodes(cell);
             let stiffness = state.stiffness.get(cell).copied().unwrap_or(1.0);
-            let (force, bound) =
-                elements.corner_forces(model, cell, &nodes.map(|n| state.displacement[n]), stiffness);
+            let (force, bound) = elements.corner_forces(model, cell, &nodes.map(|n| state.displacement[n]), stiffness);
             *out = CellForces { force, bound };
         });
     }
@@ -588,8 +561,7 @@ impl CpuEngine {
                     let at = |n: usize, s: f64, count: usize| {
                         if s < 0.0 { (n < count).then_some(n) } else { n.checked_sub(1) }
                     };
-                    if let (Some(i), Some(j), Some(k)) =
-                        (at(i, signs[0], nx), at(j, signs[1], ny), at(k, signs[2], nz))
+                    if let (Some(i), Some(j), Some(k)) = (at(i, signs[0], nx), at(j, signs[1], ny), at(k, signs[2], nz))
                     {
                         let cell = &cells[mesh.cell_index(i, j, k)];
                         force -= cell.force[corner];
@@ -614,7 +586,7 @@ impl CpuEngine {
                 let old = *v;
                 let mut new = (old * (1.0 - 0.5 * alpha * dt) + force * (dt / mass)) / (1.0 + 0.5 * alpha * dt);
                 // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
-                let fixed = fixed_components(&model, node);
+                let fixed = model.fixed_components(node);
                 for a in 0..3 {
                     if fixed[a] {
                         new[a] = 0.0;
@@ -647,10 +619,7 @@ impl CpuEngine {
                 *u += new * dt;
                 (alpha * mass * free_mid.length_squared() * dt, work, clamped, raised)
             })
-            .reduce(
-                || (0.0, 0.0, 0, 0),
-                |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3),
-            );
+            .reduce(|| (0.0, 0.0, 0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3));
         self.sums.damping_dissipation += result.0;
         self.sums.load_work += result.1;
         self.sums.clamped_nodes += result.2;
@@ -676,12 +645,7 @@ impl CpuEngine {
         let inverted = |m: &CellMeasure| m.jacobian <= 0.0 || m.corner_jacobian <= 0.0;
         sums.inverted_cells = measures.iter().filter(|m| inverted(m)).count() as u32;
         sums.inverted_cell = measures.iter().position(inverted).map(|c| c as u32);
-        sums.kinetic = state
-            .velocity
-            .iter()
-            .zip(&model.node_mass)
-            .map(|(v, m)| 0.5 * m * v.length_squared())
-            .sum();
+        sums.kinetic = state.velocity.iter().zip(&model.node_mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
         sums.max_speed = state.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
         sums.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
         sums.contact_energy = self.contact_energy;
@@ -710,9 +674,7 @@ fn prescribed_velocity(model: &Model, node: usize, input: &StepInput, dt: f64) -
     let mut velocity = DVec3::ZERO;
     for face in Face::ALL {
         let axis = face.axis();
-        if c[axis] != if face.is_max() { n[axis] - 1 } else { 0 }
-            || model.faces()[face as usize].drive.is_none()
-        {
+        if c[axis] != if face.is_max() { n[axis] - 1 } else { 0 } || model.faces()[face as usize].drive.is_none() {
             continue;
         }
         let drive = input.drives[face as usize];
@@ -732,11 +694,7 @@ impl Engine for CpuEngine {
     }
 
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {
-        self.sums = FrameSums {
-            frame: plan.frame,
-            steps: plan.steps.len() as u32,
-            ..Default::default()
-        };
+        self.sums = FrameSums { frame: plan.frame, steps: plan.steps.len() as u32, ..Default::default() };
         for input in &plan.steps {
             self.step(input);
         }

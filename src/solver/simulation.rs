@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::cpu::{CpuEngine, Elements};
 use super::engine::{Engine, FramePlan, State, StepInput};
-use super::stable_dt::{StableStep, stable_step};
+use super::stable_dt::{power_iteration, wave_speed_bound};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuEngine};
 use crate::material::mooney_rivlin::{Verdict, von_mises};
@@ -51,7 +51,8 @@ const RUNAWAY_PART: f64 = 0.05;
 /// A simulation that is advanced frame by frame.
 pub struct Simulation {
     pub model: Arc<Model>,
-    pub stable: StableStep,
+    /// Stable step: the wave-speed bound at rest [s].
+    pub stable_dt: f64,
     /// Time step [s].
     pub dt: f64,
     engine: Box<dyn Engine>,
@@ -71,14 +72,20 @@ pub struct Simulation {
 
 /// Time step and steps per frame that a model gets.
 ///
-/// The computed step is `safety` times the smaller bound of [`StableStep`]; a scene's own step is taken as it is. Both
-/// are shortened so that a whole number of steps fills a frame.
-pub fn choose_step(model: &Model, stable: &StableStep) -> (f64, u64) {
+/// The computed step is `safety` times the stable one; a scene's own step is taken as it is. Both are shortened so that
+/// a whole number of steps fills a frame.
+pub fn choose_step(model: &Model, stable_dt: f64) -> (f64, u64) {
     let solver = &model.scene.solver;
-    let wanted = solver.time_step.unwrap_or(solver.safety * stable.limit());
+    let wanted = solver.time_step.unwrap_or(solver.safety * stable_dt);
     let frame = 1.0 / solver.frame_rate;
     let steps = (frame / wanted * (1.0 - 1e-9)).ceil().max(1.0);
     (frame / steps, steps as u64)
+}
+
+/// Largest tool speed over the shear wave speed at the scaled density; `None` without a tool.
+pub fn tool_mach(model: &Model) -> Option<f64> {
+    let wave = (model.scene.material.law.shear_modulus() / model.scaled_density()).sqrt();
+    model.kinematics.is_some().then(|| model.scene.motion.largest_speed() / wave)
 }
 
 impl Simulation {
@@ -108,14 +115,26 @@ impl Simulation {
             },
         };
         let model = Arc::new(Model::new(scene, mesh));
-        let stable = stable_step(&model);
-        let (dt, steps_per_frame) = choose_step(&model, &stable);
-        if dt > stable.limit() {
+        let stable_dt = wave_speed_bound(&model);
+        let (dt, steps_per_frame) = choose_step(&model, stable_dt);
+        if dt > stable_dt {
+            let limit = power_iteration(&model);
+            let verdict = match dt > limit {
+                true => "above that limit: the run will fail",
+                false => "within it at rest, but squeezed cells and contact may take the margin",
+            };
             notices.push(format!(
-                "the time step {:.3} us is above the stable step {:.3} us: expect the run to fail; drop time_step_us or \
-                 lower it",
+                "the scene's time step gives {:.3} us, more than the stable step {:.3} us (wave-speed bound; limit by \
+                 power iteration {:.3} us): {verdict}; drop solver.time_step_us or lower it",
                 dt * 1e6,
-                stable.limit() * 1e6
+                stable_dt * 1e6,
+                limit * 1e6
+            ));
+        }
+        if let Some(mach) = tool_mach(&model).filter(|m| *m > 0.1) {
+            notices.push(format!(
+                "the tool moves at {mach:.2} of the scaled shear wave speed: inertia will show in the force; lower \
+                 solver.mass_scaling (\"auto\" keeps it below 0.03)"
             ));
         }
         let engine: Box<dyn Engine> = match &device {
@@ -127,7 +146,7 @@ impl Simulation {
         let frames = 1 + total_steps.saturating_sub(1).div_ceil(steps_per_frame);
         let watch_stretch = !matches!(model.scene.material.law.verdict(), Verdict::Stable);
         Ok(Simulation {
-            stable,
+            stable_dt,
             dt,
             engine,
             device,
@@ -266,11 +285,11 @@ impl Simulation {
             }
             Err(error) => error.to_string(),
         };
-        let way_out = if self.dt > self.stable.limit() {
+        let way_out = if self.dt > self.stable_dt {
             format!(
                 "the time step {:.3} us is above the stable step {:.3} us: drop time_step_us",
                 self.dt * 1e6,
-                self.stable.limit() * 1e6
+                self.stable_dt * 1e6
             )
         } else {
             "lower solver.safety or the speed of the tool".into()

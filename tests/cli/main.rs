@@ -87,10 +87,7 @@ impl From<Output> for Answer {
 
 impl Answer {
     fn all(&self) -> String {
-        format!(
-            "code {:?}\n--- stdout\n{}\n--- stderr\n{}",
-            self.code, self.stdout, self.stderr
-        )
+        format!("code {:?}\n--- stdout\n{}\n--- stderr\n{}", self.code, self.stdout, self.stderr)
     }
 
     /// Ended with `code`, without a panic.
@@ -117,9 +114,7 @@ impl Answer {
 
 impl Place {
     fn new() -> Self {
-        Place {
-            folder: tempfile::tempdir().unwrap(),
-        }
+        Place { folder: tempfile::tempdir().unwrap() }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -145,10 +140,7 @@ impl Place {
     /// The program, called in this folder and free of the caller's choice of an adapter.
     fn program(&self, args: &[&str]) -> std::process::Command {
         let mut command = std::process::Command::cargo_bin("stylet").unwrap();
-        command
-            .current_dir(self.folder.path())
-            .args(args)
-            .stdin(Stdio::null());
+        command.current_dir(self.folder.path()).args(args).stdin(Stdio::null());
         for name in ["WGPU_ADAPTER_NAME", "WGPU_BACKEND", "RUST_LOG"] {
             command.env_remove(name);
         }
@@ -160,11 +152,7 @@ impl Place {
     }
 
     fn call_with(&self, args: &[&str], variables: &[(&str, &str)]) -> Answer {
-        self.program(args)
-            .envs(variables.iter().copied())
-            .output()
-            .unwrap()
-            .into()
+        self.program(args).envs(variables.iter().copied()).output().unwrap().into()
     }
 
     /// Files below the folder, relative, sorted.
@@ -196,15 +184,8 @@ impl Place {
         let text = std::fs::read_to_string(self.path(folder).join(name)).unwrap();
         assert!(text.ends_with('\n'), "{name} ends in the middle of a line");
         let mut lines = text.lines();
-        let header: Vec<String> = lines
-            .next()
-            .unwrap()
-            .split(',')
-            .map(str::to_string)
-            .collect();
-        let rows: Vec<Vec<f64>> = lines
-            .map(|l| l.split(',').map(|v| v.parse().unwrap()).collect())
-            .collect();
+        let header: Vec<String> = lines.next().unwrap().split(',').map(str::to_string).collect();
+        let rows: Vec<Vec<f64>> = lines.map(|l| l.split(',').map(|v| v.parse().unwrap()).collect()).collect();
         for row in &rows {
             assert_eq!(row.len(), header.len(), "{name}: {row:?}");
         }
@@ -213,16 +194,9 @@ impl Place {
 
     /// True where a GPU adapter is found; says so where not, and fails under `REQUIRE_GPU=1`.
     fn has_adapter(&self) -> bool {
-        let found = !self
-            .call(&["adapters"])
-            .ended(0)
-            .stdout
-            .starts_with("no adapter found");
+        let found = !self.call(&["adapters"]).ended(0).stdout.starts_with("no adapter found");
         if !found {
-            assert!(
-                std::env::var_os("REQUIRE_GPU").is_none_or(|v| v != "1"),
-                "REQUIRE_GPU=1 and no adapter"
-            );
+            assert!(std::env::var_os("REQUIRE_GPU").is_none_or(|v| v != "1"), "REQUIRE_GPU=1 and no adapter");
             eprintln!("skipped: no GPU adapter");
         }
         found

@@ -7,19 +7,13 @@ fn assert_refused(changes: &[(&str, &str)], marker: &str, expected: &[&str]) {
     let place = Place::new();
     let path = place.tiny(changes);
     let text = std::fs::read_to_string(&path).unwrap();
-    let line = 1 + text
-        .lines()
-        .position(|l| l.contains(marker))
-        .expect("marker is in the scene");
+    let line = 1 + text.lines().position(|l| l.contains(marker)).expect("marker is in the scene");
     for command in ["run", "check"] {
         let mut args = vec![command, "tiny.toml"];
         if command == "run" {
             args.extend(["--out", "results"]);
         }
-        let mut answer = place
-            .call(&args)
-            .refused()
-            .says(&format!("tiny.toml:{line}:"));
+        let mut answer = place.call(&args).refused().says(&format!("tiny.toml:{line}:"));
         for text in expected {
             answer = answer.says(text);
         }
@@ -38,20 +32,13 @@ fn unknown_key() {
 
 #[test]
 fn unknown_preset_names_the_near_one() {
-    assert_refused(
-        &[("across-fibre", "across-fiber")],
-        "across-fiber",
-        &["across-fibre"],
-    );
+    assert_refused(&[("across-fibre", "across-fiber")], "across-fiber", &["across-fibre"]);
 }
 
 #[test]
 fn negative_modulus() {
     assert_refused(
-        &[(
-            "preset = \"across-fibre\"",
-            "youngs_modulus_kpa = -60.0\npoisson_ratio = 0.45",
-        )],
+        &[("preset = \"across-fibre\"", "youngs_modulus_kpa = -60.0\npoisson_ratio = 0.45")],
         "youngs_modulus_kpa",
         &["-60"],
     );
@@ -60,10 +47,7 @@ fn negative_modulus() {
 #[test]
 fn unstable_constants() {
     assert_refused(
-        &[(
-            "preset = \"across-fibre\"",
-            "c10_kpa = 4.75\nc01_kpa = -4.91\nd_per_mpa = 4.0",
-        )],
+        &[("preset = \"across-fibre\"", "c10_kpa = 4.75\nc01_kpa = -4.91\nd_per_mpa = 4.0")],
         "c01_kpa",
         &["REFUSED", "shear modulus", "lv2022-refit"],
     );
@@ -81,18 +65,11 @@ fn mesh_too_fine_for_the_memory() {
 #[test]
 fn needle_outside_the_block() {
     assert_refused(
-        &[(
-            "[[motion.phase]]",
-            "[motion]\nentry_mm = [9.0, 0.0]\n[[motion.phase]]",
-        )],
+        &[("[[motion.phase]]", "[motion]\nentry_mm = [9.0, 0.0]\n[[motion.phase]]")],
         "entry_mm",
         &["outside"],
     );
-    assert_refused(
-        &[("depth_mm = 3.0", "depth_mm = 30.0")],
-        "depth_mm = 30.0",
-        &["too deep", "at most"],
-    );
+    assert_refused(&[("depth_mm = 3.0", "depth_mm = 30.0")], "depth_mm = 30.0", &["too deep", "at most"]);
 }
 
 #[test]
@@ -127,32 +104,20 @@ fn empty_motion() {
     assert_refused(&[(phase, "[motion]\nphase = []\n")], "[motion]", &["phase"]);
     let place = Place::new();
     place.tiny(&[(phase, "")]);
-    place
-        .call(&["run", "tiny.toml"])
-        .refused()
-        .says("tiny.toml:")
-        .says("motion");
+    place.call(&["run", "tiny.toml"]).refused().says("tiny.toml:").says("motion");
     assert_eq!(place.files("."), ["tiny.toml"]);
 }
 
 #[test]
 fn not_toml() {
-    assert_refused(
-        &[("title = \"tiny\"", "title = tiny'")],
-        "title",
-        &["not TOML"],
-    );
+    assert_refused(&[("title = \"tiny\"", "title = tiny'")], "title", &["not TOML"]);
 }
 
 #[test]
 fn missing_file() {
     let place = Place::new();
     place.tiny(&[]);
-    place
-        .call(&["run", "tinny.toml", "--out", "results"])
-        .refused()
-        .says("tinny.toml")
-        .says("did you mean");
+    place.call(&["run", "tinny.toml", "--out", "results"]).refused().says("tinny.toml").says("did you mean");
     // The default scene is not here.
     place.call(&[]).refused().says("muscle_biopsy.toml");
     // A folder is no scene.
@@ -164,10 +129,7 @@ fn missing_file() {
 fn a_file_that_is_not_text() {
     let place = Place::new();
     std::fs::write(place.path("tiny.toml"), [0xff, 0xfe, 0x00, 0x80]).unwrap();
-    place
-        .call(&["run", "tiny.toml"])
-        .refused()
-        .says("tiny.toml");
+    place.call(&["run", "tiny.toml"]).refused().says("tiny.toml");
 }
 
 #[test]
@@ -176,11 +138,7 @@ fn output_folder_that_cannot_be_written_to() {
     place.tiny(&[]);
     place.write("file", "");
     for out in ["file", "file/below"] {
-        place
-            .call(&["run", "tiny.toml", "--out", out])
-            .refused()
-            .says(out)
-            .says("--out");
+        place.call(&["run", "tiny.toml", "--out", out]).refused().says(out).says("--out");
     }
     assert_eq!(place.files("."), ["file", "tiny.toml"]);
 }
@@ -191,10 +149,7 @@ fn output_folder_that_cannot_be_written_to() {
 fn output_folder_on_a_read_only_file_system() {
     let place = Place::new();
     place.tiny(&[]);
-    place
-        .call(&["run", "tiny.toml", "--out", "/proc/results"])
-        .refused()
-        .says("/proc/results");
+    place.call(&["run", "tiny.toml", "--out", "/proc/results"]).refused().says("/proc/results");
 }
 
 #[cfg(unix)]
@@ -205,8 +160,7 @@ fn output_folder_without_write_permission() {
     place.tiny(&[]);
     std::fs::create_dir(place.path("locked")).unwrap();
     let set = |mode| {
-        std::fs::set_permissions(place.path("locked"), std::fs::Permissions::from_mode(mode))
-            .unwrap();
+        std::fs::set_permissions(place.path("locked"), std::fs::Permissions::from_mode(mode)).unwrap();
     };
     set(0o555);
     // An administrator may write all the same: then there is nothing to see here.
@@ -238,11 +192,7 @@ fn wrong_commands_and_options() {
         assert!(!answer.stderr.contains("error: error:"), "{}", answer.all());
     }
     // A word that is no command is taken as a scene file; the message says so.
-    place
-        .call(&["frobnicate"])
-        .refused()
-        .says("frobnicate")
-        .says("scene file");
+    place.call(&["frobnicate"]).refused().says("frobnicate").says("scene file");
     assert_eq!(place.files("."), ["tiny.toml"]);
 }
 
@@ -259,11 +209,7 @@ fn wrong_overrides() {
         ("motion.phase.7.depth_mm=2", "no index"),
         ("tissue=3", "--set tissue=3"),
     ] {
-        place
-            .call(&["run", "tiny.toml", "--set", text, "--out", "results"])
-            .refused()
-            .says("--set")
-            .says(expected);
+        place.call(&["run", "tiny.toml", "--set", text, "--out", "results"]).refused().says("--set").says(expected);
     }
     assert_eq!(place.files("."), ["tiny.toml"]);
 }
@@ -274,18 +220,8 @@ fn printed_table_of_the_paper() {
     let scene = repository().join("scenes/lv2022/table1_as_printed.toml");
     for command in ["check", "run"] {
         let answer = place.call(&[command, scene.to_str().unwrap()]).refused();
-        assert_eq!(
-            answer.stderr.matches("REFUSED").count(),
-            3,
-            "{}",
-            answer.all()
-        );
-        assert_eq!(
-            answer.stderr.matches("way out: ").count(),
-            3,
-            "{}",
-            answer.all()
-        );
+        assert_eq!(answer.stderr.matches("REFUSED").count(), 3, "{}", answer.all());
+        assert_eq!(answer.stderr.matches("way out: ").count(), 3, "{}", answer.all());
         answer.says("table1_as_printed.toml:").says("lv2022-refit");
     }
     assert!(place.files(".").is_empty());
@@ -299,12 +235,7 @@ fn wrong_adapter_name_lists_the_right_ones() {
     }
     place.tiny(&[]);
     let listed = place.call(&["adapters"]).ended(0).stdout;
-    let first = listed
-        .lines()
-        .next()
-        .unwrap()
-        .trim_start_matches("* ")
-        .to_string();
+    let first = listed.lines().next().unwrap().trim_start_matches("* ").to_string();
     for engine in ["auto", "gpu"] {
         for args in [
             vec!["run", "tiny.toml", "--out", "results", "--engine", engine],
@@ -334,9 +265,7 @@ fn wrong_backend_name() {
             .says("direct3d")
             .says("vulkan, metal, dx12, gl");
     }
-    place
-        .call_with(&["adapters"], &[("WGPU_BACKEND", "direct3d")])
-        .refused();
+    place.call_with(&["adapters"], &[("WGPU_BACKEND", "direct3d")]).refused();
     assert_eq!(place.files("."), ["tiny.toml"]);
 }
 
@@ -357,44 +286,21 @@ fn without_an_adapter() {
     if answer.stdout.starts_with("no adapter found") {
         assert!(answer.stdout.contains("way out: "), "{}", answer.all());
         // auto: a notice and the CPU engine.
-        let answer = place
-            .call_with(&["run", "tiny.toml", "--out", "results"], &NO_DRIVERS)
-            .ended(0);
-        let answer = answer
-            .says("note: running on the CPU engine")
-            .says("no GPU adapter found");
-        assert_eq!(
-            place.summary("results")["engine"],
-            "cpu",
-            "{}",
-            answer.all()
-        );
-        assert!(
-            place
-                .files("results")
-                .iter()
-                .any(|f| f == "stress_03.00mm.png")
-        );
+        let answer = place.call_with(&["run", "tiny.toml", "--out", "results"], &NO_DRIVERS).ended(0);
+        let answer = answer.says("note: running on the CPU engine").says("no GPU adapter found");
+        assert_eq!(place.summary("results")["engine"], "cpu", "{}", answer.all());
+        assert!(place.files("results").iter().any(|f| f == "stress_03.00mm.png"));
         // gpu: an error.
-        let answer = place.call_with(
-            &["run", "tiny.toml", "--out", "other", "--engine", "gpu"],
-            &NO_DRIVERS,
-        );
+        let answer = place.call_with(&["run", "tiny.toml", "--out", "other", "--engine", "gpu"], &NO_DRIVERS);
         answer.refused().says("no GPU adapter found");
         assert!(!place.path("other").exists());
     } else {
-        eprintln!(
-            "skipped: an adapter is found without drivers\n{}",
-            answer.stdout
-        );
+        eprintln!("skipped: an adapter is found without drivers\n{}", answer.stdout);
     }
     // A backend that this system does not have was asked for by name: an error even with auto.
     for engine in ["auto", "gpu"] {
         place
-            .call_with(
-                &["run", "tiny.toml", "--out", "other", "--engine", engine],
-                &[("WGPU_BACKEND", "dx12")],
-            )
+            .call_with(&["run", "tiny.toml", "--out", "other", "--engine", engine], &[("WGPU_BACKEND", "dx12")])
             .refused()
             .says("no GPU adapter found");
         assert!(!place.path("other").exists());

@@ -53,36 +53,18 @@ fn assert_all_results(place: &Place, folder: &str) {
     let files: Vec<String> = place
         .files(folder)
         .into_iter()
-        .map(|f| {
-            if f.starts_with("frames/frame_") {
-                "frames/frame_*.vtu".into()
-            } else {
-                f
-            }
-        })
+        .map(|f| if f.starts_with("frames/frame_") { "frames/frame_*.vtu".into() } else { f })
         .collect();
     assert_eq!(files, RESULTS, "{folder}");
     let read = |name: &str| std::fs::read(place.path(folder).join(name)).unwrap();
     assert!(read("stress_03.00mm.png").starts_with(b"\x89PNG\r\n\x1a\n"));
-    assert!(
-        String::from_utf8(read("force.svg"))
-            .unwrap()
-            .contains("</svg>")
-    );
-    assert!(
-        String::from_utf8(read("frames.pvd"))
-            .unwrap()
-            .contains("frames/frame_")
-    );
+    assert!(String::from_utf8(read("force.svg")).unwrap().contains("</svg>"));
+    assert!(String::from_utf8(read("frames.pvd")).unwrap().contains("frames/frame_"));
 }
 
 /// An engine that is there.
 fn engines(place: &Place) -> Vec<&'static str> {
-    if place.has_adapter() {
-        vec!["gpu", "cpu"]
-    } else {
-        vec!["cpu"]
-    }
+    if place.has_adapter() { vec!["gpu", "cpu"] } else { vec!["cpu"] }
 }
 
 #[test]
@@ -90,22 +72,12 @@ fn a_run_writes_everything() {
     let place = Place::new();
     place.tiny(&[]);
     for engine in engines(&place) {
-        let answer = place
-            .call(&["run", "tiny.toml", "--engine", engine, "--out", engine])
-            .ended(0);
-        assert_eq!(
-            answer.stdout.lines().last(),
-            Some(engine),
-            "{}",
-            answer.all()
-        );
+        let answer = place.call(&["run", "tiny.toml", "--engine", engine, "--out", engine]).ended(0);
+        assert_eq!(answer.stdout.lines().last(), Some(engine), "{}", answer.all());
         assert_all_results(&place, engine);
         let summary = place.summary(engine);
         for key in SUMMARY_KEYS {
-            assert!(
-                summary.get(key).is_some(),
-                "{engine}: no `{key}` in {summary:#}"
-            );
+            assert!(summary.get(key).is_some(), "{engine}: no `{key}` in {summary:#}");
         }
         assert_eq!(summary["status"], "ok");
         assert_eq!(summary["scene"], "tiny");
@@ -113,50 +85,24 @@ fn a_run_writes_everything() {
         assert_eq!(summary["effects"].as_array().unwrap().len(), 3);
         assert_eq!(summary["clamped_nodes"], 0);
         assert_eq!(summary["inverted_cells"], 0);
-        let number = |key: &str| {
-            summary[key]
-                .as_f64()
-                .unwrap_or_else(|| panic!("{key} in {summary:#}"))
-        };
-        for key in [
-            "dt_s",
-            "steps",
-            "wall_s",
-            "real_time_factor",
-            "cell_steps_per_s",
-            "peak_force_n",
-        ] {
+        let number = |key: &str| summary[key].as_f64().unwrap_or_else(|| panic!("{key} in {summary:#}"));
+        for key in ["dt_s", "steps", "wall_s", "real_time_factor", "cell_steps_per_s", "peak_force_n"] {
             assert!(number(key) > 0.0, "{key}: {}", number(key));
         }
         // 3 mm at 2 mm/s.
-        assert!(
-            (number("simulated_s") - 1.5).abs() < 2.0 * number("dt_s"),
-            "{summary:#}"
-        );
+        assert!((number("simulated_s") - 1.5).abs() < 2.0 * number("dt_s"), "{summary:#}");
         assert!(number("dt_s") <= number("stable_dt_s"));
         assert!(number("energy_imbalance") <= 0.02, "{summary:#}");
 
         let (header, force) = place.table(engine, "force.csv");
-        assert_eq!(
-            &header[..4],
-            ["time_s", "depth_m", "phase", "axial_force_n"]
-        );
+        assert_eq!(&header[..4], ["time_s", "depth_m", "phase", "axial_force_n"]);
         let (_, energy) = place.table(engine, "energy.csv");
         // One row per frame: 1.5 s at 60 per second and the first single step.
         assert_eq!(force.len(), 91);
         assert_eq!(energy.len(), force.len());
         let largest = force.iter().map(|r| r[3]).fold(0.0, f64::max);
-        assert!(
-            (largest - number("peak_force_n")).abs() < 1e-6,
-            "{largest} {summary:#}"
-        );
-        assert!(
-            force
-                .iter()
-                .flatten()
-                .chain(energy.iter().flatten())
-                .all(|v| v.is_finite())
-        );
+        assert!((largest - number("peak_force_n")).abs() < 1e-6, "{largest} {summary:#}");
+        assert!(force.iter().flatten().chain(energy.iter().flatten()).all(|v| v.is_finite()));
     }
 }
 
@@ -164,14 +110,8 @@ fn a_run_writes_everything() {
 fn standard_error_is_plain_where_it_is_no_terminal() {
     let place = Place::new();
     place.tiny(&[]);
-    let answer = place
-        .call(&["run", "tiny.toml", "--engine", "cpu"])
-        .ended(0);
-    assert!(
-        !answer.stderr.contains('\r') && !answer.stderr.contains('\u{1b}'),
-        "{:?}",
-        answer.stderr
-    );
+    let answer = place.call(&["run", "tiny.toml", "--engine", "cpu"]).ended(0);
+    assert!(!answer.stderr.contains('\r') && !answer.stderr.contains('\u{1b}'), "{:?}", answer.stderr);
     assert!(!answer.stderr.contains("left"), "{}", answer.all());
 }
 
@@ -185,12 +125,7 @@ fn numbered_folders_and_the_short_call() {
         (&["tiny.toml", "--engine", "cpu"][..], "out/tiny/002"),
     ] {
         let answer = place.call(args).ended(0);
-        assert_eq!(
-            answer.stdout.lines().last(),
-            Some(folder),
-            "{}",
-            answer.all()
-        );
+        assert_eq!(answer.stdout.lines().last(), Some(folder), "{}", answer.all());
         assert_all_results(&place, folder);
     }
 }
@@ -204,20 +139,10 @@ fn a_folder_with_results_is_kept_unless_forced() {
     place.write("results/mine.txt", "keep me");
     let before = std::fs::read(place.path("results/summary.json")).unwrap();
     place.call(&run).refused().says("results").says("--force");
-    assert_eq!(
-        std::fs::read(place.path("results/summary.json")).unwrap(),
-        before
-    );
-    let forced: Vec<&str> = run
-        .iter()
-        .copied()
-        .chain(["--force", "--set", "outputs.fields_at_depth_mm=[]"])
-        .collect();
+    assert_eq!(std::fs::read(place.path("results/summary.json")).unwrap(), before);
+    let forced: Vec<&str> = run.iter().copied().chain(["--force", "--set", "outputs.fields_at_depth_mm=[]"]).collect();
     place.call(&forced).ended(0);
-    assert_ne!(
-        std::fs::read(place.path("results/summary.json")).unwrap(),
-        before
-    );
+    assert_ne!(std::fs::read(place.path("results/summary.json")).unwrap(), before);
     let files = place.files("results");
     assert!(files.contains(&"mine.txt".into()), "{files:?}");
     // Nothing of the run before is left.
@@ -227,18 +152,10 @@ fn a_folder_with_results_is_kept_unless_forced() {
 #[test]
 fn a_needle_without_puncture_runs_with_a_notice() {
     let place = Place::new();
-    place.tiny(&[
-        ("[\"puncture\", \"friction\", \"mass_scaling\"]", "[]"),
-        ("depth_mm = 3.0", "depth_mm = 0.05"),
-    ]);
+    place.tiny(&[("[\"puncture\", \"friction\", \"mass_scaling\"]", "[]"), ("depth_mm = 3.0", "depth_mm = 0.05")]);
     for engine in engines(&place) {
-        let answer = place
-            .call(&["run", "tiny.toml", "--engine", engine, "--out", engine])
-            .ended(0);
-        answer
-            .says("note: ")
-            .says("effect `puncture` is not listed")
-            .says("solver.mass_scaling");
+        let answer = place.call(&["run", "tiny.toml", "--engine", engine, "--out", engine]).ended(0);
+        answer.says("note: ").says("effect `puncture` is not listed").says("solver.mass_scaling");
         let summary = place.summary(engine);
         assert_eq!(summary["effects"].as_array().unwrap().len(), 0);
         assert_eq!(summary["peak_force_n"], 0.0);
@@ -250,38 +167,16 @@ fn a_needle_without_puncture_runs_with_a_notice() {
 #[test]
 fn a_diverging_run_fails_and_keeps_its_results() {
     let place = Place::new();
-    place.tiny(&[(
-        "[\"puncture\", \"friction\", \"mass_scaling\"]",
-        "[\"puncture\", \"friction\"]",
-    )]);
+    place.tiny(&[("[\"puncture\", \"friction\", \"mass_scaling\"]", "[\"puncture\", \"friction\"]")]);
     for engine in engines(&place) {
-        let args = [
-            "run",
-            "tiny.toml",
-            "--engine",
-            engine,
-            "--out",
-            engine,
-            "--set",
-            "solver.time_step_us=1000",
-        ];
+        let args = ["run", "tiny.toml", "--engine", engine, "--out", engine, "--set", "solver.time_step_us=1000"];
         let answer = place.call(&args).ended(3);
         assert_eq!(answer.stdout, "", "{}", answer.all());
-        let answer = answer
-            .says("above the stable step")
-            .says("run stopped in frame")
-            .says("stage integrate_nodes");
-        let answer = answer
-            .says("rest position")
-            .says("(step ")
-            .says(&format!("are in {engine}"));
+        let answer = answer.says("above the stable step").says("run stopped in frame").says("stage integrate_nodes");
+        let answer = answer.says("rest position").says("(step ").says(&format!("are in {engine}"));
         let summary = place.summary(engine);
         let status = summary["status"].as_str().unwrap();
-        assert!(
-            status.starts_with("failed: run stopped in frame"),
-            "{}",
-            answer.all()
-        );
+        assert!(status.starts_with("failed: run stopped in frame"), "{}", answer.all());
         // As many rows as the frames before the failure, all complete.
         let (_, force) = place.table(engine, "force.csv");
         let (_, energy) = place.table(engine, "energy.csv");
@@ -295,10 +190,7 @@ fn a_diverging_run_fails_and_keeps_its_results() {
 fn ctrl_c_ends_the_run_with_complete_results() {
     let place = Place::new();
     // At true mass this takes minutes.
-    place.tiny(&[
-        ("\"mass_scaling\"]", "]"),
-        ("speed_mm_s = 2.0", "speed_mm_s = 0.1"),
-    ]);
+    place.tiny(&[("\"mass_scaling\"]", "]"), ("speed_mm_s = 2.0", "speed_mm_s = 0.1")]);
     for engine in engines(&place) {
         let mut child = place
             .program(&["run", "tiny.toml", "--engine", engine, "--out", engine])
@@ -313,37 +205,14 @@ fn ctrl_c_ends_the_run_with_complete_results() {
             assert!(begin.elapsed().as_secs() < 120, "no frame in two minutes");
             std::thread::sleep(std::time::Duration::from_millis(20));
         }
-        let sent = std::process::Command::new("kill")
-            .args(["-INT", &child.id().to_string()])
-            .status()
-            .unwrap();
+        let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
         assert!(sent.success());
         let (mut stdout, mut stderr) = (String::new(), String::new());
-        child
-            .stdout
-            .take()
-            .unwrap()
-            .read_to_string(&mut stdout)
-            .unwrap();
-        child
-            .stderr
-            .take()
-            .unwrap()
-            .read_to_string(&mut stderr)
-            .unwrap();
+        child.stdout.take().unwrap().read_to_string(&mut stdout).unwrap();
+        child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
         let code = child.wait().unwrap().code();
-        let answer = Answer {
-            code,
-            stdout,
-            stderr,
-        }
-        .ended(130);
-        assert_eq!(
-            answer.stdout.lines().last(),
-            Some(engine),
-            "{}",
-            answer.all()
-        );
+        let answer = Answer { code, stdout, stderr }.ended(130);
+        assert_eq!(answer.stdout.lines().last(), Some(engine), "{}", answer.all());
         let summary = place.summary(engine);
         assert_eq!(summary["status"], "interrupted");
         let (_, force) = place.table(engine, "force.csv");
@@ -351,10 +220,7 @@ fn ctrl_c_ends_the_run_with_complete_results() {
         assert_eq!(force.len(), energy.len());
         assert!(force.len() >= 3);
         let last = force.last().unwrap()[0];
-        assert!(
-            (summary["simulated_s"].as_f64().unwrap() - last).abs() < 1e-9,
-            "{summary:#}"
-        );
+        assert!((summary["simulated_s"].as_f64().unwrap() - last).abs() < 1e-9, "{summary:#}");
         assert!(place.path(engine).join("force.svg").exists());
     }
 }
@@ -363,46 +229,19 @@ fn ctrl_c_ends_the_run_with_complete_results() {
 fn a_closed_pipe_is_no_failure() {
     let place = Place::new();
     place.tiny(&[]);
-    let calls: [&[&str]; 4] = [
-        &["schema"],
-        &["adapters"],
-        &["check", "tiny.toml"],
-        &["run", "tiny.toml"],
-    ];
+    let calls: [&[&str]; 4] = [&["schema"], &["adapters"], &["check", "tiny.toml"], &["run", "tiny.toml"]];
     for args in calls {
-        let mut child = place
-            .program(args)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut child = place.program(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         let mut stderr = String::new();
-        child
-            .stderr
-            .take()
-            .unwrap()
-            .read_to_string(&mut stderr)
-            .unwrap();
+        child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
         let code = child.wait().unwrap().code();
-        Answer {
-            code,
-            stdout: String::new(),
-            stderr,
-        }
-        .ended(0);
+        Answer { code, stdout: String::new(), stderr }.ended(0);
     }
     // And one that is closed after the first line.
-    let mut child = place
-        .program(&["schema"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = place.program(&["schema"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut line = String::new();
-    BufReader::new(child.stdout.take().unwrap())
-        .read_line(&mut line)
-        .unwrap();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
     let answer: Answer = child.wait_with_output().unwrap().into();
     answer.ended(0);
     assert_eq!(line.trim(), "{");
@@ -416,22 +255,10 @@ fn every_scene_is_checked() {
             continue;
         }
         let answer = place.call(&["check", path.to_str().unwrap()]).ended(0);
-        for word in [
-            "stability",
-            "stable step",
-            "steps",
-            "shear modulus",
-            "effects",
-            "mass scaling",
-            "prediction",
-            "ok",
-        ] {
-            assert!(
-                answer.stdout.contains(word),
-                "no `{word}` for {}\n{}",
-                path.display(),
-                answer.all()
-            );
+        for word in
+            ["stability", "stable step", "steps", "shear modulus", "effects", "mass scaling", "prediction", "ok"]
+        {
+            assert!(answer.stdout.contains(word), "no `{word}` for {}\n{}", path.display(), answer.all());
         }
     }
     assert!(place.files(".").is_empty(), "check writes nothing");
@@ -441,35 +268,16 @@ fn every_scene_is_checked() {
 #[test]
 fn long_frames_are_predicted_too() {
     let place = Place::new();
-    place.tiny(&[
-        ("\"mass_scaling\"]", "]"),
-        ("mass_scaling = 40000", "frame_rate_hz = 6.0"),
-    ]);
-    let answer = place
-        .call(&["check", "tiny.toml", "--engine", "cpu"])
-        .ended(0);
-    assert!(
-        answer.stdout.contains("s of wall time on this adapter"),
-        "{}",
-        answer.all()
-    );
+    place.tiny(&[("\"mass_scaling\"]", "]"), ("mass_scaling = 40000", "frame_rate_hz = 6.0")]);
+    let answer = place.call(&["check", "tiny.toml", "--engine", "cpu"]).ended(0);
+    assert!(answer.stdout.contains("s of wall time on this adapter"), "{}", answer.all());
 }
 
 #[test]
 fn the_schema_describes_the_keys() {
     let text = Place::new().call(&["schema"]).ended(0).stdout;
     let schema: Value = serde_json::from_str(&text).unwrap();
-    for key in [
-        "tissue",
-        "material",
-        "boundaries",
-        "needle",
-        "sphere",
-        "motion",
-        "puncture",
-        "friction",
-        "solver",
-    ] {
+    for key in ["tissue", "material", "boundaries", "needle", "sphere", "motion", "puncture", "friction", "solver"] {
         assert!(schema["properties"].get(key).is_some(), "no `{key}`");
     }
     for (table, key) in [
@@ -481,10 +289,7 @@ fn the_schema_describes_the_keys() {
         ("OutputsTable", "pictures_at_depth_mm"),
     ] {
         let described = schema["$defs"][table]["properties"][key]["description"].as_str();
-        assert!(
-            described.is_some_and(|d| d.len() > 10),
-            "{table}.{key}: {described:?}"
-        );
+        assert!(described.is_some_and(|d| d.len() > 10), "{table}.{key}: {described:?}");
     }
 }
 
@@ -493,11 +298,7 @@ fn adapters_are_listed() {
     let place = Place::new();
     let answer = place.call(&["adapters"]).ended(0);
     let found = !answer.stdout.starts_with("no adapter found");
-    assert!(
-        found || answer.stdout.contains("way out: "),
-        "{}",
-        answer.all()
-    );
+    assert!(found || answer.stdout.contains("way out: "), "{}", answer.all());
     if found {
         assert!(answer.stdout.starts_with("* "), "{}", answer.all());
         assert!(answer.stdout.contains("driver: "), "{}", answer.all());
@@ -511,11 +312,5 @@ fn help_and_version() {
     for word in ["run", "check", "bench", "adapters", "schema"] {
         assert!(help.contains(word), "{help}");
     }
-    assert!(
-        place
-            .call(&["--version"])
-            .ended(0)
-            .stdout
-            .contains(env!("CARGO_PKG_VERSION"))
-    );
+    assert!(place.call(&["--version"]).ended(0).stdout.contains(env!("CARGO_PKG_VERSION")));
 }

@@ -15,19 +15,11 @@ fn gravity_is_carried_by_the_base() {
     };
     assert_near("force of the base [N]", base.z, carried, 0.01);
     let state = run.state();
-    let sink = run
-        .face(Face::ZMax)
-        .iter()
-        .map(|&n| state.displacement[n].z)
-        .fold(0.0, f64::min);
+    let sink = run.face(Face::ZMax).iter().map(|&n| state.displacement[n].z).fold(0.0, f64::min);
     // A free bar under its weight sinks by rho g H^2 / (2 E); the bonded base makes it a little stiffer.
     let law = run.simulation.model.scene.material.law;
     let bar = 1060.0 * 9.81 * 1e-4 / (2.0 * law.youngs_modulus());
-    println!(
-        "the top sinks by {:.3} um, a free bar by {:.3} um",
-        -sink * 1e6,
-        bar * 1e6
-    );
+    println!("the top sinks by {:.3} um, a free bar by {:.3} um", -sink * 1e6, bar * 1e6);
     assert!((0.6 * bar..1.05 * bar).contains(&-sink), "{sink} m");
 }
 
@@ -37,16 +29,10 @@ fn mass_scaling_leaves_the_force_and_saves_steps() {
     let mut plain = run("effects/mass_scaling.toml", &["effects=[]"], best_engine());
     scaled.assert_sound();
     plain.assert_sound();
-    let (a, b) = (
-        scaled.reaction(Face::ZMax).0.z,
-        plain.reaction(Face::ZMax).0.z,
-    );
+    let (a, b) = (scaled.reaction(Face::ZMax).0.z, plain.reaction(Face::ZMax).0.z);
     assert_near("force with scaled mass [N]", a, b, 0.02);
     let saved = plain.simulation.total_steps() as f64 / scaled.simulation.total_steps() as f64;
-    println!(
-        "mass scaling {}: {saved:.1} times fewer steps",
-        scaled.simulation.model.mass_scaling()
-    );
+    println!("mass scaling {}: {saved:.1} times fewer steps", scaled.simulation.model.mass_scaling());
     assert!(saved > 0.8 * scaled.simulation.model.mass_scaling().sqrt());
 }
 
@@ -62,14 +48,7 @@ fn friction_is_what_it_adds_to_puncture() {
     assert!(smooth.records.iter().all(|r| r.force.friction == 0.0));
     assert_eq!(smooth.last().energy.friction, 0.0);
     assert!(rough.last().energy.friction > 0.0);
-    let friction = rough
-        .records
-        .iter()
-        .rev()
-        .take(3)
-        .map(|r| r.force.friction)
-        .sum::<f64>()
-        / 3.0;
+    let friction = rough.records.iter().rev().take(3).map(|r| r.force.friction).sum::<f64>() / 3.0;
     let added = rough.force_at_depth() - smooth.force_at_depth();
     println!("friction {friction:.4} N, difference of the forces {added:.4} N");
     assert!(friction > 0.0 && added > 0.0);
@@ -84,32 +63,16 @@ fn indentation_comes_back_to_zero() {
     // Linear between frames, which are 0.17 mm apart.
     let force = |phase: usize, depth: f64| {
         let part: Vec<&FrameRecord> = run.records.iter().filter(|r| r.phase == phase).collect();
-        let pair = part
-            .windows(2)
-            .find(|w| (w[0].depth - depth) * (w[1].depth - depth) <= 0.0)
-            .unwrap();
+        let pair = part.windows(2).find(|w| (w[0].depth - depth) * (w[1].depth - depth) <= 0.0).unwrap();
         let share = (depth - pair[0].depth) / (pair[1].depth - pair[0].depth);
         pair[0].force.axial + share * (pair[1].force.axial - pair[0].force.axial)
     };
     let (half, whole, back) = (force(0, 1e-3), force(0, 1.9e-3), force(1, 1e-3));
-    println!(
-        "force at 1 mm {half:.4} N, at 1.9 mm {whole:.4} N, at 1 mm on the way back {back:.4} N"
-    );
+    println!("force at 1 mm {half:.4} N, at 1.9 mm {whole:.4} N, at 1 mm on the way back {back:.4} N");
     // Hertz: 1.9^1.5 = 2.62; more on a thin block (10 mm under a sphere of 5 mm).
     assert!((2.4..4.0).contains(&(whole / half)), "{}", whole / half);
-    assert!(
-        (back / half - 1.0).abs() < 0.15,
-        "elastic: {back} N, {half} N"
-    );
-    let largest = run
-        .records
-        .iter()
-        .map(|r| r.force.axial)
-        .fold(0.0, f64::max);
+    assert!((back / half - 1.0).abs() < 0.15, "elastic: {back} N, {half} N");
+    let largest = run.records.iter().map(|r| r.force.axial).fold(0.0, f64::max);
     assert!(run.last().depth < 0.0);
-    assert!(
-        run.last().force.axial.abs() < 0.01 * largest,
-        "{} N outside",
-        run.last().force.axial
-    );
+    assert!(run.last().force.axial.abs() < 0.01 * largest, "{} N outside", run.last().force.axial);
 }

@@ -17,9 +17,7 @@ mod muscle_biopsy;
 mod validation;
 
 fn load(name: &str, overrides: &[&str]) -> Scene {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("scenes")
-        .join(name);
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
     let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
     Scene::load(&path, &overrides).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -29,10 +27,7 @@ fn has_gpu() -> bool {
     static FOUND: OnceLock<bool> = OnceLock::new();
     let found = *FOUND.get_or_init(|| match Gpu::open() {
         Ok(gpu) => {
-            println!(
-                "adapter: {} ({} {})",
-                gpu.info.name, gpu.info.driver, gpu.info.driver_info
-            );
+            println!("adapter: {} ({} {})", gpu.info.name, gpu.info.driver, gpu.info.driver_info);
             true
         }
         Err(error) => {
@@ -40,10 +35,7 @@ fn has_gpu() -> bool {
             false
         }
     });
-    assert!(
-        found || std::env::var_os("REQUIRE_GPU").is_none_or(|v| v != "1"),
-        "REQUIRE_GPU=1 and no adapter"
-    );
+    assert!(found || std::env::var_os("REQUIRE_GPU").is_none_or(|v| v != "1"), "REQUIRE_GPU=1 and no adapter");
     if !found {
         println!("skipped: no GPU adapter");
     }
@@ -52,11 +44,7 @@ fn has_gpu() -> bool {
 
 /// The GPU where there is one: the numbers of a scene do not depend on the engine.
 fn best_engine() -> EngineChoice {
-    if has_gpu() {
-        EngineChoice::Gpu
-    } else {
-        EngineChoice::Cpu
-    }
+    if has_gpu() { EngineChoice::Gpu } else { EngineChoice::Cpu }
 }
 
 /// True where the full comparisons are run.
@@ -74,22 +62,11 @@ struct Run {
 
 fn run(name: &str, overrides: &[&str], engine: EngineChoice) -> Run {
     let begin = std::time::Instant::now();
-    let mut simulation =
-        Simulation::new(load(name, overrides), engine).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let mut simulation = Simulation::new(load(name, overrides), engine).unwrap_or_else(|e| panic!("{name}: {e}"));
     let on = simulation.engine().info().engine.clone();
-    assert_eq!(
-        on,
-        if engine == EngineChoice::Cpu {
-            "cpu"
-        } else {
-            "gpu"
-        }
-    );
+    assert_eq!(on, if engine == EngineChoice::Cpu { "cpu" } else { "gpu" });
     let mut records = Vec::new();
-    while let Some(record) = simulation
-        .next_frame()
-        .unwrap_or_else(|e| panic!("{name}: {e}"))
-    {
+    while let Some(record) = simulation.next_frame().unwrap_or_else(|e| panic!("{name}: {e}")) {
         records.push(record);
     }
     assert_eq!(records.len() as u64, simulation.frame_count());
@@ -106,12 +83,7 @@ fn run(name: &str, overrides: &[&str], engine: EngineChoice) -> Run {
         100.0 * summary.hourglass_to_internal
     );
     let figures = CurveFigures::from_records(&records);
-    Run {
-        simulation,
-        records,
-        summary,
-        figures,
-    }
+    Run { simulation, records, summary, figures }
 }
 
 impl Run {
@@ -126,16 +98,8 @@ impl Run {
     /// Signs that hold for every scene that is worth reading a number from.
     fn assert_sound(&self) {
         let s = &self.summary;
-        assert!(
-            s.energy_imbalance <= 0.02,
-            "energy imbalance {}",
-            s.energy_imbalance
-        );
-        assert_eq!(
-            (s.clamped_nodes, s.inverted_cells),
-            (0, 0),
-            "clamped nodes, inverted cells"
-        );
+        assert!(s.energy_imbalance <= 0.02, "energy imbalance {}", s.energy_imbalance);
+        assert_eq!((s.clamped_nodes, s.inverted_cells), (0, 0), "clamped nodes, inverted cells");
     }
 
     fn force_at_depth(&self) -> f64 {
@@ -145,14 +109,8 @@ impl Run {
     /// Nodes of a face.
     fn face(&self, face: Face) -> Vec<usize> {
         let mesh = &self.simulation.model.mesh;
-        let plane = if face.is_max() {
-            mesh.nodes()[face.axis()] - 1
-        } else {
-            0
-        };
-        (0..mesh.node_count())
-            .filter(|&n| mesh.node_coordinates(n)[face.axis()] == plane)
-            .collect()
+        let plane = if face.is_max() { mesh.nodes()[face.axis()] - 1 } else { 0 };
+        (0..mesh.node_count()).filter(|&n| mesh.node_coordinates(n)[face.axis()] == plane).collect()
     }
 
     /// Force [N] and moment about the axis x = y = 0 [N m] that the support of a face exerts on the tissue at rest.
@@ -170,14 +128,6 @@ impl Run {
 
 /// `a` lies within `part` of `b`; prints both.
 fn assert_near(what: &str, a: f64, b: f64, part: f64) {
-    println!(
-        "{what}: {a:.6e}, expected {b:.6e} within {:.2} %: {:+.3} %",
-        100.0 * part,
-        100.0 * (a / b - 1.0)
-    );
-    assert!(
-        (a - b).abs() <= part * b.abs(),
-        "{what}: {a}, expected {b} within {:.2} %",
-        100.0 * part
-    );
+    println!("{what}: {a:.6e}, expected {b:.6e} within {:.2} %: {:+.3} %", 100.0 * part, 100.0 * (a / b - 1.0));
+    assert!((a - b).abs() <= part * b.abs(), "{what}: {a}, expected {b} within {:.2} %", 100.0 * part);
 }

@@ -7,7 +7,7 @@ use stylet::model::Model;
 use stylet::scene::Phase;
 use stylet::solver::engine::{Engine, FramePlan, FrameSums, StepInput};
 use stylet::solver::simulation::choose_step;
-use stylet::solver::stable_dt::stable_step;
+use stylet::solver::stable_dt::wave_speed_bound;
 
 const SCENE: &str = "muscle_biopsy.toml";
 const INSERTION: &str = "motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 12.0}]";
@@ -15,8 +15,7 @@ const INSERTION: &str = "motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, dep
 /// The default scene on the GPU; run once for all tests.
 fn default_run() -> Option<&'static Default> {
     static RUN: OnceLock<Option<Default>> = OnceLock::new();
-    RUN.get_or_init(|| has_gpu().then(|| Default::from(run(SCENE, &[], EngineChoice::Gpu))))
-        .as_ref()
+    RUN.get_or_init(|| has_gpu().then(|| Default::from(run(SCENE, &[], EngineChoice::Gpu)))).as_ref()
 }
 
 /// What is kept of the default run.
@@ -30,12 +29,7 @@ struct Default {
 impl From<Run> for Default {
     fn from(run: Run) -> Self {
         let phases = run.simulation.model.scene.motion.phases.clone();
-        Default {
-            records: run.records,
-            summary: run.summary,
-            figures: run.figures,
-            phases,
-        }
+        Default { records: run.records, summary: run.summary, figures: run.figures, phases }
     }
 }
 
@@ -57,12 +51,7 @@ fn the_force_has_the_shape_of_a_puncture() {
     assert!((1.2..=1.4).contains(&end), "force at 12 mm {end} N");
     assert!((f.max_depth.unwrap() - 12e-3).abs() < 1e-4);
     // The largest force comes at the end, not at the puncture.
-    let at = run
-        .records
-        .iter()
-        .find(|r| r.force.axial == largest)
-        .unwrap()
-        .depth;
+    let at = run.records.iter().find(|r| r.force.axial == largest).unwrap().depth;
     assert!(at > 11e-3, "largest force at {at} m");
 }
 
@@ -71,34 +60,19 @@ fn withdrawal_reverses_the_friction() {
     let Some(run) = default_run() else { return };
     assert_eq!(run.phases.len(), 3);
     let mean = |phase: usize, part: fn(&FrameRecord) -> f64| {
-        let values: Vec<f64> = run
-            .records
-            .iter()
-            .filter(|r| r.phase == phase && (4e-3..11e-3).contains(&r.depth))
-            .map(part)
-            .collect();
+        let values: Vec<f64> =
+            run.records.iter().filter(|r| r.phase == phase && (4e-3..11e-3).contains(&r.depth)).map(part).collect();
         assert!(values.len() > 100);
         values.iter().sum::<f64>() / values.len() as f64
     };
     let (inward, outward) = (mean(0, |r| r.force.friction), mean(2, |r| r.force.friction));
     let (push, pull) = (mean(0, |r| r.force.axial), mean(2, |r| r.force.axial));
-    println!(
-        "mean from 4 to 11 mm: friction {inward:.4} N in, {outward:.4} N out; axial {push:.4} N, {pull:.4} N"
-    );
-    assert!(
-        inward > 0.05 && outward < -0.05,
-        "friction {inward} N on the way in, {outward} N on the way out"
-    );
-    assert!(
-        push > 0.0 && pull < 0.0,
-        "axial force {push} N on the way in, {pull} N on the way out"
-    );
+    println!("mean from 4 to 11 mm: friction {inward:.4} N in, {outward:.4} N out; axial {push:.4} N, {pull:.4} N");
+    assert!(inward > 0.05 && outward < -0.05, "friction {inward} N on the way in, {outward} N on the way out");
+    assert!(push > 0.0 && pull < 0.0, "axial force {push} N on the way in, {pull} N on the way out");
     // While the needle stands still the force relaxes by little and does not change its sign.
     let hold: Vec<&FrameRecord> = run.records.iter().filter(|r| r.phase == 1).collect();
-    assert!(
-        hold.iter()
-            .all(|r| r.force.axial > 0.5 * run.figures.force_at_max_depth.unwrap())
-    );
+    assert!(hold.iter().all(|r| r.force.axial > 0.5 * run.figures.force_at_max_depth.unwrap()));
 }
 
 #[test]
@@ -114,21 +88,9 @@ fn energies_stay_in_balance() {
         s.clamped_nodes,
         s.inverted_cells
     );
-    assert!(
-        s.energy_imbalance <= 0.02,
-        "energy imbalance {}",
-        s.energy_imbalance
-    );
-    assert!(
-        s.kinetic_to_internal <= 0.05,
-        "kinetic over internal energy {}",
-        s.kinetic_to_internal
-    );
-    assert!(
-        s.hourglass_to_internal <= 0.05,
-        "hourglass over internal energy {}",
-        s.hourglass_to_internal
-    );
+    assert!(s.energy_imbalance <= 0.02, "energy imbalance {}", s.energy_imbalance);
+    assert!(s.kinetic_to_internal <= 0.05, "kinetic over internal energy {}", s.kinetic_to_internal);
+    assert!(s.hourglass_to_internal <= 0.05, "hourglass over internal energy {}", s.hourglass_to_internal);
     assert_eq!(s.clamped_nodes, 0);
     assert_eq!(s.inverted_cells, 0);
 }
@@ -160,10 +122,7 @@ fn both_engines_give_the_same_force() {
     }
     let (gpu, cpu) = if full() {
         let gpu = default_run().unwrap();
-        (
-            axial(&gpu.records),
-            axial(&run(SCENE, &[], EngineChoice::Cpu).records),
-        )
+        (axial(&gpu.records), axial(&run(SCENE, &[], EngineChoice::Cpu).records))
     } else {
         let coarse = [
             "tissue.cell_size_mm=1.0",
@@ -184,38 +143,23 @@ fn both_engines_give_the_same_force() {
     let larger: Vec<f64> = cpu.iter().map(|f| 1.03 * f).collect();
     assert!(curve_difference(&gpu, &larger).1 > 0.02);
     let late: Vec<f64> = (0..cpu.len()).map(|i| cpu[i.saturating_sub(4)]).collect();
-    let (a, b) = (
-        curve_difference(&gpu, &late).1,
-        curve_difference(&late, &gpu).1,
-    );
+    let (a, b) = (curve_difference(&gpu, &late).1, curve_difference(&late, &gpu).1);
     assert!(a.max(b) > 0.02, "{a} {b}");
 }
 
 /// Sums of all frames and the final state of the first 4 mm, straight from the engine.
 fn four_millimetres() -> (Vec<FrameSums>, State) {
-    let scene = load(
-        SCENE,
-        &["motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 4.0}]"],
-    );
+    let scene = load(SCENE, &["motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 4.0}]"]);
     let mesh = BlockMesh::for_scene(&scene);
     let model = std::sync::Arc::new(Model::new(scene, mesh));
-    let (dt, steps) = choose_step(&model, &stable_step(&model));
-    let mut engine =
-        GpuEngine::new(model.clone(), Gpu::open().unwrap(), dt, steps as usize).unwrap();
+    let (dt, steps) = choose_step(&model, wave_speed_bound(&model));
+    let mut engine = GpuEngine::new(model.clone(), Gpu::open().unwrap(), dt, steps as usize).unwrap();
     let frames = (model.duration() / (dt * steps as f64)).round() as u64;
     let mut sums = Vec::new();
     for frame in 0..frames {
         let first_step = frame * steps;
-        let steps = (first_step..first_step + steps)
-            .map(|s| StepInput::at(&model, s as f64 * dt, dt))
-            .collect();
-        engine
-            .start_frame(&FramePlan {
-                frame,
-                first_step,
-                steps,
-            })
-            .unwrap();
+        let steps = (first_step..first_step + steps).map(|s| StepInput::at(&model, s as f64 * dt, dt)).collect();
+        engine.start_frame(&FramePlan { frame, first_step, steps }).unwrap();
         sums.push(engine.collect(true).unwrap().unwrap());
     }
     (sums, engine.read_state().unwrap())
@@ -245,49 +189,28 @@ fn the_mesh_changes_the_force_by_little() {
         run.assert_sound();
         run.force_at_depth()
     };
-    let forces = [
-        with("tissue.cell_size_mm=0.8"),
-        middle.figures.force_at_max_depth.unwrap(),
-        with("tissue.cell_size_mm=0.5"),
-    ];
+    let forces =
+        [with("tissue.cell_size_mm=0.8"), middle.figures.force_at_max_depth.unwrap(), with("tissue.cell_size_mm=0.5")];
     let high = forces.iter().copied().fold(0.0, f64::max);
     let low = forces.iter().copied().fold(f64::INFINITY, f64::min);
-    println!(
-        "force at 12 mm with 0.8, 0.6, 0.5 mm: {forces:.4?} N, {:.2} %",
-        100.0 * (high / low - 1.0)
-    );
+    println!("force at 12 mm with 0.8, 0.6, 0.5 mm: {forces:.4?} N, {:.2} %", 100.0 * (high / low - 1.0));
     assert!(high / low <= 1.10, "{forces:?}");
 }
 
 #[test]
 fn an_axis_on_grid_lines_changes_the_force_by_little() {
     let Some(usual) = default_run() else { return };
-    let on_lines = run(
-        SCENE,
-        &["tissue.axis_offset_cells=[0, 0]", INSERTION],
-        EngineChoice::Gpu,
-    );
+    let on_lines = run(SCENE, &["tissue.axis_offset_cells=[0, 0]", INSERTION], EngineChoice::Gpu);
     println!("{:?}", on_lines.figures);
     on_lines.assert_sound();
-    let (a, b) = (
-        on_lines.force_at_depth(),
-        usual.figures.force_at_max_depth.unwrap(),
-    );
+    let (a, b) = (on_lines.force_at_depth(), usual.figures.force_at_max_depth.unwrap());
     assert_near("force at 12 mm with the axis on grid lines [N]", a, b, 0.10);
-    let (p, q) = (
-        on_lines.figures.peak_force.unwrap(),
-        usual.figures.peak_force.unwrap(),
-    );
+    let (p, q) = (on_lines.figures.peak_force.unwrap(), usual.figures.peak_force.unwrap());
     assert_near("largest force with the axis on grid lines [N]", p, q, 0.10);
     // Along the whole way in, as part of the largest force.
     let count = on_lines.records.len();
-    let (direct, shifted) =
-        curve_difference(&axial(&on_lines.records), &axial(&usual.records)[..count]);
-    println!(
-        "along the way: {:.2} %, {:.2} % beside drops, of the largest force",
-        100.0 * direct,
-        100.0 * shifted
-    );
+    let (direct, shifted) = curve_difference(&axial(&on_lines.records), &axial(&usual.records)[..count]);
+    println!("along the way: {:.2} %, {:.2} % beside drops, of the largest force", 100.0 * direct, 100.0 * shifted);
     assert!(shifted <= 0.10, "{shifted}");
 }
 
@@ -298,10 +221,7 @@ fn oblique_entry() {
     run.assert_sound();
     assert!(run.summary.kinetic_to_internal <= 0.05);
     let f = &run.figures;
-    assert!(
-        f.puncture_force.is_some_and(|p| (0.4..0.8).contains(&p)),
-        "the puncture threshold is 0.6 N"
-    );
+    assert!(f.puncture_force.is_some_and(|p| (0.4..0.8).contains(&p)), "the puncture threshold is 0.6 N");
     assert!((f.max_depth.unwrap() - 12e-3).abs() < 1e-4);
     // Cutting alone takes 0.3 N, and the shaft adds to it.
     assert!(f.force_at_max_depth.unwrap() > 0.5);

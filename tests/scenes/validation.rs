@@ -10,20 +10,13 @@ fn uniaxial(c10: f64, c01: f64, bulk: f64, axial: f64) -> (f64, f64) {
     let cauchy = |lateral: f64| {
         let j = axial * lateral * lateral;
         let b = [axial, lateral, lateral].map(|l| l * l * j.powf(-2.0 / 3.0));
-        let (i1, i2) = (
-            b.iter().sum::<f64>(),
-            b.iter().map(|b| 1.0 / b).sum::<f64>(),
-        );
+        let (i1, i2) = (b.iter().sum::<f64>(), b.iter().map(|b| 1.0 / b).sum::<f64>());
         b.map(|b| 2.0 / j * (c10 * (b - i1 / 3.0) - c01 * (1.0 / b - i2 / 3.0)) + bulk * (j - 1.0))
     };
     let (mut low, mut high) = (0.5, 1.5);
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
-        if cauchy(middle)[1] > 0.0 {
-            high = middle
-        } else {
-            low = middle
-        }
+        if cauchy(middle)[1] > 0.0 { high = middle } else { low = middle }
     }
     (cauchy(low)[0] * low * low, low)
 }
@@ -36,16 +29,8 @@ fn uniaxial_stretch() {
     let (stress, lateral) = uniaxial(law.c10, law.c01, law.bulk_modulus, 1.3);
     // The incompressible closed form of the scene's comment, about 1 % above.
     let incompressible = 2.0 * (1.3 - 1.3f64.powi(-2)) * (law.c10 + law.c01 / 1.3);
-    assert_near(
-        "incompressible closed form [Pa]",
-        incompressible,
-        4348.0,
-        1e-3,
-    );
-    assert!(
-        stress < incompressible && stress > 0.98 * incompressible,
-        "{stress} {incompressible}"
-    );
+    assert_near("incompressible closed form [Pa]", incompressible, 4348.0, 1e-3);
+    assert!(stress < incompressible && stress > 0.98 * incompressible, "{stress} {incompressible}");
     let (force, _) = run.reaction(Face::ZMax);
     assert_near("force on the top [N]", force.z, stress * 400e-6, 0.003);
     // Homogeneous: every node moves with the same stretches.
@@ -59,10 +44,7 @@ fn uniaxial_stretch() {
             (state.displacement[n] - u).length()
         })
         .fold(0.0, f64::max);
-    println!(
-        "largest deviation from the homogeneous field {:.3} um of 6 mm",
-        worst * 1e6
-    );
+    println!("largest deviation from the homogeneous field {:.3} um of 6 mm", worst * 1e6);
     assert!(worst < 0.002 * 6e-3, "{worst} m");
 }
 
@@ -72,11 +54,7 @@ fn patch() {
     run.assert_sound();
     let last = *run.last();
     let fields = run.simulation.snapshot(&last).unwrap();
-    let worst = fields
-        .jacobian
-        .iter()
-        .map(|j| (j - 0.95).abs())
-        .fold(0.0, f64::max);
+    let worst = fields.jacobian.iter().map(|j| (j - 0.95).abs()).fold(0.0, f64::max);
     let state = run.state();
     let mesh = &run.simulation.model.mesh;
     let height = -mesh.rest_position(0).z;
@@ -86,10 +64,7 @@ fn patch() {
             (state.displacement[n] - DVec3::new(0.0, 0.0, -0.05 * (x.z + height))).length()
         })
         .fold(0.0, f64::max);
-    println!(
-        "largest |J - 0.95| {worst:.2e}, largest deviation from the affine field {:.4} um of 1 mm",
-        shift * 1e6
-    );
+    println!("largest |J - 0.95| {worst:.2e}, largest deviation from the affine field {:.4} um of 1 mm", shift * 1e6);
     // Single precision and what is left of the vibration: 1e-4 of the strain.
     assert!(worst < 1e-5, "{worst}");
     assert!(shift < 1e-4 * 1e-3, "{shift} m");
@@ -104,30 +79,15 @@ fn compression_of_a_bonded_cube() {
     // At the eight corners of the cube, where bonded and free faces meet, the strain is singular: these cells fold at
     // one corner, as nothing but the linear hourglass force holds them (none does with hourglass_quartic = 1000, which
     // gives 4.75 N).
-    println!(
-        "smallest J {:.3}, at cell corners {:.3}",
-        health.min_j, health.min_corner_j
-    );
-    assert!(
-        summary.inverted_cells <= 8,
-        "{} cells",
-        summary.inverted_cells
-    );
+    println!("smallest J {:.3}, at cell corners {:.3}", health.min_j, health.min_corner_j);
+    assert!(summary.inverted_cells <= 8, "{} cells", summary.inverted_cells);
     assert!(health.min_j > 0.9, "no cell is inverted as a whole");
     let ((top, _), (bottom, _)) = (run.reaction(Face::ZMax), run.reaction(Face::ZMin));
     println!("reactions {top:.4?} N, {bottom:.4?} N");
     // With the quartic hourglass term of the needle scenes: 5.16 N, 14 % more.
-    assert_near(
-        "reaction of one-point hexahedra, 10 cells per side [N]",
-        -top.z,
-        4.51,
-        0.01,
-    );
+    assert_near("reaction of one-point hexahedra, 10 cells per side [N]", -top.z, 4.51, 0.01);
     assert_near("converged reaction [N]", -top.z, 4.65, 0.05);
-    assert!(
-        (top + bottom).length() < 0.005 * top.length(),
-        "the block is at rest"
-    );
+    assert!((top + bottom).length() < 0.005 * top.length(), "the block is at rest");
     assert!(top.truncate().length() < 0.005 * top.length());
 }
 
@@ -138,23 +98,10 @@ fn twisted_cube() {
     let ((top, turn), (bottom, held)) = (run.reaction(Face::ZMax), run.reaction(Face::ZMin));
     println!("forces {top:.5?}, {bottom:.5?} N; moments {turn:.6?}, {held:.6?} N m");
     assert!(turn.z > 0.0, "the moment turns the way the face does");
-    assert_near(
-        "moment at the bottom over that at the top",
-        -held.z / turn.z,
-        1.0,
-        0.005,
-    );
+    assert_near("moment at the bottom over that at the top", -held.z / turn.z, 1.0, 0.005);
     assert!(top.truncate().length() < 0.005 * top.z.abs());
-    assert!(
-        top.z < 0.0,
-        "Poynting: a twisted block pushes its ends apart"
-    );
-    assert_near(
-        "axial force at the bottom over that at the top",
-        -bottom.z / top.z,
-        1.0,
-        0.01,
-    );
+    assert!(top.z < 0.0, "Poynting: a twisted block pushes its ends apart");
+    assert_near("axial force at the bottom over that at the top", -bottom.z / top.z, 1.0, 0.01);
 }
 
 #[test]
@@ -167,45 +114,26 @@ fn sphere_on_a_block() {
     assert_near("Hertz [N]", hertz, 0.110, 0.01);
     // Finite thickness, bonded base, incompressible: Dimitriadis et al. 2002, Eq. 13, chi = sqrt(R d) / h.
     let chi = (10e-3f64 * 1e-3).sqrt() / 40e-3;
-    let thick = hertz
-        * (1.0 + 1.133 * chi + 1.283 * chi.powi(2) + 0.769 * chi.powi(3) + 0.0975 * chi.powi(4));
-    let held: Vec<f64> = run
-        .records
-        .iter()
-        .rev()
-        .take(5)
-        .map(|r| r.force.axial)
-        .collect();
+    let thick = hertz * (1.0 + 1.133 * chi + 1.283 * chi.powi(2) + 0.769 * chi.powi(3) + 0.0975 * chi.powi(4));
+    let held: Vec<f64> = run.records.iter().rev().take(5).map(|r| r.force.axial).collect();
     let force = held.iter().sum::<f64>() / held.len() as f64;
-    println!(
-        "force at 1 mm: {:+.2} % of Hertz",
-        100.0 * (force / hertz - 1.0)
-    );
+    println!("force at 1 mm: {:+.2} % of Hertz", 100.0 * (force / hertz - 1.0));
     assert!(force > hertz, "a finite block is stiffer than a half space");
-    assert_near(
-        "force at 1 mm against the block of finite thickness [N]",
-        force,
-        thick,
-        0.10,
-    );
+    assert_near("force at 1 mm against the block of finite thickness [N]", force, thick, 0.10);
 }
 
 #[test]
 fn free_vibration_of_a_column() {
     // 20 frames per period, so that a window of whole periods holds harmonics that are orthogonal.
     const PER_PERIOD: usize = 20;
-    let scene = load(
-        "validation/free_vibration.toml",
-        &["solver.frame_rate_hz=5477.2256"],
-    );
+    let scene = load("validation/free_vibration.toml", &["solver.frame_rate_hz=5477.2256"]);
     let mut simulation = Simulation::new(scene, best_engine()).unwrap();
     for frame in 0..simulation.frame_count() {
         simulation.stop_after(frame);
     }
     let mesh = simulation.model.mesh.clone();
-    let top: Vec<usize> = (0..mesh.node_count())
-        .filter(|&n| mesh.node_coordinates(n)[2] == mesh.nodes()[2] - 1)
-        .collect();
+    let top: Vec<usize> =
+        (0..mesh.node_count()).filter(|&n| mesh.node_coordinates(n)[2] == mesh.nodes()[2] - 1).collect();
     let mut curve = vec![(0.0, 0.0)];
     let mut damped = 0.0;
     while let Some(record) = simulation.next_frame().unwrap() {
@@ -220,12 +148,7 @@ fn free_vibration_of_a_column() {
     assert_near("P-wave speed [m/s]", speed, 21.909, 1e-3);
     let (period, rest) = (4.0 * 20e-3 / speed, 10.0 * 20e-3 / modulus);
     let peak = curve.iter().map(|p| p.1).fold(0.0, f64::max);
-    assert_near(
-        "largest displacement of the top [m]",
-        peak,
-        2.0 * rest,
-        0.02,
-    );
+    assert_near("largest displacement of the top [m]", peak, 2.0 * rest, 0.02);
     // The top passes its static place upwards at T/4, 5T/4, ...
     let crossings: Vec<f64> = curve
         .windows(2)
@@ -253,12 +176,7 @@ fn free_vibration_of_a_column() {
     // The first point is the start, the last frame may be shorter than the others.
     let (first, last) = (amplitude(1), amplitude(curve.len() - 1 - 2 * PER_PERIOD));
     // A triangular wave of height s0 H / M has the first harmonic 8/pi^2 of it.
-    assert_near(
-        "first harmonic [m]",
-        first,
-        8.0 / std::f64::consts::PI.powi(2) * rest,
-        0.02,
-    );
+    assert_near("first harmonic [m]", first, 8.0 / std::f64::consts::PI.powi(2) * rest, 0.02);
     assert_near("last over first amplitude", last / first, 1.0, 0.02);
     assert_eq!(damped, 0.0, "damping is off");
 }

@@ -19,17 +19,12 @@ impl Check<'_> {
             if !keys.contains(&key.as_str()) {
                 self.unknown_name(&format!("effects.{index}"), "effect", key, &keys);
             } else if file.effects[..index].contains(key) {
-                self.notices
-                    .push(format!("Effect `{key}` is listed twice."));
+                self.notices.push(format!("Effect `{key}` is listed twice."));
             }
         }
         let listed = |key: &str| file.effects.iter().any(|listed| listed == key);
         let place = |key: &str| {
-            let index = file
-                .effects
-                .iter()
-                .position(|listed| listed == key)
-                .unwrap_or(0);
+            let index = file.effects.iter().position(|listed| listed == key).unwrap_or(0);
             format!("effects.{index}")
         };
         let is_needle = matches!(tool, Some(Tool::Needle(_)));
@@ -59,14 +54,10 @@ impl Check<'_> {
             );
         }
         if is_needle && !listed("puncture") {
-            self.notices.push(
-                "The needle has no effect on the tissue: effect `puncture` is not listed.".into(),
-            );
+            self.notices.push("The needle has no effect on the tissue: effect `puncture` is not listed.".into());
         }
         if is_indenter && !listed("indentation") {
-            self.notices.push(
-                "The tool has no effect on the tissue: effect `indentation` is not listed.".into(),
-            );
+            self.notices.push("The tool has no effect on the tissue: effect `indentation` is not listed.".into());
         }
         for (key, present) in [
             ("puncture", file.puncture.is_some()),
@@ -75,30 +66,19 @@ impl Check<'_> {
             ("gravity", file.gravity.is_some()),
         ] {
             if present && !listed(key) {
-                self.notices.push(format!(
-                    "Table [{key}] has no effect: `{key}` is not in the list `effects`."
-                ));
+                self.notices.push(format!("Table [{key}] has no effect: `{key}` is not in the list `effects`."));
             }
         }
         if file.solver.mass_scaling.is_some() && !listed("mass_scaling") {
-            self.notices.push(
-                "`solver.mass_scaling` has no effect: `mass_scaling` is not in the list `effects`."
-                    .into(),
-            );
+            self.notices
+                .push("`solver.mass_scaling` has no effect: `mass_scaling` is not in the list `effects`.".into());
         }
         let puncture = self.puncture(&file.puncture.clone().unwrap_or_default());
         let friction = self.friction(&file.friction.clone().unwrap_or_default());
         let indentation = self.indentation(&file.indentation.clone().unwrap_or_default());
-        let acceleration = file
-            .gravity
-            .as_ref()
-            .and_then(|table| table.acceleration_m_s2);
+        let acceleration = file.gravity.as_ref().and_then(|table| table.acceleration_m_s2);
         let gravity = effects::gravity::Params {
-            acceleration: self.vector(
-                "gravity.acceleration_m_s2",
-                acceleration.unwrap_or([0.0, 0.0, -9.81]),
-                1000.0,
-            ),
+            acceleration: self.vector("gravity.acceleration_m_s2", acceleration.unwrap_or([0.0, 0.0, -9.81]), 1000.0),
         };
         let factor = match file.solver.mass_scaling {
             Some(MassScalingEntry::Factor(factor)) => {
@@ -108,8 +88,7 @@ impl Check<'_> {
             _ => 1.0,
         };
         EffectSet {
-            mass_scaling: listed("mass_scaling")
-                .then_some(effects::mass_scaling::Params { factor }),
+            mass_scaling: listed("mass_scaling").then_some(effects::mass_scaling::Params { factor }),
             gravity: listed("gravity").then_some(gravity),
             puncture: listed("puncture").then_some(puncture),
             indentation: listed("indentation").then_some(indentation),
@@ -124,17 +103,12 @@ impl Check<'_> {
         faces: &[FaceCondition; 6],
         material: &TissueMaterial,
     ) -> f64 {
-        let driven = faces
-            .iter()
-            .filter_map(|face| face.drive)
-            .map(|drive| drive.displacement.length() / drive.duration);
+        let driven =
+            faces.iter().filter_map(|face| face.drive).map(|drive| drive.displacement.length() / drive.duration);
         let speed = driven.fold(motion.largest_speed(), f64::max);
         let shear_modulus = material.law.shear_modulus();
         if !(speed > 0.0 && shear_modulus > 0.0) {
-            self.notices.push(
-                "solver.mass_scaling \"auto\" is 1: nothing in the scene moves at a known speed."
-                    .into(),
-            );
+            self.notices.push("solver.mass_scaling \"auto\" is 1: nothing in the scene moves at a known speed.".into());
             return 1.0;
         }
         effects::mass_scaling::auto_factor(speed, (shear_modulus / material.density).sqrt())
@@ -187,13 +161,7 @@ impl Check<'_> {
                 d.residual_stiffness,
                 Between(1e-4, 1.0),
             ),
-            ring_radius: self.optional(
-                &at("ring_radius_mm"),
-                t.ring_radius_mm,
-                MM,
-                d.ring_radius,
-                Positive(100.0),
-            ),
+            ring_radius: self.optional(&at("ring_radius_mm"), t.ring_radius_mm, MM, d.ring_radius, Positive(100.0)),
             contact_stiffness_factor: self.optional(
                 &at("contact_stiffness_factor"),
                 t.contact_stiffness_factor,
@@ -208,20 +176,10 @@ impl Check<'_> {
                 d.contact_damping,
                 NotNegative(1.0),
             ),
-            entry_fade: self.optional(
-                &at("entry_fade_mm"),
-                t.entry_fade_mm,
-                MM,
-                d.entry_fade,
-                Positive(100.0),
-            ),
+            entry_fade: self.optional(&at("entry_fade_mm"), t.entry_fade_mm, MM, d.entry_fade, Positive(100.0)),
         };
         if params.softened_radius >= params.ring_radius {
-            let key = if t.softened_radius_mm.is_some() {
-                "softened_radius_mm"
-            } else {
-                "ring_radius_mm"
-            };
+            let key = if t.softened_radius_mm.is_some() { "softened_radius_mm" } else { "ring_radius_mm" };
             self.problems.report(
                 &at(key),
                 format!(

@@ -27,21 +27,13 @@ impl Check<'_> {
         let placeholder = TissueMaterial {
             name: "refused".into(),
             source: String::new(),
-            law: MooneyRivlin {
-                c10: 1.0,
-                c01: 1.0,
-                bulk_modulus: 1.0,
-            },
+            law: MooneyRivlin { c10: 1.0, c01: 1.0, bulk_modulus: 1.0 },
             density,
         };
         // Ranges first: signs of c10 and c01 are the verdict's business.
         for (key, value) in [("c10_kpa", table.c10_kpa), ("c01_kpa", table.c01_kpa)] {
             if let Some(value) = value {
-                self.number(
-                    &format!("material.{key}"),
-                    value,
-                    Within::Between(-1e6, 1e6),
-                );
+                self.number(&format!("material.{key}"), value, Within::Between(-1e6, 1e6));
             }
         }
         let largest = LARGEST_TISSUE_MODULUS / KPA;
@@ -49,11 +41,7 @@ impl Check<'_> {
             if value > largest {
                 self.refuse_stiff_tissue("material.youngs_modulus_kpa", value * KPA);
             } else {
-                self.number(
-                    "material.youngs_modulus_kpa",
-                    value,
-                    Within::Positive(largest),
-                );
+                self.number("material.youngs_modulus_kpa", value, Within::Positive(largest));
             }
         }
         if let Some(value) = table.bulk_modulus_kpa {
@@ -71,11 +59,7 @@ impl Check<'_> {
                     "write 0.45 to 0.495; explicit time steps shrink without limit towards 0.5",
                 );
             } else {
-                self.number(
-                    "material.poisson_ratio",
-                    value,
-                    Within::Between(0.0, 0.4999),
-                );
+                self.number("material.poisson_ratio", value, Within::Between(0.0, 0.4999));
             }
         }
         if let Some(value) = table.c10_share {
@@ -90,22 +74,16 @@ impl Check<'_> {
             );
         }
         // Bulk modulus written directly [Pa]; a Poisson's ratio beside it is only compared.
-        let direct_bulk = table
-            .bulk_modulus_kpa
-            .map(|k| k * KPA)
-            .or(table.d_per_mpa.map(|d| 2.0e6 / d));
+        let direct_bulk = table.bulk_modulus_kpa.map(|k| k * KPA).or(table.d_per_mpa.map(|d| 2.0e6 / d));
         let bulk = |shear: f64| match (direct_bulk, table.poisson_ratio) {
             (Some(bulk), _) => Some(bulk),
             (None, Some(nu)) => Some(presets::bulk_modulus_from_poisson(shear, nu)),
             (None, None) => None,
         };
         let material = match (&table.preset, table.c10_kpa, table.c01_kpa) {
-            (Some(name), None, None)
-                if table.youngs_modulus_kpa.is_none() && table.c10_share.is_none() =>
-            {
+            (Some(name), None, None) if table.youngs_modulus_kpa.is_none() && table.c10_share.is_none() => {
                 let Some(preset) = presets::tissue(name) else {
-                    let names: Vec<&str> =
-                        presets::tissues().iter().map(|p| p.name.as_str()).collect();
+                    let names: Vec<&str> = presets::tissues().iter().map(|p| p.name.as_str()).collect();
                     self.unknown_name("material.preset", "tissue preset", name, &names);
                     return placeholder;
                 };
@@ -122,11 +100,7 @@ impl Check<'_> {
                     name: preset.name.clone(),
                     source: format!("{}; valid: {}", preset.source, preset.range),
                     law,
-                    density: if table.density_kg_m3.is_some() {
-                        density
-                    } else {
-                        preset.density
-                    },
+                    density: if table.density_kg_m3.is_some() { density } else { preset.density },
                 }
             }
             (Some(_), _, _) => {
@@ -152,11 +126,7 @@ impl Check<'_> {
                 TissueMaterial {
                     name: "constants".into(),
                     source: "c10, c01 of the scene file".into(),
-                    law: MooneyRivlin {
-                        c10: c10 * KPA,
-                        c01: c01 * KPA,
-                        bulk_modulus,
-                    },
+                    law: MooneyRivlin { c10: c10 * KPA, c01: c01 * KPA, bulk_modulus },
                     density,
                 }
             }
@@ -182,11 +152,7 @@ impl Check<'_> {
                 TissueMaterial {
                     name: "constants".into(),
                     source: "E and nu of the scene file".into(),
-                    law: presets::law_from_youngs_modulus(
-                        young,
-                        nu,
-                        table.c10_share.unwrap_or(C10_SHARE),
-                    ),
+                    law: presets::law_from_youngs_modulus(young, nu, table.c10_share.unwrap_or(C10_SHARE)),
                     density,
                 }
             }
@@ -220,11 +186,7 @@ impl Check<'_> {
     /// Accepts, limits or refuses the law; compares values that are stated twice.
     fn verdict(&mut self, table: &MaterialTable, material: &TissueMaterial, cell_size: f64) {
         let law = &material.law;
-        let place = if table.c01_kpa.is_some() {
-            "material.c01_kpa"
-        } else {
-            "material"
-        };
+        let place = if table.c01_kpa.is_some() { "material.c01_kpa" } else { "material" };
         match law.verdict() {
             Verdict::Unstable => {
                 let (c10, c01) = (law.c10 / KPA, law.c01 / KPA);
@@ -265,18 +227,16 @@ impl Check<'_> {
                 return;
             }
             Verdict::StableBelow(_) | Verdict::StableAbove(_) => {
-                self.notices
-                    .push(format!("Limited material: {}.", describe_verdict(law)));
+                self.notices.push(format!("Limited material: {}.", describe_verdict(law)));
             }
             Verdict::Stable => {}
         }
         if table.youngs_modulus_kpa.is_none() && law.youngs_modulus() > LARGEST_TISSUE_MODULUS {
             self.refuse_stiff_tissue(place, law.youngs_modulus());
         }
-        if let (Some(stated), true) = (
-            table.poisson_ratio,
-            table.bulk_modulus_kpa.is_some() || table.d_per_mpa.is_some(),
-        ) && (stated - law.poisson_ratio()).abs() > 1e-3
+        if let (Some(stated), true) =
+            (table.poisson_ratio, table.bulk_modulus_kpa.is_some() || table.d_per_mpa.is_some())
+            && (stated - law.poisson_ratio()).abs() > 1e-3
         {
             self.notices.push(format!(
                 "material.poisson_ratio {stated} disagrees with the law, whose c10, c01 and K give nu {}; the law counts.",

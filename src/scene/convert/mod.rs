@@ -45,20 +45,14 @@ pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, Str
     }
     problems.check()?;
     let file: SceneFile = document.deserialize()?;
-    let mut check = Check {
-        problems,
-        notices: Vec::new(),
-    };
+    let mut check = Check { problems, notices: Vec::new() };
     check.scene(path, &file)
 }
 
 /// The text for a file that cannot be read.
 fn unreadable(path: &Path, error: &std::io::Error) -> String {
     let name = path.display();
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut scenes: Vec<String> = std::fs::read_dir(folder)
         .into_iter()
         .flatten()
@@ -67,15 +61,10 @@ fn unreadable(path: &Path, error: &std::io::Error) -> String {
         .filter(|name| name.ends_with(".toml"))
         .collect();
     scenes.sort();
-    let stem = path
-        .file_name()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default();
+    let stem = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let way_out = match closest(&stem, scenes.iter().map(String::as_str)) {
         Some(near) => format!("did you mean {}?", folder.join(near).display()),
-        None if scenes.is_empty() => {
-            "give the path of a scene file (.toml); the program's own lie in scenes/".into()
-        }
+        None if scenes.is_empty() => "give the path of a scene file (.toml); the program's own lie in scenes/".into(),
         None => format!("scenes in {}: {}", folder.display(), scenes.join(", ")),
     };
     format!("error: cannot read the scene file {name}: {error}\n  = way out: {way_out}\n")
@@ -102,10 +91,7 @@ type Checked<T> = std::result::Result<T, String>;
 
 impl Check<'_> {
     fn scene(&mut self, path: &Path, file: &SceneFile) -> Checked<Scene> {
-        let name = path
-            .file_stem()
-            .map(|s| s.to_string_lossy().into_owned())
-            .unwrap_or_default();
+        let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let tissue = self.tissue(&file.tissue);
         let material = self.material(&file.material, tissue.cell_size);
         let faces = self.faces(&file.boundaries);
@@ -120,8 +106,10 @@ impl Check<'_> {
         self.memory(&tissue, tool.as_ref(), &motion);
         self.problems.check()?;
         if tool.is_some() && faces.iter().all(|face| face.fixed == [false; 3]) {
-            self.notices
-                .push("No face of the block is fixed, so the tool pushes it away; set e.g. boundaries.z_min = \"fixed\".".into());
+            self.notices.push(
+                "No face of the block is fixed, so the tool pushes it away; set e.g. boundaries.z_min = \"fixed\"."
+                    .into(),
+            );
         }
         Ok(Scene {
             title: file.title.clone().unwrap_or_else(|| name.replace('_', " ")),
@@ -142,17 +130,9 @@ impl Check<'_> {
     /// Reports a number outside its range and returns it unchanged.
     fn number(&mut self, path: &str, value: f64, within: Within) -> f64 {
         let (good, range) = match within {
-            Within::Positive(limit) => (
-                value > 0.0 && value <= limit,
-                format!("greater than 0 and at most {limit}"),
-            ),
-            Within::NotNegative(limit) => {
-                (value >= 0.0 && value <= limit, format!("from 0 to {limit}"))
-            }
-            Within::Between(low, high) => (
-                value >= low && value <= high,
-                format!("from {low} to {high}"),
-            ),
+            Within::Positive(limit) => (value > 0.0 && value <= limit, format!("greater than 0 and at most {limit}")),
+            Within::NotNegative(limit) => (value >= 0.0 && value <= limit, format!("from 0 to {limit}")),
+            Within::Between(low, high) => (value >= low && value <= high, format!("from {low} to {high}")),
         };
         if !good {
             self.problems.report(
@@ -166,43 +146,24 @@ impl Check<'_> {
     }
 
     /// An optional number in SI: `value * unit` where it is written, else `default` (already SI).
-    fn optional(
-        &mut self,
-        path: &str,
-        value: Option<f64>,
-        unit: f64,
-        default: f64,
-        within: Within,
-    ) -> f64 {
+    fn optional(&mut self, path: &str, value: Option<f64>, unit: f64, default: f64, within: Within) -> f64 {
         value.map_or(default, |value| self.number(path, value, within) * unit)
     }
 
     /// A vector of which every component lies within +-limit.
     fn vector(&mut self, path: &str, value: [f64; 3], limit: f64) -> DVec3 {
         for (index, component) in value.iter().enumerate() {
-            self.number(
-                &format!("{path}.{index}"),
-                *component,
-                Within::Between(-limit, limit),
-            );
+            self.number(&format!("{path}.{index}"), *component, Within::Between(-limit, limit));
         }
         DVec3::from(value)
     }
 
     fn tissue(&mut self, table: &TissueTable) -> Tissue {
         for (index, size) in table.size_mm.iter().enumerate() {
-            self.number(
-                &format!("tissue.size_mm.{index}"),
-                *size,
-                Within::Positive(1000.0),
-            );
+            self.number(&format!("tissue.size_mm.{index}"), *size, Within::Positive(1000.0));
         }
         let smallest = table.size_mm.iter().cloned().fold(f64::INFINITY, f64::min);
-        let cell = self.number(
-            "tissue.cell_size_mm",
-            table.cell_size_mm,
-            Within::Between(1e-3, 100.0),
-        );
+        let cell = self.number("tissue.cell_size_mm", table.cell_size_mm, Within::Between(1e-3, 100.0));
         if cell > 0.5 * smallest && smallest > 0.0 {
             self.problems.report(
                 "tissue.cell_size_mm",
@@ -213,11 +174,7 @@ impl Check<'_> {
         }
         let offset = table.axis_offset_cells.unwrap_or([0.23, 0.31]);
         for (index, value) in offset.iter().enumerate() {
-            self.number(
-                &format!("tissue.axis_offset_cells.{index}"),
-                *value,
-                Within::Between(0.0, 1.0),
-            );
+            self.number(&format!("tissue.axis_offset_cells.{index}"), *value, Within::Between(0.0, 1.0));
         }
         Tissue {
             size: DVec3::from(table.size_mm) * MM,
@@ -229,13 +186,7 @@ impl Check<'_> {
                 2.5 * MM,
                 Within::Positive(1000.0),
             ),
-            growth: self.optional(
-                "tissue.growth",
-                table.growth,
-                1.0,
-                1.25,
-                Within::Between(1.0, 2.0),
-            ),
+            growth: self.optional("tissue.growth", table.growth, 1.0, 1.25, Within::Between(1.0, 2.0)),
             axis_offset_cells: offset,
         }
     }
@@ -246,29 +197,13 @@ impl Check<'_> {
             Some(near) => format!("did you mean \"{near}\"? There are: {list}"),
             None => format!("use one of: {list}"),
         };
-        self.problems.report(
-            path,
-            format!("there is no {what} called \"{name}\""),
-            "unknown name",
-            way_out,
-        );
+        self.problems.report(path, format!("there is no {what} called \"{name}\""), "unknown name", way_out);
     }
 
     fn faces(&mut self, table: &BoundariesTable) -> [FaceCondition; 6] {
-        let entries = [
-            &table.x_min,
-            &table.x_max,
-            &table.y_min,
-            &table.y_max,
-            &table.z_min,
-            &table.z_max,
-        ];
+        let entries = [&table.x_min, &table.x_max, &table.y_min, &table.y_max, &table.z_min, &table.z_max];
         Face::ALL.map(|face| {
-            let default = if face == Face::ZMax {
-                FaceKind::Free
-            } else {
-                FaceKind::Fixed
-            };
+            let default = if face == Face::ZMax { FaceKind::Free } else { FaceKind::Fixed };
             match entries[face as usize] {
                 None => face_of_kind(face, default),
                 Some(FaceEntry::Kind(kind)) => face_of_kind(face, *kind),
@@ -283,19 +218,12 @@ impl Check<'_> {
         for axis in &table.fixed {
             condition.fixed[*axis as usize] = true;
         }
-        let displacement = table
-            .displacement_mm
-            .map(|value| self.vector(&at("displacement_mm"), value, 1000.0) * MM);
-        let rotation = table.rotation_deg.map(|value| {
-            self.number(&at("rotation_deg"), value, Within::Between(-3600.0, 3600.0))
-                .to_radians()
-        });
+        let displacement = table.displacement_mm.map(|value| self.vector(&at("displacement_mm"), value, 1000.0) * MM);
+        let rotation = table
+            .rotation_deg
+            .map(|value| self.number(&at("rotation_deg"), value, Within::Between(-3600.0, 3600.0)).to_radians());
         if displacement.is_some() || rotation.is_some() {
-            let key = at(if displacement.is_some() {
-                "displacement_mm"
-            } else {
-                "rotation_deg"
-            });
+            let key = at(if displacement.is_some() { "displacement_mm" } else { "rotation_deg" });
             match table.duration_s {
                 None => self.problems.report(
                     &key,
@@ -313,36 +241,22 @@ impl Check<'_> {
                 }
             }
         } else if table.duration_s.is_some() {
-            self.notices.push(format!(
-                "`{}` has no effect without displacement_mm or rotation_deg.",
-                at("duration_s")
-            ));
+            self.notices.push(format!("`{}` has no effect without displacement_mm or rotation_deg.", at("duration_s")));
         }
         let names = ["x", "y", "z"];
         for axis in 0..3 {
             if displacement.is_some_and(|d| d[axis] != 0.0) && !condition.fixed[axis] {
                 self.problems.report(
                     &at("displacement_mm"),
-                    format!(
-                        "face {} moves along {} but is not fixed along it",
-                        face.key(),
-                        names[axis]
-                    ),
+                    format!("face {} moves along {} but is not fixed along it", face.key(), names[axis]),
                     "a free component cannot be prescribed",
-                    format!(
-                        "add \"{}\" to `fixed`, or write 0 for this component",
-                        names[axis]
-                    ),
+                    format!("add \"{}\" to `fixed`, or write 0 for this component", names[axis]),
                 );
             }
             if rotation.is_some_and(|r| r != 0.0) && axis != face.axis() && !condition.fixed[axis] {
                 self.problems.report(
                     &at("rotation_deg"),
-                    format!(
-                        "face {} turns but is not fixed along {}",
-                        face.key(),
-                        names[axis]
-                    ),
+                    format!("face {} turns but is not fixed along {}", face.key(), names[axis]),
                     "both tangential components must be fixed",
                     format!("add \"{}\" to `fixed`", names[axis]),
                 );
@@ -350,36 +264,20 @@ impl Check<'_> {
             if table.traction_kpa.is_some_and(|t| t[axis] != 0.0) && condition.fixed[axis] {
                 self.problems.report(
                     &at("traction_kpa"),
-                    format!(
-                        "face {} is loaded along {} and fixed along it",
-                        face.key(),
-                        names[axis]
-                    ),
+                    format!("face {} is loaded along {} and fixed along it", face.key(), names[axis]),
                     "a fixed component carries no load",
-                    format!(
-                        "remove \"{}\" from `fixed`, or write 0 for this component",
-                        names[axis]
-                    ),
+                    format!("remove \"{}\" from `fixed`, or write 0 for this component", names[axis]),
                 );
             }
         }
-        condition.traction = table
-            .traction_kpa
-            .map(|value| self.vector(&at("traction_kpa"), value, 1e4) * KPA);
-        condition.traction_ramp = self.optional(
-            &at("traction_ramp_s"),
-            table.traction_ramp_s,
-            1.0,
-            0.0,
-            Within::NotNegative(3600.0),
-        );
+        condition.traction = table.traction_kpa.map(|value| self.vector(&at("traction_kpa"), value, 1e4) * KPA);
+        condition.traction_ramp =
+            self.optional(&at("traction_ramp_s"), table.traction_ramp_s, 1.0, 0.0, Within::NotNegative(3600.0));
         condition
     }
 
     fn solver(&mut self, table: &SolverTable, has_tool: bool) -> SolverSettings {
-        let duration = table
-            .duration_s
-            .map(|value| self.number("solver.duration_s", value, Within::Positive(3600.0)));
+        let duration = table.duration_s.map(|value| self.number("solver.duration_s", value, Within::Positive(3600.0)));
         if has_tool && duration.is_some() {
             self.notices
                 .push("`solver.duration_s` has no effect: with a tool the phases decide how long the run is.".into());
@@ -393,16 +291,10 @@ impl Check<'_> {
             );
         }
         SolverSettings {
-            safety: self.optional(
-                "solver.safety",
-                table.safety,
-                1.0,
-                0.8,
-                Within::Positive(1.0),
-            ),
-            time_step: table.time_step_us.map(|value| {
-                self.number("solver.time_step_us", value, Within::Positive(1e5)) * 1e-6
-            }),
+            safety: self.optional("solver.safety", table.safety, 1.0, 0.8, Within::Positive(1.0)),
+            time_step: table
+                .time_step_us
+                .map(|value| self.number("solver.time_step_us", value, Within::Positive(1e5)) * 1e-6),
             mass_damping: self.optional(
                 "solver.mass_damping_per_s",
                 table.mass_damping_per_s,
@@ -435,13 +327,7 @@ impl Check<'_> {
         }
     }
 
-    fn outputs(
-        &mut self,
-        table: &OutputsTable,
-        motion: &Motion,
-        has_tool: bool,
-        duration: Option<f64>,
-    ) -> Outputs {
+    fn outputs(&mut self, table: &OutputsTable, motion: &Motion, has_tool: bool, duration: Option<f64>) -> Outputs {
         let lists = [
             ("pictures_at_depth_mm", &table.pictures_at_depth_mm, true),
             ("fields_at_depth_mm", &table.fields_at_depth_mm, true),
@@ -453,11 +339,7 @@ impl Check<'_> {
             let Some(list) = list else { continue };
             let path = format!("outputs.{key}");
             if by_depth != has_tool {
-                let (has, other) = if has_tool {
-                    ("a tool", "depth_mm")
-                } else {
-                    ("no tool", "s")
-                };
+                let (has, other) = if has_tool { ("a tool", "depth_mm") } else { ("no tool", "s") };
                 let stem = key.trim_end_matches("_depth_mm").trim_end_matches("_s");
                 self.problems.report(
                     &path,
@@ -467,22 +349,12 @@ impl Check<'_> {
                 );
                 continue;
             }
-            let (unit, reach) = if by_depth {
-                (MM, motion.deepest())
-            } else {
-                (1.0, duration.unwrap_or(f64::INFINITY))
-            };
+            let (unit, reach) =
+                if by_depth { (MM, motion.deepest()) } else { (1.0, duration.unwrap_or(f64::INFINITY)) };
             for (index, value) in list.iter().enumerate() {
-                let value = self.number(
-                    &format!("{path}.{index}"),
-                    *value,
-                    Within::NotNegative(3600.0),
-                ) * unit;
+                let value = self.number(&format!("{path}.{index}"), *value, Within::NotNegative(3600.0)) * unit;
                 if value > reach * (1.0 + 1e-9) {
-                    self.notices.push(format!(
-                        "`{path}` holds {}, which the run never reaches.",
-                        value / unit
-                    ));
+                    self.notices.push(format!("`{path}` holds {}, which the run never reaches.", value / unit));
                 }
                 values[slot % 2].push(value);
             }
@@ -493,18 +365,14 @@ impl Check<'_> {
         }
         let [pictures_at, fields_at] = values;
         let width = table.picture_width_px.unwrap_or(900);
-        self.number(
-            "outputs.picture_width_px",
-            width as f64,
-            Within::Between(64.0, 8192.0),
-        );
+        self.number("outputs.picture_width_px", width as f64, Within::Between(64.0, 8192.0));
         Outputs {
             pictures_at,
             fields_at,
             picture_width: width,
-            stress_scale: table.stress_scale_kpa.map(|value| {
-                self.number("outputs.stress_scale_kpa", value, Within::Positive(1e6)) * KPA
-            }),
+            stress_scale: table
+                .stress_scale_kpa
+                .map(|value| self.number("outputs.stress_scale_kpa", value, Within::Positive(1e6)) * KPA),
         }
     }
 
@@ -513,20 +381,12 @@ impl Check<'_> {
         let Some(tool) = tool else { return };
         let half = tissue.size * 0.5;
         let show = |p: DVec3| format!("({:.3}, {:.3}, {:.3}) mm", p.x / MM, p.y / MM, p.z / MM);
-        let range = format!(
-            "x {:.3} to {:.3}, y {:.3} to {:.3} mm",
-            -half.x / MM,
-            half.x / MM,
-            -half.y / MM,
-            half.y / MM
-        );
+        let range =
+            format!("x {:.3} to {:.3}, y {:.3} to {:.3} mm", -half.x / MM, half.x / MM, -half.y / MM, half.y / MM);
         if motion.entry.x.abs() > half.x || motion.entry.y.abs() > half.y {
             self.problems.report(
                 "motion.entry_mm",
-                format!(
-                    "the entry point {} lies outside the top face ({range})",
-                    show(motion.entry)
-                ),
+                format!("the entry point {} lies outside the top face ({range})", show(motion.entry)),
                 "outside the block",
                 format!("choose entry_mm inside {range}"),
             );
@@ -619,29 +479,17 @@ fn mesh_excess(mesh: &BlockMesh) -> (f64, String) {
     let bytes = cells * BYTES_PER_CELL + nodes * BYTES_PER_NODE;
     let binding = cells * BINDING_BYTES_PER_CELL;
     let mut limits = vec![
-        (
-            nodes / 2f64.powi(31),
-            format!("it has {nodes:.3e} nodes and the index holds 2^31"),
-        ),
+        (nodes / 2f64.powi(31), format!("it has {nodes:.3e} nodes and the index holds 2^31")),
         (
             binding / LARGEST_BINDING,
-            format!(
-                "one of its buffers takes {} GiB and portable devices offer 0.125 GiB",
-                gib(binding)
-            ),
+            format!("one of its buffers takes {} GiB and portable devices offer 0.125 GiB", gib(binding)),
         ),
     ];
     if let Some(available) = available_memory() {
         let half = 0.5 * available;
-        limits.push((
-            bytes / half,
-            format!("half of the available memory is {} GiB", gib(half)),
-        ));
+        limits.push((bytes / half, format!("half of the available memory is {} GiB", gib(half))));
     }
-    limits
-        .into_iter()
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .expect("two limits at least")
+    limits.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).expect("two limits at least")
 }
 
 /// Product of three counts in floating point: for three long axes it may not fit an index.
@@ -668,9 +516,7 @@ fn face_of_kind(face: Face, kind: FaceKind) -> FaceCondition {
 /// Memory that the system can give now [B]; `None` where /proc/meminfo does not exist.
 fn available_memory() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text
-        .lines()
-        .find(|line| line.starts_with("MemAvailable:"))?;
+    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
     let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kib * 1024.0)
 }

@@ -20,11 +20,7 @@ impl Check<'_> {
         if present.len() > 1 {
             self.problems.report(
                 present[1],
-                format!(
-                    "the scene has {} tools: {}",
-                    present.len(),
-                    present.join(", ")
-                ),
+                format!("the scene has {} tools: {}", present.len(), present.join(", ")),
                 "second tool",
                 "keep one of the tables",
             );
@@ -33,19 +29,11 @@ impl Check<'_> {
             return Some(Tool::Needle(self.needle(table)));
         }
         if let Some(table) = &file.sphere {
-            let radius = self.number(
-                "sphere.radius_mm",
-                table.radius_mm,
-                Within::Between(0.01, 1000.0),
-            ) * MM;
+            let radius = self.number("sphere.radius_mm", table.radius_mm, Within::Between(0.01, 1000.0)) * MM;
             return Some(Tool::Sphere { radius });
         }
         file.flat_punch.as_ref().map(|table| Tool::FlatPunch {
-            radius: self.number(
-                "flat_punch.radius_mm",
-                table.radius_mm,
-                Within::Between(0.01, 1000.0),
-            ) * MM,
+            radius: self.number("flat_punch.radius_mm", table.radius_mm, Within::Between(0.01, 1000.0)) * MM,
             bonded: table.bonded,
         })
     }
@@ -56,56 +44,31 @@ impl Check<'_> {
             (Some(gauge), None) => match presets::needle(gauge) {
                 Some(preset) => (name, diameter) = (preset.gauge.clone(), preset.outer_diameter),
                 None => {
-                    let names: Vec<&str> = presets::needles()
-                        .iter()
-                        .map(|p| p.gauge.as_str())
-                        .collect();
+                    let names: Vec<&str> = presets::needles().iter().map(|p| p.gauge.as_str()).collect();
                     self.unknown_name("needle.gauge", "needle gauge", gauge, &names);
                 }
             },
             (None, Some(outer)) => {
-                diameter = self.number(
-                    "needle.outer_diameter_mm",
-                    outer,
-                    Within::Between(0.05, 20.0),
-                ) * MM;
+                diameter = self.number("needle.outer_diameter_mm", outer, Within::Between(0.05, 20.0)) * MM;
                 name = format!("{outer} mm");
             }
             (gauge, _) => self.problems.report(
                 "needle",
-                if gauge.is_some() {
-                    "the needle has two diameters"
-                } else {
-                    "the needle has no diameter"
-                },
+                if gauge.is_some() { "the needle has two diameters" } else { "the needle has no diameter" },
                 "exactly one of gauge and outer_diameter_mm",
                 "write gauge = \"16G\" or outer_diameter_mm = 1.65",
             ),
         }
         let radius = 0.5 * diameter;
         let tip_length = match (table.tip_length_mm, table.tip_half_angle_deg) {
-            (Some(length), None) => {
-                self.number("needle.tip_length_mm", length, Within::Between(0.05, 50.0)) * MM
-            }
+            (Some(length), None) => self.number("needle.tip_length_mm", length, Within::Between(0.05, 50.0)) * MM,
             (None, Some(angle)) => {
-                radius
-                    / self
-                        .number(
-                            "needle.tip_half_angle_deg",
-                            angle,
-                            Within::Between(3.0, 80.0),
-                        )
-                        .to_radians()
-                        .tan()
+                radius / self.number("needle.tip_half_angle_deg", angle, Within::Between(3.0, 80.0)).to_radians().tan()
             }
             (length, _) => {
                 self.problems.report(
                     "needle",
-                    if length.is_some() {
-                        "the tip has two shapes"
-                    } else {
-                        "the tip has no shape"
-                    },
+                    if length.is_some() { "the tip has two shapes" } else { "the tip has no shape" },
                     "exactly one of tip_length_mm and tip_half_angle_deg",
                     "write tip_half_angle_deg = 18 or tip_length_mm = 2.5",
                 );
@@ -116,10 +79,7 @@ impl Check<'_> {
             None => "steel-304".to_string(),
             Some(NeedleMaterialEntry::Preset(name)) => {
                 if presets::needle_material(name).is_none() {
-                    let names: Vec<&str> = presets::needle_materials()
-                        .iter()
-                        .map(|m| m.name.as_str())
-                        .collect();
+                    let names: Vec<&str> = presets::needle_materials().iter().map(|m| m.name.as_str()).collect();
                     self.unknown_name("needle.material", "needle material", name, &names);
                 }
                 name.clone()
@@ -129,37 +89,16 @@ impl Check<'_> {
                 "constants".to_string()
             }
         };
-        NeedleShape {
-            name,
-            radius,
-            tip_length,
-            material,
-        }
+        NeedleShape { name, radius, tip_length, material }
     }
 
     fn needle_material(&mut self, table: &NeedleMaterialTable) {
-        self.number(
-            "needle.material.youngs_modulus_gpa",
-            table.youngs_modulus_gpa,
-            Within::Between(0.1, 2000.0),
-        );
-        self.number(
-            "needle.material.poisson_ratio",
-            table.poisson_ratio,
-            Within::Between(0.0, 0.4999),
-        );
+        self.number("needle.material.youngs_modulus_gpa", table.youngs_modulus_gpa, Within::Between(0.1, 2000.0));
+        self.number("needle.material.poisson_ratio", table.poisson_ratio, Within::Between(0.0, 0.4999));
         // Density [kg/m^3] and how the file writes it.
         let (path, written, density) = match (table.density_g_cm3, table.density_g_mm3) {
-            (Some(value), None) => (
-                "needle.material.density_g_cm3",
-                format!("{value} g/cm^3"),
-                value * 1e3,
-            ),
-            (None, Some(value)) => (
-                "needle.material.density_g_mm3",
-                format!("{value:e} g/mm^3"),
-                value * 1e6,
-            ),
+            (Some(value), None) => ("needle.material.density_g_cm3", format!("{value} g/cm^3"), value * 1e3),
+            (None, Some(value)) => ("needle.material.density_g_mm3", format!("{value:e} g/mm^3"), value * 1e6),
             _ => {
                 self.problems.report(
                     "needle.material",
@@ -180,23 +119,15 @@ impl Check<'_> {
                 "did you mean {:.3e} t/mm^3 = {:.1} g/cm^3{}? Then write density_g_cm3 = {:.1}",
                 density * 1e-6,
                 as_tonnes * 1e-3,
-                if as_tonnes > 12_000.0 {
-                    " (tungsten carbide)"
-                } else {
-                    ""
-                },
+                if as_tonnes > 12_000.0 { " (tungsten carbide)" } else { "" },
                 as_tonnes * 1e-3
             )
         } else {
-            "write the density of the metal, e.g. density_g_cm3 = 7.9, or material = \"steel-304\""
-                .into()
+            "write the density of the metal, e.g. density_g_cm3 = 7.9, or material = \"steel-304\"".into()
         };
         self.problems.report(
             path,
-            format!(
-                "REFUSED needle: density {written} is {} kg/m^3 (air: 1.2, steel: 7900)",
-                four_digits(density)
-            ),
+            format!("REFUSED needle: density {written} is {} kg/m^3 (air: 1.2, steel: 7900)", four_digits(density)),
             "no needle material",
             guess,
         );
@@ -225,19 +156,11 @@ impl Check<'_> {
         }
         let entry = table.entry_mm.unwrap_or([0.0, 0.0]);
         for (index, value) in entry.iter().enumerate() {
-            self.number(
-                &format!("motion.entry_mm.{index}"),
-                *value,
-                Within::Between(-1000.0, 1000.0),
-            );
+            self.number(&format!("motion.entry_mm.{index}"), *value, Within::Between(-1000.0, 1000.0));
         }
         let direction = self.direction(table);
         let phases = self.phases(&table.phase);
-        Motion {
-            entry: DVec3::new(entry[0], entry[1], 0.0) * MM,
-            direction,
-            phases,
-        }
+        Motion { entry: DVec3::new(entry[0], entry[1], 0.0) * MM, direction, phases }
     }
 
     fn direction(&mut self, table: &MotionTable) -> DVec3 {
@@ -268,26 +191,14 @@ impl Check<'_> {
             }
             (None, angle) => {
                 if angle.is_none() && table.azimuth_deg.is_some() {
-                    self.notices.push(
-                        "`motion.azimuth_deg` has no effect without motion.angle_deg.".into(),
-                    );
+                    self.notices.push("`motion.azimuth_deg` has no effect without motion.angle_deg.".into());
                 }
-                let angle = angle.map_or(0.0, |value| {
-                    self.number("motion.angle_deg", value, Within::Between(0.0, 80.0))
-                });
-                let azimuth = self.optional(
-                    "motion.azimuth_deg",
-                    table.azimuth_deg,
-                    1.0,
-                    0.0,
-                    Within::Between(-360.0, 360.0),
-                );
+                let angle =
+                    angle.map_or(0.0, |value| self.number("motion.angle_deg", value, Within::Between(0.0, 80.0)));
+                let azimuth =
+                    self.optional("motion.azimuth_deg", table.azimuth_deg, 1.0, 0.0, Within::Between(-360.0, 360.0));
                 let (angle, azimuth) = (angle.to_radians(), azimuth.to_radians());
-                DVec3::new(
-                    angle.sin() * azimuth.cos(),
-                    angle.sin() * azimuth.sin(),
-                    -angle.cos(),
-                )
+                DVec3::new(angle.sin() * azimuth.cos(), angle.sin() * azimuth.sin(), -angle.cos())
             }
         }
     }
@@ -307,11 +218,7 @@ impl Check<'_> {
             let at = |key: &str| format!("motion.phase.{index}.{key}");
             if table.kind == PhaseKind::Hold {
                 if table.speed_mm_s.is_some() || table.depth_mm.is_some() {
-                    let key = if table.speed_mm_s.is_some() {
-                        "speed_mm_s"
-                    } else {
-                        "depth_mm"
-                    };
+                    let key = if table.speed_mm_s.is_some() { "speed_mm_s" } else { "depth_mm" };
                     self.problems.report(
                         &at(key),
                         "a hold has no speed and no depth",
@@ -323,9 +230,8 @@ impl Check<'_> {
                     self.missing_in_phase(index, "duration_s", "duration_s = 0.5");
                     continue;
                 };
-                phases.push(Phase::Hold {
-                    duration: self.number(&at("duration_s"), duration, Within::Positive(600.0)),
-                });
+                phases
+                    .push(Phase::Hold { duration: self.number(&at("duration_s"), duration, Within::Positive(600.0)) });
                 continue;
             }
             if table.duration_s.is_some() {
@@ -357,16 +263,10 @@ impl Check<'_> {
                     );
                 }
                 reached = depth;
-                phases.push(Phase::Insert {
-                    speed,
-                    depth: depth * MM,
-                });
+                phases.push(Phase::Insert { speed, depth: depth * MM });
             } else {
                 let depth = self.number(&at("depth_mm"), depth, Within::Between(-100.0, 1000.0));
-                if !phases
-                    .iter()
-                    .any(|phase| matches!(phase, Phase::Insert { .. }))
-                {
+                if !phases.iter().any(|phase| matches!(phase, Phase::Insert { .. })) {
                     self.problems.report(
                         &at("kind"),
                         "the motion withdraws before it inserts",
@@ -382,10 +282,7 @@ impl Check<'_> {
                     );
                 }
                 reached = depth;
-                phases.push(Phase::Withdraw {
-                    speed,
-                    depth: depth * MM,
-                });
+                phases.push(Phase::Withdraw { speed, depth: depth * MM });
             }
         }
         phases
