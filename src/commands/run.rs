@@ -89,16 +89,26 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
             }
         };
         first_step_ms.get_or_insert_with(|| program_start.elapsed().as_secs_f64() * 1e3);
-        tables.append(&record)?;
+        if let Err(error) = tables.append(&record) {
+            status = Status::Failed(error.to_string());
+            failure = Some(error);
+            break;
+        }
         let wall = begin.elapsed().as_secs_f64() - drawing;
         progress.update(&record, record.time / wall.max(1e-9));
         for moment in moments.iter().filter(|m| m.frame == record.frame) {
             let (wall, cpu) = (Instant::now(), process::cpu_seconds());
-            write_moment(&mut simulation, &record, moment, &output, &mut fields, device.as_ref())?;
+            if let Err(error) = write_moment(&mut simulation, &record, moment, &output, &mut fields, device.as_ref()) {
+                status = Status::Failed(error.to_string());
+                failure.get_or_insert(error);
+            }
             drawing += wall.elapsed().as_secs_f64();
             drawing_cpu += difference(process::cpu_seconds(), cpu).unwrap_or(0.0);
         }
         records.push(record);
+        if failure.is_some() {
+            break;
+        }
     }
     let wall = begin.elapsed().as_secs_f64() - drawing;
     let cpu = difference(process::cpu_seconds(), cpu_begin).map(|c| c - drawing_cpu);
@@ -138,6 +148,13 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, &records, &figures)?;
     }
     summary.write(&output.file(folder::SUMMARY))?;
+    if summary.raised_mass_share > 0.2 {
+        eprintln!(
+            "note: {:.0} % of all node steps had their mass raised to keep the step stable: inertia is not what \
+             mass_scaling says; lower solver.time_step_us or raise solver.mass_scaling",
+            100.0 * summary.raised_mass_share
+        );
+    }
     match failure {
         Some(error) => {
             eprintln!("results up to the failure are in {}", output.path().display());

@@ -111,6 +111,8 @@ pub struct Summary {
     pub clamped_nodes: u64,
     /// Most inverted cells in one frame.
     pub inverted_cells: u64,
+    /// Share of all node steps in which selective mass scaling raised the mass of a node.
+    pub raised_mass_share: f64,
 }
 
 /// JSON has no NaN; it is written as `null`.
@@ -150,6 +152,9 @@ impl Summary {
         self.hourglass_to_internal_max =
             largest(records.iter().filter(|r| internal(r) >= telling).map(|r| hourglass_to_internal(&r.energy)));
         self.clamped_nodes = records.iter().map(|r| u64::from(r.health.clamped_nodes)).sum();
+        let raised: u64 = records.iter().map(|r| u64::from(r.health.raised_mass)).sum();
+        let node_steps = self.nodes * records.last().map_or(0, |r| r.step);
+        self.raised_mass_share = if node_steps > 0 { raised as f64 / node_steps as f64 } else { 0.0 };
         self.inverted_cells = records.iter().map(|r| u64::from(r.health.inverted_cells)).max().unwrap_or(0);
     }
 

@@ -60,8 +60,11 @@ pub fn hourglass_to_internal(energy: &EnergyAccount) -> f64 {
     ratio(energy.hourglass, energy.elastic + energy.hourglass)
 }
 
+/// Energy below which a ratio would compare rounding with rounding [J].
+const NOTHING: f64 = 1e-18;
+
 fn ratio(part: f64, whole: f64) -> f64 {
-    if whole == 0.0 { 0.0 } else { part / whole }
+    if whole <= NOTHING { 0.0 } else { part / whole }
 }
 
 /// The two open tables of a run.
