@@ -4,4 +4,9 @@
 mod common;
 
 mod element;
+mod friction;
+mod gravity;
+mod indentation;
+mod mass_scaling;
 mod mooney_rivlin;
+mod puncture;

@@ -176,25 +176,25 @@ fn homogeneous_states_through_the_element_stage() {
                 assert!(largest_entry(p) < allowed * row.law.shear_modulus(), "{name} {}: {p}", row.label);
                 continue;
             }
-            // A free face is stress-free because kappa (J - 1) cof F cancels the rest; J - 1 is a sum of terms of order
-            // one in f32, known to one unit of its last place, 1.2e-7.
-            let noise = if *name == "gpu" { 1.2e-7 * row.law.bulk_modulus * largest_entry(cofactor(row.f)) } else { 0.0 };
+            // kappa (J - 1) cof F is known no better than J - 1: one unit of the last place of f32 of its terms, which
+            // are of order |H|, and the fixed point of u, 7 pm over 1 mm. Free faces feel this as they are
+            // stress-free by cancellation, small shears because their normal stress is of second order.
+            let h = largest_entry(row.f - DMat3::IDENTITY);
+            let jacobian = 1.2e-7 * h * h.powi(2).max(1.0) + 1e-8;
+            let noise = row.law.bulk_modulus * largest_entry(cofactor(row.f)) * jacobian;
+            let (part, zero, noise) = if *name == "gpu" { (1e-3, 1e-5, noise) } else { (1e-6, 1e-5, 0.0) };
             for (found, expected) in p.to_cols_array().iter().zip(row.p.to_cols_array()) {
                 let difference = (found - expected).abs();
-                if expected.abs() > 1e-6 * scale {
-                    let error = difference / expected.abs();
-                    worst[kind] = worst[kind].max(error);
-                    let allowed = if *name == "gpu" { 1e-3 } else { 1e-6 };
-                    assert!(error <= allowed, "{name} {}: {found} instead of {expected}", row.label);
-                } else {
-                    worst_zero[kind] = worst_zero[kind].max(difference / scale);
-                    assert!(difference <= 1e-5 * scale + noise, "{name} {}: {found} not 0 of {scale}", row.label);
-                }
+                let is_zero = expected.abs() <= 1e-6 * scale;
+                let allowed = if is_zero { zero * scale } else { part * expected.abs() } + noise;
+                let measure = if is_zero { &mut worst_zero } else { &mut worst };
+                measure[kind] = measure[kind].max(difference / if is_zero { scale } else { expected.abs().max(1e-3 * scale) });
+                assert!(difference <= allowed, "{name} {}: {found} instead of {expected} of {scale}", row.label);
             }
         }
     }
     for (kind, name) in ["cpu", "gpu"].iter().enumerate() {
-        println!("homogeneous states, {name}: entries off by {:.1e}, zeros by {:.1e}", worst[kind], worst_zero[kind]);
+        println!("homogeneous states, {name}: entries above 1e-3 of the largest off by {:.1e}, zeros by {:.1e}", worst[kind], worst_zero[kind]);
     }
 }
 
