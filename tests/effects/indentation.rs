@@ -59,14 +59,15 @@ fn force_at_rest(model: &Arc<Model>) -> Vec<(&'static str, f64)> {
 #[test]
 fn a_sphere_presses_as_hertz_says() {
     let (radius, depth) = (8e-3, 0.5e-3);
-    let model = press([24.0, 24.0, 16.0], 1.0, Tool::Sphere { radius }, depth);
+    let height = 20e-3;
+    let model = press([32.0, 32.0, height * 1e3], 0.8, Tool::Sphere { radius }, depth);
     let nu = MATERIAL_A.poisson_ratio();
     let modulus = MATERIAL_A.youngs_modulus() / (1.0 - nu * nu);
     let hertz = 4.0 / 3.0 * modulus * radius.sqrt() * depth.powf(1.5);
     // A bonded layer of finite thickness is stiffer than a half-space: Dimitriadis 2002 gives for nu = 1/2, with
     // chi = sqrt(R d)/h, the factor 1 + 1.133 chi + 1.283 chi^2 + 0.769 chi^3 + 0.0975 chi^4. The block is also finite
     // sideways, which softens it.
-    let chi = (radius * depth).sqrt() / 16e-3;
+    let chi = (radius * depth).sqrt() / height;
     let layer = 1.0 + chi * (1.133 + chi * (1.283 + chi * (0.769 + chi * 0.0975)));
     let found = force_at_rest(&model);
     for (name, force) in &found {
