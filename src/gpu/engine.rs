@@ -650,9 +650,16 @@ fn contact_nodes(model: &Model, strips: &Strips) -> Vec<ContactNode> {
     nodes
 }
 
-/// A step's input in the layout of the shader.
-fn step_input(input: &crate::solver::engine::StepInput, dt: f64) -> StepInput {
-    let mut out = StepInput { load_factor: input.load_factor as f32, ..StepInput::zeroed() };
+/// The input of step `number` in the layout of the shader.
+fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) -> StepInput {
+    // Multiples of the golden ratio: any run of steps sees all offsets alike, so rounding errors cancel.
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let mut out = StepInput {
+        load_factor: input.load_factor as f32,
+        // Below 1 in f32 too, so that a face at rest stays at rest.
+        rounding: ((number as f64 * GOLDEN).fract() as f32).min(0.999_999),
+        ..StepInput::zeroed()
+    };
     if let Some(pose) = input.pose {
         out.tip = vec4(pose.tip);
         out.velocity = vec4(pose.velocity);
@@ -689,7 +696,8 @@ impl Engine for GpuEngine {
             self.collect_oldest(true)?;
         }
         if let Some(buffer) = self.buffers.get(STEP_INPUT) {
-            let inputs: Vec<StepInput> = plan.steps.iter().map(|s| step_input(s, self.dt)).collect();
+            let numbered = (plan.first_step..).zip(&plan.steps);
+            let inputs: Vec<StepInput> = numbered.map(|(n, s)| step_input(s, n, self.dt)).collect();
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&inputs));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
