@@ -23,6 +23,9 @@ pub const DISPLACEMENT_UNIT: f64 = 1.0 / (1u64 << 36) as f64;
 /// Frames whose results may be under way.
 const RING: usize = 3;
 
+/// How long the mapping of a finished submission may take.
+const MAPPING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
+
 /// Partial sums of `measure_contact`.
 const CONTACT_PARTS: usize = 64;
 
@@ -234,6 +237,9 @@ impl GpuEngine {
         };
         self.gpu.device.poll(poll).map_err(|e| Error::Device(e.to_string()))?;
         self.gpu.check()?;
+        if wait {
+            await_mapping(&self.gpu, &front.mapped)?;
+        }
         match front.mapped.load(Ordering::Acquire) {
             1 => {}
             2 => return Err(Error::Device("results of a frame could not be mapped".into())),
@@ -338,9 +344,10 @@ impl GpuEngine {
             offset += buffer.size();
         }
         self.gpu.queue.submit([encoder.finish()]);
-        staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        let mapped = map_for_reading(&staging);
         self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| Error::Device(e.to_string()))?;
         self.gpu.check()?;
+        await_mapping(&self.gpu, &mapped)?;
         let view = staging.get_mapped_range(..).map_err(|e| Error::Device(e.to_string()))?;
         let mut start = 0;
         Ok(wanted
@@ -360,6 +367,27 @@ impl GpuEngine {
             kernel.encode(pass, offset);
         }
     }
+}
+
+/// Asks for a mapping; the flag becomes 1 when it is there, 2 when it failed.
+fn map_for_reading(buffer: &wgpu::Buffer) -> Arc<AtomicU8> {
+    let mapped = Arc::new(AtomicU8::new(0));
+    let flag = mapped.clone();
+    buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+        flag.store(if result.is_ok() { 1 } else { 2 }, Ordering::Release);
+    });
+    mapped
+}
+
+/// Waits for the flag of a mapping whose submission has finished. Another thread that uses the same device may have
+/// taken over the callback in its own poll and be about to call it, so the flag can come a moment after the poll.
+fn await_mapping(gpu: &Gpu, mapped: &AtomicU8) -> Result<()> {
+    let begin = std::time::Instant::now();
+    while mapped.load(Ordering::Acquire) == 0 && begin.elapsed() < MAPPING_PATIENCE {
+        std::thread::yield_now();
+        gpu.device.poll(wgpu::PollType::Poll).map_err(|e| Error::Device(e.to_string()))?;
+    }
+    Ok(())
 }
 
 /// Values of a byte slice that need not be aligned.
@@ -716,11 +744,7 @@ impl Engine for GpuEngine {
             encoder.copy_buffer_to_buffer(&self.buffers[range.name], 0, &self.staging[slot], range.offset, range.size);
         }
         let submission = self.gpu.queue.submit([encoder.finish()]);
-        let mapped = Arc::new(AtomicU8::new(0));
-        let flag = mapped.clone();
-        self.staging[slot].map_async(wgpu::MapMode::Read, .., move |result| {
-            flag.store(if result.is_ok() { 1 } else { 2 }, Ordering::Release);
-        });
+        let mapped = map_for_reading(&self.staging[slot]);
         self.in_flight.push_back(InFlight {
             slot,
             frame: plan.frame,

@@ -299,14 +299,7 @@ const TRACES: [(&str, &[&str]); 5] = [
     ("gravity", &["gravity", "free fall"]),
     (
         "puncture",
-        &[
-            "puncture",
-            "cutting",
-            "tip_",
-            "needle",
-            "soften",
-            "remaining",
-        ],
+        &["puncture", "tip_", "needle", "soften", "remaining"],
     ),
     ("indentation", &["indent", "punch"]),
     ("friction", &["friction", "stick_", "coulomb"]),
