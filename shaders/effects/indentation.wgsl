@@ -13,7 +13,7 @@ struct IndentationParams {
     _pad2: u32,
 }
 
-// Before `friction`: a software adapter (lavapipe of Mesa 22.3) crashes where a branch depends on a stage's fourth
+// Ahead of other effects' parameters: a software adapter (lavapipe of Mesa 22.3) crashes where a branch depends on a stage's fourth
 // uniform buffer, and branches ask for `bonded` and `flat`.
 @group(0) @binding(4) var<uniform> indentation: IndentationParams;
 

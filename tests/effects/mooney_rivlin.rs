@@ -243,14 +243,10 @@ fn homogeneous_states_through_the_element_stage() {
                     part * expected.abs()
                 } + noise;
                 let measure = if is_zero { &mut worst_zero } else { &mut worst };
-                measure[kind] = measure[kind].max(
-                    difference
-                        / if is_zero {
-                            scale
-                        } else {
-                            expected.abs().max(1e-3 * scale)
-                        },
-                );
+                // Told are the entries that count: large ones, of states beyond small strain.
+                if h > 0.01 && (is_zero || expected.abs() > 0.1 * scale) {
+                    measure[kind] = measure[kind].max(difference / scale);
+                }
                 assert!(
                     difference <= allowed,
                     "{name} {}: {found} instead of {expected} of {scale}",
@@ -261,7 +257,7 @@ fn homogeneous_states_through_the_element_stage() {
     }
     for (kind, name) in ["cpu", "gpu"].iter().enumerate() {
         println!(
-            "homogeneous states, {name}: entries above 1e-3 of the largest off by {:.1e}, zeros by {:.1e}",
+            "homogeneous states, {name}: strains above 1 %: large entries off by {:.1e}, zeros by {:.1e}",
             worst[kind], worst_zero[kind]
         );
     }
