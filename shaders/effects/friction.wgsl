@@ -7,7 +7,7 @@ struct FrictionParams {
     _pad: f32,
 }
 
-@group(0) @binding(4) var<uniform> friction: FrictionParams;
+@group(0) @binding(5) var<uniform> friction: FrictionParams;
 
 // Stretch of the stick spring after a tangential motion `slip`; `n` the contact normal, `allowed` the longest stretch.
 fn stick_trial(stretch: vec3<f32>, slip: vec3<f32>, n: vec3<f32>) -> vec3<f32> {

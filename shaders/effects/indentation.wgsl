@@ -13,7 +13,9 @@ struct IndentationParams {
     _pad2: u32,
 }
 
-@group(0) @binding(5) var<uniform> indentation: IndentationParams;
+// Ahead of other effects' parameters: a software adapter (lavapipe of Mesa 22.3) crashes where a branch depends on a stage's fourth
+// uniform buffer, and branches ask for `bonded` and `flat`.
+@group(0) @binding(4) var<uniform> indentation: IndentationParams;
 
 // Penetration depth [m] (xyz: outward normal of the tool, w: depth) of a point at `lever` from the tip; `rest_radius`
 // decides what lies under a flat punch.

@@ -18,7 +18,8 @@ struct StepInput {
     speed: f32,
     // Factor of the ramped loads, 0..1.
     load_factor: f32,
-    _pad: f32,
+    // Offset of this step for rounding prescribed motion to the fixed point, 0..1, equidistributed over the steps.
+    rounding: f32,
     drives: array<DriveStep, 6>,
 }
 

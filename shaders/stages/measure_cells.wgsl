@@ -33,13 +33,13 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         for (var corner = 0u; corner < 8u; corner++) {
             u[corner] = vec3<f32>(node_displacement[corner_node(cell, corner)].xyz - origin) * DISPLACEMENT_UNIT;
         }
-        let energy = cell_energy(cell, &u);
-        var remaining = 1.0;
+        var energy = cell_energy(cell, &u);
 #ifdef PUNCTURE
-        remaining = cell_stiffness[index];
+        energy.elastic *= cell_stiffness[index];
+        energy.hourglass *= cell_stiffness[index];
 #endif
-        sums.elastic += energy.elastic * remaining;
-        sums.hourglass += energy.hourglass * remaining;
+        sums.elastic += energy.elastic;
+        sums.hourglass += energy.hourglass;
         sums.min_jacobian = min(sums.min_jacobian, energy.jacobian);
         sums.min_corner_jacobian = min(sums.min_corner_jacobian, energy.corner_jacobian);
         if (!(energy.jacobian > 0.0 && energy.corner_jacobian > 0.0)) {

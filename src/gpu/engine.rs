@@ -24,6 +24,9 @@ pub const DISPLACEMENT_UNIT: f64 = 1.0 / (1u64 << 36) as f64;
 /// Frames whose results may be under way.
 const RING: usize = 3;
 
+/// How long the mapping of a finished submission may take.
+const MAPPING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
+
 /// Partial sums of `measure_contact`.
 const CONTACT_PARTS: usize = 64;
 
@@ -253,6 +256,9 @@ impl GpuEngine {
         };
         self.gpu.device.poll(poll).map_err(|e| Error::Device(e.to_string()))?;
         self.gpu.check()?;
+        if wait {
+            await_mapping(&self.gpu, &front.mapped)?;
+        }
         match front.mapped.load(Ordering::Acquire) {
             1 => {}
             2 => return Err(Error::Device("results of a frame could not be mapped".into())),
@@ -357,9 +363,10 @@ impl GpuEngine {
             offset += buffer.size();
         }
         self.gpu.queue.submit([encoder.finish()]);
-        staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        let mapped = map_for_reading(&staging);
         self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| Error::Device(e.to_string()))?;
         self.gpu.check()?;
+        await_mapping(&self.gpu, &mapped)?;
         let view = staging.get_mapped_range(..).map_err(|e| Error::Device(e.to_string()))?;
         let mut start = 0;
         Ok(wanted
@@ -379,6 +386,27 @@ impl GpuEngine {
             kernel.encode(pass, offset);
         }
     }
+}
+
+/// Asks for a mapping; the flag becomes 1 when it is there, 2 when it failed.
+fn map_for_reading(buffer: &wgpu::Buffer) -> Arc<AtomicU8> {
+    let mapped = Arc::new(AtomicU8::new(0));
+    let flag = mapped.clone();
+    buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+        flag.store(if result.is_ok() { 1 } else { 2 }, Ordering::Release);
+    });
+    mapped
+}
+
+/// Waits for the flag of a mapping whose submission has finished. Another thread that uses the same device may have
+/// taken over the callback in its own poll and be about to call it, so the flag can come a moment after the poll.
+fn await_mapping(gpu: &Gpu, mapped: &AtomicU8) -> Result<()> {
+    let begin = std::time::Instant::now();
+    while mapped.load(Ordering::Acquire) == 0 && begin.elapsed() < MAPPING_PATIENCE {
+        std::thread::yield_now();
+        gpu.device.poll(wgpu::PollType::Poll).map_err(|e| Error::Device(e.to_string()))?;
+    }
+    Ok(())
 }
 
 /// Values of a byte slice that need not be aligned.
@@ -661,9 +689,16 @@ fn contact_nodes(model: &Model, strips: &Strips) -> Vec<ContactNode> {
     nodes
 }
 
-/// A step's input in the layout of the shader.
-fn step_input(input: &crate::solver::engine::StepInput, dt: f64) -> StepInput {
-    let mut out = StepInput { load_factor: input.load_factor as f32, ..StepInput::zeroed() };
+/// The input of step `number` in the layout of the shader.
+fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) -> StepInput {
+    // Multiples of the golden ratio: any run of steps sees all offsets alike, so rounding errors cancel.
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let mut out = StepInput {
+        load_factor: input.load_factor as f32,
+        // Below 1 in f32 too, so that a face at rest stays at rest.
+        rounding: ((number as f64 * GOLDEN).fract() as f32).min(0.999_999),
+        ..StepInput::zeroed()
+    };
     if let Some(pose) = input.pose {
         out.tip = vec4(pose.tip);
         out.velocity = vec4(pose.velocity);
@@ -700,7 +735,8 @@ impl Engine for GpuEngine {
             self.collect_oldest(true)?;
         }
         if let Some(buffer) = self.buffers.get(STEP_INPUT) {
-            let inputs: Vec<StepInput> = plan.steps.iter().map(|s| step_input(s, self.dt)).collect();
+            let numbered = (plan.first_step..).zip(&plan.steps);
+            let inputs: Vec<StepInput> = numbered.map(|(n, s)| step_input(s, n, self.dt)).collect();
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&inputs));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
@@ -719,11 +755,7 @@ impl Engine for GpuEngine {
             encoder.copy_buffer_to_buffer(&self.buffers[range.name], 0, &self.staging[slot], range.offset, range.size);
         }
         let submission = self.gpu.queue.submit([encoder.finish()]);
-        let mapped = Arc::new(AtomicU8::new(0));
-        let flag = mapped.clone();
-        self.staging[slot].map_async(wgpu::MapMode::Read, .., move |result| {
-            flag.store(if result.is_ok() { 1 } else { 2 }, Ordering::Release);
-        });
+        let mapped = map_for_reading(&self.staging[slot]);
         self.in_flight.push_back(InFlight {
             slot,
             frame: plan.frame,

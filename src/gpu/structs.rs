@@ -71,7 +71,7 @@ shared_structs! {
         depth: f32,
         speed: f32,
         load_factor: f32,
-        _pad: f32,
+        rounding: f32,
         drives: [DriveStep; 6],
     }
     /// shaders/shared/cell_edge.wgsl

@@ -1,0 +1,285 @@
+//! What several test targets share: scenes in code, both engines, reference files, comparisons.
+#![allow(dead_code)] // Every target uses its own part.
+
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use glam::{DMat3, DVec3};
+use serde_json::Value;
+use stylet::effects::EffectSet;
+use stylet::gpu::{Gpu, GpuEngine};
+use stylet::material::MooneyRivlin;
+use stylet::mesh::BlockMesh;
+use stylet::model::Model;
+use stylet::scene::{
+    FaceCondition, Motion, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool,
+};
+use stylet::solver::cpu::CpuEngine;
+use stylet::solver::engine::{Engine, FramePlan, FrameSums, State, StepInput};
+
+/// Material A of the reference files.
+pub const MATERIAL_A: MooneyRivlin = MooneyRivlin {
+    c10: 2300.0,
+    c01: 1000.0,
+    bulk_modulus: 5.0e5,
+};
+/// Material N of the reference files.
+pub const MATERIAL_N: MooneyRivlin = MooneyRivlin {
+    c10: 3300.0,
+    c01: 0.0,
+    bulk_modulus: 5.0e5,
+};
+/// Density of the reference files [kg/m^3].
+pub const DENSITY: f64 = 1060.0;
+/// Default hourglass constants of a scene.
+pub const HOURGLASS: (f64, f64) = (0.1, 15_000.0);
+
+/// The adapter of this machine, opened once; `None` (and a line on stdout) where there is none.
+///
+/// Panics with `REQUIRE_GPU=1` where there is none.
+pub fn gpu() -> Option<Gpu> {
+    static GPU: OnceLock<Option<Gpu>> = OnceLock::new();
+    GPU.get_or_init(|| match Gpu::open() {
+        Ok(gpu) => {
+            let info = &gpu.info;
+            println!(
+                "adapter: {}, driver {} {}",
+                info.name, info.driver, info.driver_info
+            );
+            Some(gpu)
+        }
+        Err(error) if std::env::var("REQUIRE_GPU").is_ok_and(|v| v == "1") => {
+            panic!("REQUIRE_GPU=1, but {error}")
+        }
+        Err(error) => {
+            println!("skipped: no adapter ({error})");
+            None
+        }
+    })
+    .clone()
+}
+
+/// The engines that can run here, f64 first.
+pub fn engines(
+    model: &Arc<Model>,
+    dt: f64,
+    max_steps: usize,
+) -> Vec<(&'static str, Box<dyn Engine>)> {
+    let mut engines: Vec<(&'static str, Box<dyn Engine>)> =
+        vec![("cpu", Box::new(CpuEngine::new(model.clone(), dt)))];
+    engines
+        .extend(gpu_engine(model, dt, max_steps).map(|e| ("gpu", Box::new(e) as Box<dyn Engine>)));
+    engines
+}
+
+pub fn gpu_engine(model: &Arc<Model>, dt: f64, max_steps: usize) -> Option<GpuEngine> {
+    gpu().map(|gpu| GpuEngine::new(model.clone(), gpu, dt, max_steps).unwrap())
+}
+
+/// A block of material A without effects, tool or support; edge lengths and cell edge in mm.
+pub fn block(size_mm: [f64; 3], cell_mm: f64) -> Scene {
+    Scene {
+        name: "test".into(),
+        title: "test".into(),
+        path: Default::default(),
+        tissue: Tissue {
+            size: DVec3::from(size_mm) * 1e-3,
+            cell_size: cell_mm * 1e-3,
+            fine_radius: 2.5e-3,
+            growth: 1.25,
+            axis_offset_cells: [0.23, 0.31],
+        },
+        material: TissueMaterial {
+            name: "A".into(),
+            source: "reference files".into(),
+            law: MATERIAL_A,
+            density: DENSITY,
+        },
+        faces: Default::default(),
+        tool: None,
+        motion: Motion::default(),
+        effects: EffectSet::default(),
+        solver: SolverSettings {
+            safety: 0.8,
+            time_step: None,
+            mass_damping: 0.0,
+            hourglass_stiffness: HOURGLASS.0,
+            hourglass_quartic: HOURGLASS.1,
+            frame_rate: 30.0,
+            duration: Some(1.0),
+        },
+        outputs: Outputs::default(),
+        notices: Vec::new(),
+    }
+}
+
+/// Gives a scene a tool that enters at the middle of the top face.
+pub fn with_tool(scene: &mut Scene, tool: Tool, direction: DVec3, phases: Vec<Phase>) {
+    scene.tool = Some(tool);
+    scene.motion = Motion {
+        entry: DVec3::ZERO,
+        direction: direction.normalize(),
+        phases,
+    };
+}
+
+/// A face whose listed components are held.
+pub fn held(x: bool, y: bool, z: bool) -> FaceCondition {
+    FaceCondition {
+        fixed: [x, y, z],
+        ..Default::default()
+    }
+}
+
+pub fn model(scene: Scene) -> Arc<Model> {
+    let mesh = BlockMesh::for_scene(&scene);
+    Arc::new(Model::new(scene, mesh))
+}
+
+/// A block with cell edges between 0.7 and 1.5 mm that repeat nowhere.
+pub fn graded_mesh(cells: [usize; 3]) -> BlockMesh {
+    let lines = |axis: usize| {
+        let mut x = 0.0;
+        let mut lines: Vec<f64> = (0..=cells[axis])
+            .map(|i| {
+                let at = x;
+                x += 1e-3 * (0.7 + 0.8 * ((i * 7 + axis * 3) % 11) as f64 / 10.0);
+                at
+            })
+            .collect();
+        // The block stands where a scene would put it: centred, top face at z = 0.
+        let shift = if axis == 2 {
+            lines[cells[axis]]
+        } else {
+            0.5 * lines[cells[axis]]
+        };
+        lines.iter_mut().for_each(|l| *l -= shift);
+        lines
+    };
+    BlockMesh {
+        lines: [lines(0), lines(1), lines(2)],
+    }
+}
+
+/// Advances an engine by `steps` steps in one frame; `step` counts the steps since t = 0.
+pub fn advance(
+    engine: &mut dyn Engine,
+    model: &Model,
+    dt: f64,
+    step: &mut u64,
+    steps: usize,
+) -> FrameSums {
+    let plan = FramePlan {
+        frame: *step,
+        first_step: *step,
+        steps: (0..steps as u64)
+            .map(|s| StepInput::at(model, (*step + s) as f64 * dt, dt))
+            .collect(),
+    };
+    *step += steps as u64;
+    engine.start_frame(&plan).unwrap();
+    let sums = engine.collect(true).unwrap().expect("a finished frame");
+    assert!(!sums.not_finite, "state out of range after step {step}");
+    sums
+}
+
+/// A state at rest with the displacement `u(X)`.
+pub fn displaced(engine: &mut dyn Engine, model: &Model, u: impl Fn(DVec3) -> DVec3) -> State {
+    let mut state = engine.read_state().unwrap();
+    for (node, value) in state.displacement.iter_mut().enumerate() {
+        *value = u(model.mesh.rest_position(node));
+    }
+    engine.write_state(&state).unwrap();
+    state
+}
+
+/// A parsed file of tests/references.
+pub fn reference(name: &str) -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/references")
+        .join(name);
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    serde_json::from_str(&text).unwrap()
+}
+
+/// A number of a reference file.
+pub fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+pub fn vector(value: &Value) -> DVec3 {
+    DVec3::from(std::array::from_fn(|a| number(&value[a])))
+}
+
+/// A row-major list of lists.
+pub fn tensor(value: &Value) -> DMat3 {
+    DMat3::from_cols(vector(&value[0]), vector(&value[1]), vector(&value[2])).transpose()
+}
+
+/// `a (x) b`.
+pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// Largest absolute entry.
+pub fn largest_entry(m: DMat3) -> f64 {
+    m.to_cols_array().iter().fold(0.0, |l, x| l.max(x.abs()))
+}
+
+pub fn largest(vectors: &[DVec3]) -> f64 {
+    vectors.iter().map(|v| v.length()).fold(0.0, f64::max)
+}
+
+/// Largest difference over the largest vector of `expected`.
+pub fn relative_difference(found: &[DVec3], expected: &[DVec3]) -> f64 {
+    assert_eq!(found.len(), expected.len());
+    let difference = found
+        .iter()
+        .zip(expected)
+        .map(|(a, b)| (*a - *b).length())
+        .fold(0.0, f64::max);
+    difference / largest(expected)
+}
+
+/// Asserts `|found/expected - 1| <= tolerance`; prints what was measured.
+pub fn close(what: &str, found: f64, expected: f64, tolerance: f64) {
+    let error = (found / expected - 1.0).abs();
+    println!(
+        "{what}: {found:.8e}, expected {expected:.8e}, off by {error:.2e} (allowed {tolerance:.0e})"
+    );
+    assert!(
+        error <= tolerance,
+        "{what}: {found:e} instead of {expected:e}, off by {error:.2e} > {tolerance:e}"
+    );
+}
+
+/// Asserts `value <= bound`; prints what was measured.
+pub fn at_most(what: &str, value: f64, bound: f64) {
+    println!("{what}: {value:.2e} (allowed {bound:.0e})");
+    assert!(value <= bound, "{what}: {value:.3e} > {bound:e}");
+}
+
+/// Repeatable random numbers (splitmix64).
+pub struct Random(pub u64);
+
+impl Random {
+    /// Uniform in -1..1.
+    pub fn signed(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^= z >> 31;
+        (z >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    pub fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.signed(), self.signed(), self.signed())
+    }
+
+    pub fn tensor(&mut self) -> DMat3 {
+        DMat3::from_cols(self.vector(), self.vector(), self.vector())
+    }
+}

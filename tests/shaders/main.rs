@@ -1,0 +1,524 @@
+//! Every combination of effects composes and validates; layouts, bindings and budget. No adapter needed.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::OnceLock;
+
+use glam::DVec3;
+use stylet::effects::{EFFECTS, EffectSet, friction, gravity, indentation, mass_scaling, puncture};
+use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose};
+use stylet::gpu::engine::{defines, stages};
+use stylet::gpu::kernel::{Reflected, reflect};
+use stylet::gpu::structs::layouts;
+use stylet::solver::step::Stage;
+
+/// Features of a scene that are no effects: loaded faces, driven faces.
+const SCENES: [(bool, bool); 4] = [(false, false), (true, false), (false, true), (true, true)];
+
+/// The set with the effects of which `wanted` is true, in the order of [`EFFECTS`].
+fn effect_set(wanted: impl Fn(usize) -> bool) -> EffectSet {
+    let set = EffectSet {
+        mass_scaling: wanted(0).then_some(mass_scaling::Params { factor: 100.0 }),
+        gravity: wanted(1).then_some(gravity::Params {
+            acceleration: DVec3::NEG_Z,
+        }),
+        puncture: wanted(2).then(puncture::Params::default),
+        indentation: wanted(3).then(indentation::Params::default),
+        friction: wanted(4).then(friction::Params::default),
+    };
+    let expected: Vec<&str> = EFFECTS
+        .iter()
+        .enumerate()
+        .filter(|e| wanted(e.0))
+        .map(|e| e.1.key)
+        .collect();
+    assert_eq!(set.keys(), expected, "order of the effect table");
+    set
+}
+
+/// All 32 subsets: none, every single one, all pairs, all together and what lies between.
+fn all_sets() -> Vec<EffectSet> {
+    (0..1usize << EFFECTS.len())
+        .map(|bits| effect_set(|i| bits >> i & 1 == 1))
+        .collect()
+}
+
+/// All stages of a set of effects.
+fn reflected(set: &EffectSet, (loaded, driven): (bool, bool)) -> Vec<Reflected> {
+    let defines = defines(set, loaded, driven);
+    stages(set)
+        .into_iter()
+        .map(|stage| {
+            reflect(stage, &defines)
+                .unwrap_or_else(|e| panic!("{:?} {loaded} {driven}: {e}", set.keys()))
+        })
+        .collect()
+}
+
+/// Every stage of every set in every kind of scene; of those that compose to the same text only the first.
+fn everything() -> &'static [(String, Reflected)] {
+    static ALL: OnceLock<Vec<(String, Reflected)>> = OnceLock::new();
+    ALL.get_or_init(|| {
+        let mut seen = BTreeSet::new();
+        let mut all = Vec::new();
+        for set in all_sets() {
+            for (loaded, driven) in SCENES {
+                let defines = defines(&set, loaded, driven);
+                for stage in stages(&set) {
+                    let what = format!("{} with {defines:?}", stage.name());
+                    let composed = compose(&format!("stages/{}", stage.name()), &defines);
+                    let composed = composed.unwrap_or_else(|e| panic!("{what}: {e}"));
+                    if seen.insert(composed.source) {
+                        all.push((
+                            what.clone(),
+                            reflect(stage, &defines).unwrap_or_else(|e| panic!("{what}: {e}")),
+                        ));
+                    }
+                }
+            }
+        }
+        all
+    })
+}
+
+#[test]
+fn every_combination_composes_validates_and_keeps_the_budget() {
+    let (mut most_buffers, mut most_memory) = (0, 0);
+    for (place, r) in everything() {
+        let storage = r.bindings.iter().filter(|b| !b.uniform).count();
+        assert!(storage <= 8, "{place}: {storage} storage buffers");
+        assert!(
+            r.bindings.iter().all(|b| b.group < 4),
+            "{place}: more than 4 groups"
+        );
+        assert!(
+            r.workgroup_size <= 256,
+            "{place}: workgroup of {}",
+            r.workgroup_size
+        );
+        let memory: u32 = r
+            .module
+            .global_variables
+            .iter()
+            .filter(|(_, v)| v.space == naga::AddressSpace::WorkGroup)
+            .map(|(_, v)| r.module.types[v.ty].inner.size(r.module.to_ctx()))
+            .sum();
+        assert!(
+            memory <= 16 * 1024,
+            "{place}: {memory} bytes of workgroup memory"
+        );
+        for (_, ty) in r.module.types.iter() {
+            let scalar = match ty.inner {
+                naga::TypeInner::Scalar(s) | naga::TypeInner::Atomic(s) => Some(s),
+                naga::TypeInner::Vector { scalar, .. } | naga::TypeInner::Matrix { scalar, .. } => {
+                    Some(scalar)
+                }
+                _ => None,
+            };
+            assert!(
+                scalar.is_none_or(
+                    |s| s.width <= 4 && !(s.kind == naga::ScalarKind::Float && s.width != 4)
+                ),
+                "{place}: a type that is not portable: {ty:?}"
+            );
+        }
+        let source = code(&r.composed.source);
+        for word in ["f16", "f64", "i64", "u64", "subgroup", "enable", "requires"] {
+            assert!(!words(&source).contains(word), "{place}: uses {word}");
+        }
+        most_buffers = most_buffers.max(storage);
+        most_memory = most_memory.max(memory);
+    }
+    let count = everything().len();
+    println!(
+        "{count} different shaders; at most {most_buffers} storage buffers and {most_memory} bytes of workgroup memory"
+    );
+}
+
+/// Source without comments.
+fn code(source: &str) -> String {
+    source
+        .lines()
+        .map(|l| l.split("//").next().unwrap_or(""))
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+/// Identifiers of a source.
+fn words(source: &str) -> BTreeSet<&str> {
+    source
+        .split(|c: char| !c.is_alphanumeric() && c != '_')
+        .filter(|w| !w.is_empty())
+        .collect()
+}
+
+#[test]
+fn a_name_has_one_place_and_a_place_one_name() {
+    let mut place_of: BTreeMap<String, (u32, u32)> = BTreeMap::new();
+    let mut name_at: BTreeMap<(u32, u32), String> = BTreeMap::new();
+    let mut kind_of: BTreeMap<String, bool> = BTreeMap::new();
+    for (what, r) in everything() {
+        // All bound variables of the module, also those that the entry point leaves alone.
+        for (_, variable) in r.module.global_variables.iter() {
+            let Some(binding) = &variable.binding else {
+                continue;
+            };
+            let name = variable.name.clone().unwrap();
+            let place = (binding.group, binding.binding);
+            assert_eq!(
+                *place_of.entry(name.clone()).or_insert(place),
+                place,
+                "{name} moves: {what}"
+            );
+            let uniform = variable.space == naga::AddressSpace::Uniform;
+            assert_eq!(
+                *kind_of.entry(name.clone()).or_insert(uniform),
+                uniform,
+                "{name}: {what}"
+            );
+            let other = name_at.entry(place).or_insert(name.clone());
+            assert_eq!(*other, name, "{place:?} has two names: {what}");
+        }
+    }
+    println!("{} bindings", place_of.len());
+}
+
+/// Name, span and members (name, offset) of a struct in a shader.
+type ShaderStruct = (u32, Vec<(String, u32)>);
+
+/// All structs of all stages with all effects.
+fn shader_structs() -> BTreeMap<String, ShaderStruct> {
+    let mut found: BTreeMap<String, ShaderStruct> = BTreeMap::new();
+    for r in reflected(&effect_set(|_| true), (true, true)) {
+        for (_, ty) in r.module.types.iter() {
+            let (naga::TypeInner::Struct { members, span }, Some(name)) = (&ty.inner, &ty.name)
+            else {
+                continue;
+            };
+            let members = members
+                .iter()
+                .map(|m| (m.name.clone().unwrap_or_default(), m.offset))
+                .collect();
+            let this: ShaderStruct = (*span, members);
+            let known = found.entry(name.clone()).or_insert(this.clone());
+            assert_eq!(*known, this, "struct {name} differs between stages");
+        }
+    }
+    found
+}
+
+/// Differences between a host struct and its shader struct, one sentence each.
+fn layout_differences(
+    name: &str,
+    size: usize,
+    fields: &[(&str, usize)],
+    shader: Option<&ShaderStruct>,
+) -> Vec<String> {
+    let Some((span, members)) = shader else {
+        return vec![format!("struct {name}: not in any shader")];
+    };
+    let mut wrong = Vec::new();
+    if size != *span as usize {
+        wrong.push(format!(
+            "struct {name}: {size} bytes on the host, {span} in the shader"
+        ));
+    }
+    if fields.len() != members.len() {
+        wrong.push(format!(
+            "struct {name}: {} fields on the host, {} in the shader",
+            fields.len(),
+            members.len()
+        ));
+    }
+    for ((field, offset), (member, place)) in fields.iter().zip(members) {
+        if field != member {
+            wrong.push(format!(
+                "struct {name}: field {field} on the host is {member} in the shader"
+            ));
+        } else if *offset != *place as usize {
+            wrong.push(format!(
+                "struct {name}, field {field}: offset {offset} on the host, {place} in the shader"
+            ));
+        }
+    }
+    wrong
+}
+
+#[test]
+fn host_structs_lie_as_the_shaders_read_them() {
+    let shader = shader_structs();
+    let mut wrong = Vec::new();
+    for (name, size, fields) in layouts() {
+        wrong.extend(layout_differences(name, size, &fields, shader.get(name)));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // Structs that live in buffers must be known to the host.
+    let host: BTreeSet<&str> = layouts().into_iter().map(|l| l.0).collect();
+    let local = [
+        "CellEnergy",
+        "IsochoricFactors",
+        "StressState",
+        "AnchorPlace",
+    ];
+    for name in shader.keys().filter(|n| !local.contains(&n.as_str())) {
+        assert!(
+            host.contains(name.as_str()),
+            "struct {name} of the shaders is unknown to the host"
+        );
+    }
+}
+
+#[test]
+fn a_wrong_layout_is_found_and_named() {
+    let shader = shader_structs();
+    let all = layouts();
+    let (name, size, fields) = all.iter().find(|l| l.0 == "CellEdge").unwrap();
+    assert!(layout_differences(name, *size, fields, shader.get(*name)).is_empty());
+    let mut shifted = fields.clone();
+    shifted[2].1 += 4;
+    let wrong = layout_differences(name, *size, &shifted, shader.get(*name));
+    assert_eq!(
+        wrong,
+        ["struct CellEdge, field quarter_inverse: offset 12 on the host, 8 in the shader"]
+    );
+    let wrong = layout_differences(name, *size + 16, fields, shader.get(*name));
+    assert_eq!(
+        wrong,
+        ["struct CellEdge: 32 bytes on the host, 16 in the shader"]
+    );
+    let mut renamed = fields.clone();
+    renamed.swap(0, 1);
+    assert!(layout_differences(name, *size, &renamed, shader.get(*name))[0].contains("cube_root"));
+}
+
+/// Words that would betray an effect, by its key.
+const TRACES: [(&str, &[&str]); 5] = [
+    (
+        "mass_scaling",
+        &["mass_scaling", "stable_mass", "selective"],
+    ),
+    ("gravity", &["gravity", "free fall"]),
+    (
+        "puncture",
+        &["puncture", "tip_", "needle", "soften", "remaining"],
+    ),
+    ("indentation", &["indent", "punch"]),
+    ("friction", &["friction", "stick_", "coulomb"]),
+];
+
+/// Lower-case source and binding names of all stages of a set.
+fn text_of(set: &EffectSet, scene: (bool, bool)) -> Vec<(&'static str, String)> {
+    let names = |r: &Reflected| {
+        r.bindings
+            .iter()
+            .map(|b| b.name.clone())
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    reflected(set, scene)
+        .iter()
+        .map(|r| {
+            (
+                r.stage.name(),
+                format!("{}\n{}", r.composed.source, names(r)).to_lowercase(),
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn without_effects_the_shaders_know_nothing_of_them() {
+    let none = effect_set(|_| false);
+    for scene in SCENES {
+        for (stage, text) in text_of(&none, scene) {
+            for word in [
+                "contact", "friction", "cutting", "puncture", "needle", "tip", "stick", "indent",
+            ] {
+                // The one struct of a step's input serves all scenes that have one; it alone may speak of a tool.
+                let mut lines = text.lines().filter(|l| l.contains(word));
+                let found =
+                    lines.find(|l| !(scene != (false, false) && step_input_lines().contains(*l)));
+                assert!(found.is_none(), "{stage} {scene:?}: {word:?} in {found:?}");
+            }
+        }
+    }
+}
+
+/// Lower-case lines of shared/step_input.
+fn step_input_lines() -> BTreeSet<String> {
+    let (_, text) = SOURCES
+        .iter()
+        .find(|(name, _)| *name == "shared/step_input")
+        .unwrap();
+    text.lines().map(str::to_lowercase).collect()
+}
+
+#[test]
+fn an_absent_effect_leaves_no_trace() {
+    for (absent, (key, traces)) in TRACES.iter().enumerate() {
+        assert_eq!(EFFECTS[absent].key, *key);
+        // The stages of the effect are gone, and so are its blocks in the others.
+        for (stage, text) in text_of(&effect_set(|i| i != absent), (true, true)) {
+            for word in *traces {
+                let shared = ["shared/step_input", "shared/contact_node"];
+                let known: BTreeSet<String> = SOURCES
+                    .iter()
+                    .filter(|(name, _)| shared.contains(name))
+                    .flat_map(|(_, text)| text.lines().map(str::to_lowercase))
+                    .collect();
+                let mut lines = text.lines().filter(|l| l.contains(word));
+                let found = lines.find(|l| !known.contains(*l));
+                assert!(
+                    found.is_none(),
+                    "{stage} without {key}: {word:?} in {found:?}"
+                );
+            }
+        }
+        // Not a vacuous search: with the effect alone (or with a tool, for friction) the words are there.
+        let present =
+            effect_set(|i| i == absent || (*key == "friction" && EFFECTS[i].key == "puncture"));
+        let all: String = text_of(&present, (false, false))
+            .into_iter()
+            .map(|t| t.1)
+            .collect();
+        assert!(
+            traces.iter().any(|word| all.contains(word)),
+            "{key}: none of {traces:?} with it"
+        );
+    }
+}
+
+#[test]
+fn every_file_and_every_define_is_used() {
+    let mut used = BTreeSet::new();
+    for (_, r) in everything() {
+        used.extend(r.composed.origin.iter().map(|o| o.0));
+    }
+    for (name, text) in SOURCES {
+        assert!(used.contains(name), "shaders/{name}.wgsl is in no stage");
+        let path = format!("{}/shaders/{name}.wgsl", env!("CARGO_MANIFEST_DIR"));
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), *text, "{path}");
+    }
+    for define in SCENE_DEFINES
+        .into_iter()
+        .chain(EFFECTS.iter().map(|e| e.define))
+    {
+        let test = |text: &str| text.lines().any(|l| l.trim() == format!("#ifdef {define}"));
+        let stage_of_its_own = ["INDENTATION"];
+        assert!(
+            SOURCES.iter().any(|s| test(s.1)) || stage_of_its_own.contains(&define),
+            "no shader asks for {define}"
+        );
+    }
+}
+
+#[test]
+fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
+    for (name, text) in SOURCES
+        .iter()
+        .filter(|s| s.0 == "stages/element_forces" || s.0 == "stages/integrate_nodes")
+    {
+        let mut last = 0;
+        // Imports stand at the top of a file, blocks of code in its functions.
+        let body = text.split("fn ").skip(1).collect::<Vec<_>>().join("fn ");
+        for line in body
+            .lines()
+            .filter_map(|l| l.trim().strip_prefix("#ifdef "))
+        {
+            let Some(place) = EFFECTS.iter().position(|e| e.define == line) else {
+                continue;
+            };
+            assert!(
+                place >= last,
+                "{name}: the block of {line} comes out of order"
+            );
+            last = place;
+        }
+        for effect in &EFFECTS {
+            let count = body
+                .lines()
+                .filter(|l| l.trim() == format!("#ifdef {}", effect.define))
+                .count();
+            assert!(count <= 1, "{name}: {count} blocks of {}", effect.key);
+        }
+    }
+}
+
+#[test]
+fn the_readme_lists_the_stages_of_the_step() {
+    let path = format!("{}/README.md", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).unwrap_or_default();
+    let section = text
+        .split("\n## Stages")
+        .nth(1)
+        .unwrap_or_else(|| panic!("{path} has no heading `## Stages`"));
+    let section = section.split("\n## ").next().unwrap_or_default();
+    let listed: Vec<&str> = section
+        .lines()
+        .filter(|l| l.trim_start().starts_with(|c: char| c.is_ascii_digit()))
+        .filter_map(|l| l.split('`').nth(1))
+        .collect();
+    let names: Vec<&str> = Stage::ALL.iter().map(|s| s.name()).collect();
+    assert_eq!(listed, names, "{path}: list of stages");
+}
+
+#[test]
+fn every_stage_has_a_file_and_every_file_a_stage() {
+    let files: Vec<&str> = SOURCES
+        .iter()
+        .filter_map(|s| s.0.strip_prefix("stages/"))
+        .collect();
+    let mut names: Vec<&str> = Stage::ALL.iter().map(|s| s.name()).collect();
+    names.sort_unstable();
+    assert_eq!(files, names);
+}
+
+#[test]
+fn a_broken_stage_names_file_and_line() {
+    // The needle's stage without its effect lacks nothing that the composer sees, but the tip stage of a scene
+    // without a define still imports what it needs; a line of a shared file must map back to that file.
+    let set = effect_set(|i| EFFECTS[i].key == "puncture");
+    let composed = compose("stages/needle_contact", &defines(&set, false, false)).unwrap();
+    for (index, line) in composed.source.lines().enumerate() {
+        let place = composed.place(index + 1);
+        let (file, number) = place
+            .strip_prefix("shaders/")
+            .unwrap()
+            .split_once(".wgsl:")
+            .unwrap();
+        let text = SOURCES.iter().find(|s| s.0 == file).unwrap().1;
+        assert_eq!(
+            text.lines()
+                .nth(number.parse::<usize>().unwrap() - 1)
+                .unwrap(),
+            line,
+            "{place}"
+        );
+    }
+    // A define without the others that belong to it: `driven_faces` then names a step input that nobody imported.
+    let error = reflect(Stage::IntegrateNodes, &BTreeSet::from(["DRIVEN_FACES"]))
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        error.contains("shaders/shared/driven_faces.wgsl:"),
+        "{error}"
+    );
+    let line: usize = error
+        .split("driven_faces.wgsl:")
+        .nth(1)
+        .unwrap()
+        .split('\n')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
+    let text = SOURCES
+        .iter()
+        .find(|s| s.0 == "shared/driven_faces")
+        .unwrap()
+        .1;
+    assert!(
+        text.lines().nth(line - 1).unwrap().contains("step_input"),
+        "line {line} of driven_faces: {error}"
+    );
+}
