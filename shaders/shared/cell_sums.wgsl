@@ -8,8 +8,9 @@ struct CellSums {
     // Cells with J <= 0 at the centre or a corner, and the last of them.
     inverted_cells: u32,
     inverted_cell: u32,
-    _pad0: u32,
-    _pad1: u32,
+    // Cells whose corners are farther apart than the integer sums of the element stage hold.
+    overstretched_cells: u32,
+    _pad: u32,
 }
 
 @group(2) @binding(5) var<storage, read_write> cell_sums: array<CellSums>;

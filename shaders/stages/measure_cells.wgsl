@@ -33,6 +33,11 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         for (var corner = 0u; corner < 8u; corner++) {
             u[corner] = vec3<f32>(node_displacement[corner_node(cell, corner)].xyz - origin) * DISPLACEMENT_UNIT;
         }
+        var apart = vec3<f32>(0.0);
+        for (var corner = 1u; corner < 8u; corner++) {
+            apart = max(apart, abs(u[corner]));
+        }
+        sums.overstretched_cells += select(0u, 1u, max(apart.x, max(apart.y, apart.z)) > LARGEST_DIFFERENCE);
         var energy = cell_energy(cell, &u);
 #ifdef PUNCTURE
         energy.elastic *= cell_stiffness[index];

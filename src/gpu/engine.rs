@@ -187,6 +187,8 @@ impl GpuEngine {
             })
             .collect();
         bytes += offset * RING as u64;
+        // Error scopes belong to a thread; what the compiling threads met is with the device.
+        gpu.check()?;
         if let Some(error) = pollster::block_on(scope.pop()) {
             return Err(Error::Device(error.to_string()));
         }
@@ -239,12 +241,19 @@ impl GpuEngine {
             }
             let (begin, cpu) = (std::time::Instant::now(), crate::process::cpu_seconds());
             self.gpu.queue.submit([encoder.finish()]);
-            self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| Error::Device(e.to_string()))?;
+            self.wait(wgpu::PollType::wait_indefinitely())?;
             let wall = begin.elapsed().as_secs_f64() / f64::from(repeats);
             let cpu = crate::process::cpu_seconds().zip(cpu).map(|(b, a)| (b - a) / f64::from(repeats));
             times.push((kernel.stage, wall, cpu));
         }
         Ok(times)
+    }
+
+    /// Polls the device. What the device itself has reported says more than the failed wait that follows it.
+    fn wait(&self, poll: wgpu::PollType) -> Result<()> {
+        let polled = self.gpu.device.poll(poll);
+        self.gpu.check()?;
+        polled.map(|_| ()).map_err(|e| Error::Device(e.to_string()))
     }
 
     fn collect_oldest(&mut self, wait: bool) -> Result<bool> {
@@ -254,8 +263,7 @@ impl GpuEngine {
         } else {
             wgpu::PollType::Poll
         };
-        self.gpu.device.poll(poll).map_err(|e| Error::Device(e.to_string()))?;
-        self.gpu.check()?;
+        self.wait(poll)?;
         if wait {
             await_mapping(&self.gpu, &front.mapped)?;
         }
@@ -296,6 +304,7 @@ impl GpuEngine {
                         sums.min_j = sums.min_j.min(f64::from(s.min_jacobian));
                         sums.min_corner_j = sums.min_corner_j.min(f64::from(s.min_corner_jacobian));
                         sums.inverted_cells += s.inverted_cells;
+                        sums.not_finite |= s.overstretched_cells > 0;
                         if s.inverted_cells > 0 {
                             sums.inverted_cell.get_or_insert(s.inverted_cell);
                         }
@@ -364,8 +373,7 @@ impl GpuEngine {
         }
         self.gpu.queue.submit([encoder.finish()]);
         let mapped = map_for_reading(&staging);
-        self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| Error::Device(e.to_string()))?;
-        self.gpu.check()?;
+        self.wait(wgpu::PollType::wait_indefinitely())?;
         await_mapping(&self.gpu, &mapped)?;
         let view = staging.get_mapped_range(..).map_err(|e| Error::Device(e.to_string()))?;
         let mut start = 0;

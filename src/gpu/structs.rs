@@ -187,8 +187,8 @@ shared_structs! {
         min_corner_jacobian: f32,
         inverted_cells: u32,
         inverted_cell: u32,
-        _pad0: u32,
-        _pad1: u32,
+        overstretched_cells: u32,
+        _pad: u32,
     }
     /// shaders/shared/node_sums.wgsl
     struct NodeSums {

@@ -262,7 +262,9 @@ impl Simulation {
                             x.x, x.y, x.z, state.displacement[n]
                         )
                     }
-                    None => "a displacement or velocity was out of range".into(),
+                    None => "a displacement, a velocity or the stretch of a cell (corners more than 7.8 mm apart from their \
+                             rest distance) was out of range"
+                        .into(),
                 }
             }
             Err(error) => error.to_string(),

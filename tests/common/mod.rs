@@ -11,28 +11,19 @@ use stylet::gpu::{Gpu, GpuEngine};
 use stylet::material::MooneyRivlin;
 use stylet::mesh::BlockMesh;
 use stylet::model::Model;
-use stylet::scene::{
-    FaceCondition, Motion, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool,
-};
+use stylet::scene::{FaceCondition, Motion, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool};
 use stylet::solver::cpu::CpuEngine;
 use stylet::solver::engine::{Engine, FramePlan, FrameSums, State, StepInput};
 
 /// Material A of the reference files.
-pub const MATERIAL_A: MooneyRivlin = MooneyRivlin {
-    c10: 2300.0,
-    c01: 1000.0,
-    bulk_modulus: 5.0e5,
-};
+pub const MATERIAL_A: MooneyRivlin = MooneyRivlin { c10: 2300.0, c01: 1000.0, bulk_modulus: 5.0e5 };
 /// Material N of the reference files.
-pub const MATERIAL_N: MooneyRivlin = MooneyRivlin {
-    c10: 3300.0,
-    c01: 0.0,
-    bulk_modulus: 5.0e5,
-};
+pub const MATERIAL_N: MooneyRivlin = MooneyRivlin { c10: 3300.0, c01: 0.0, bulk_modulus: 5.0e5 };
 /// Density of the reference files [kg/m^3].
 pub const DENSITY: f64 = 1060.0;
-/// Default hourglass constants of a scene.
-pub const HOURGLASS: (f64, f64) = (0.1, 15_000.0);
+/// Default hourglass constants of a scene without and with the effect `puncture`.
+pub const HOURGLASS: (f64, f64) = (0.1, 1000.0);
+pub const HOURGLASS_PUNCTURE: (f64, f64) = (0.1, 15_000.0);
 
 /// The adapter of this machine, opened once; `None` (and a line on stdout) where there is none.
 ///
@@ -42,10 +33,7 @@ pub fn gpu() -> Option<Gpu> {
     GPU.get_or_init(|| match Gpu::open() {
         Ok(gpu) => {
             let info = &gpu.info;
-            println!(
-                "adapter: {}, driver {} {}",
-                info.name, info.driver, info.driver_info
-            );
+            println!("adapter: {}, driver {} {}", info.name, info.driver, info.driver_info);
             Some(gpu)
         }
         Err(error) if std::env::var("REQUIRE_GPU").is_ok_and(|v| v == "1") => {
@@ -60,15 +48,9 @@ pub fn gpu() -> Option<Gpu> {
 }
 
 /// The engines that can run here, f64 first.
-pub fn engines(
-    model: &Arc<Model>,
-    dt: f64,
-    max_steps: usize,
-) -> Vec<(&'static str, Box<dyn Engine>)> {
-    let mut engines: Vec<(&'static str, Box<dyn Engine>)> =
-        vec![("cpu", Box::new(CpuEngine::new(model.clone(), dt)))];
-    engines
-        .extend(gpu_engine(model, dt, max_steps).map(|e| ("gpu", Box::new(e) as Box<dyn Engine>)));
+pub fn engines(model: &Arc<Model>, dt: f64, max_steps: usize) -> Vec<(&'static str, Box<dyn Engine>)> {
+    let mut engines: Vec<(&'static str, Box<dyn Engine>)> = vec![("cpu", Box::new(CpuEngine::new(model.clone(), dt)))];
+    engines.extend(gpu_engine(model, dt, max_steps).map(|e| ("gpu", Box::new(e) as Box<dyn Engine>)));
     engines
 }
 
@@ -116,19 +98,12 @@ pub fn block(size_mm: [f64; 3], cell_mm: f64) -> Scene {
 /// Gives a scene a tool that enters at the middle of the top face.
 pub fn with_tool(scene: &mut Scene, tool: Tool, direction: DVec3, phases: Vec<Phase>) {
     scene.tool = Some(tool);
-    scene.motion = Motion {
-        entry: DVec3::ZERO,
-        direction: direction.normalize(),
-        phases,
-    };
+    scene.motion = Motion { entry: DVec3::ZERO, direction: direction.normalize(), phases };
 }
 
 /// A face whose listed components are held.
 pub fn held(x: bool, y: bool, z: bool) -> FaceCondition {
-    FaceCondition {
-        fixed: [x, y, z],
-        ..Default::default()
-    }
+    FaceCondition { fixed: [x, y, z], ..Default::default() }
 }
 
 pub fn model(scene: Scene) -> Arc<Model> {
@@ -148,33 +123,19 @@ pub fn graded_mesh(cells: [usize; 3]) -> BlockMesh {
             })
             .collect();
         // The block stands where a scene would put it: centred, top face at z = 0.
-        let shift = if axis == 2 {
-            lines[cells[axis]]
-        } else {
-            0.5 * lines[cells[axis]]
-        };
+        let shift = if axis == 2 { lines[cells[axis]] } else { 0.5 * lines[cells[axis]] };
         lines.iter_mut().for_each(|l| *l -= shift);
         lines
     };
-    BlockMesh {
-        lines: [lines(0), lines(1), lines(2)],
-    }
+    BlockMesh { lines: [lines(0), lines(1), lines(2)] }
 }
 
 /// Advances an engine by `steps` steps in one frame; `step` counts the steps since t = 0.
-pub fn advance(
-    engine: &mut dyn Engine,
-    model: &Model,
-    dt: f64,
-    step: &mut u64,
-    steps: usize,
-) -> FrameSums {
+pub fn advance(engine: &mut dyn Engine, model: &Model, dt: f64, step: &mut u64, steps: usize) -> FrameSums {
     let plan = FramePlan {
         frame: *step,
         first_step: *step,
-        steps: (0..steps as u64)
-            .map(|s| StepInput::at(model, (*step + s) as f64 * dt, dt))
-            .collect(),
+        steps: (0..steps as u64).map(|s| StepInput::at(model, (*step + s) as f64 * dt, dt)).collect(),
     };
     *step += steps as u64;
     engine.start_frame(&plan).unwrap();
@@ -195,18 +156,14 @@ pub fn displaced(engine: &mut dyn Engine, model: &Model, u: impl Fn(DVec3) -> DV
 
 /// A parsed file of tests/references.
 pub fn reference(name: &str) -> Value {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/references")
-        .join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references").join(name);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     serde_json::from_str(&text).unwrap()
 }
 
 /// A number of a reference file.
 pub fn number(value: &Value) -> f64 {
-    value
-        .as_f64()
-        .unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
 pub fn vector(value: &Value) -> DVec3 {
@@ -235,24 +192,15 @@ pub fn largest(vectors: &[DVec3]) -> f64 {
 /// Largest difference over the largest vector of `expected`.
 pub fn relative_difference(found: &[DVec3], expected: &[DVec3]) -> f64 {
     assert_eq!(found.len(), expected.len());
-    let difference = found
-        .iter()
-        .zip(expected)
-        .map(|(a, b)| (*a - *b).length())
-        .fold(0.0, f64::max);
+    let difference = found.iter().zip(expected).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
     difference / largest(expected)
 }
 
 /// Asserts `|found/expected - 1| <= tolerance`; prints what was measured.
 pub fn close(what: &str, found: f64, expected: f64, tolerance: f64) {
     let error = (found / expected - 1.0).abs();
-    println!(
-        "{what}: {found:.8e}, expected {expected:.8e}, off by {error:.2e} (allowed {tolerance:.0e})"
-    );
-    assert!(
-        error <= tolerance,
-        "{what}: {found:e} instead of {expected:e}, off by {error:.2e} > {tolerance:e}"
-    );
+    println!("{what}: {found:.8e}, expected {expected:.8e}, off by {error:.2e} (allowed {tolerance:.0e})");
+    assert!(error <= tolerance, "{what}: {found:e} instead of {expected:e}, off by {error:.2e} > {tolerance:e}");
 }
 
 /// Asserts `value <= bound`; prints what was measured.

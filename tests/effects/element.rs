@@ -26,10 +26,7 @@ const SIGNS: [[f64; 3]; 8] = [
 /// One-point volume and gradients of a hexahedron with any corners: `B = dN/dxi J0^-1`, `V = 8 det J0`.
 fn one_point(corners: &[DVec3; 8]) -> (f64, [DVec3; 8]) {
     let local: [DVec3; 8] = SIGNS.map(|s| DVec3::from(s) / 8.0);
-    let jacobian = corners
-        .iter()
-        .zip(local)
-        .fold(DMat3::ZERO, |j, (x, d)| j + outer(*x, d));
+    let jacobian = corners.iter().zip(local).fold(DMat3::ZERO, |j, (x, d)| j + outer(*x, d));
     let inverse = jacobian.inverse().transpose();
     (8.0 * jacobian.determinant(), local.map(|d| inverse * d))
 }
@@ -37,14 +34,9 @@ fn one_point(corners: &[DVec3; 8]) -> (f64, [DVec3; 8]) {
 /// Stress of a homogeneous block with the deformation gradient F.
 fn stress_of_a_block(engine: &mut dyn Engine, model: &Model, f: DMat3) -> DMat3 {
     displaced(engine, model, |x| (f - DMat3::IDENTITY) * x);
-    let volume: f64 = (0..model.mesh.node_count())
-        .map(|n| model.mesh.node_volume(n))
-        .sum();
+    let volume: f64 = (0..model.mesh.node_count()).map(|n| model.mesh.node_volume(n)).sum();
     let forces = engine.internal_forces().unwrap();
-    let p = forces
-        .iter()
-        .enumerate()
-        .map(|(n, f)| outer(*f, model.mesh.rest_position(n)));
+    let p = forces.iter().enumerate().map(|(n, f)| outer(*f, model.mesh.rest_position(n)));
     p.fold(DMat3::ZERO, |a, b| a + b) * (1.0 / volume)
 }
 
@@ -52,12 +44,7 @@ fn stress_of_a_block(engine: &mut dyn Engine, model: &Model, f: DMat3) -> DMat3 
 fn nodal_forces_of_the_reference_cells() {
     let model = model(block([2.0, 2.0, 2.0], 1.0));
     let file = reference("09_element_forces.json");
-    let cases: Vec<_> = file["cases"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter(|c| c["element"] == "hex8_1pt")
-        .collect();
+    let cases: Vec<_> = file["cases"].as_array().unwrap().iter().filter(|c| c["element"] == "hex8_1pt").collect();
     assert_eq!(cases.len(), 6);
     for (name, mut engine) in engines(&model, 1e-6, 1) {
         let tolerance = if name == "gpu" { 1e-4 } else { 1e-9 };
@@ -70,23 +57,11 @@ fn nodal_forces_of_the_reference_cells() {
             let forces = gradients.map(|b| p * b * volume);
             // Rigid cases are judged against c10 h^2, the others against their own force.
             let scale = largest(&expected).max(MATERIAL_A.c10 * volume.powf(2.0 / 3.0));
-            let difference = forces
-                .iter()
-                .zip(expected)
-                .map(|(a, b)| (*a - b).length())
-                .fold(0.0, f64::max);
-            at_most(
-                &format!("{name}, reference cell {}", case["case"]),
-                difference / scale,
-                tolerance,
-            );
+            let difference = forces.iter().zip(expected).map(|(a, b)| (*a - b).length()).fold(0.0, f64::max);
+            at_most(&format!("{name}, reference cell {}", case["case"]), difference / scale, tolerance);
             let energy = volume * MATERIAL_A.energy_density(f - DMat3::IDENTITY);
             let reference_energy = number(&case["energy_J"]);
-            assert!(
-                (energy - reference_energy).abs() <= 1e-9 * reference_energy + 1e-18,
-                "{}",
-                case["case"]
-            );
+            assert!((energy - reference_energy).abs() <= 1e-9 * reference_energy + 1e-18, "{}", case["case"]);
         }
     }
 }
@@ -103,15 +78,10 @@ fn graded_model(scene: Scene, cells: [usize; 3]) -> Arc<Model> {
 #[test]
 fn patch_test_on_a_graded_block() {
     let model = graded_model(block([1.0; 3], 1.0), [4, 5, 11]);
-    let gradient = DMat3::from_cols(
-        DVec3::new(0.12, 0.05, -0.04),
-        DVec3::new(-0.03, -0.08, 0.06),
-        DVec3::new(0.07, 0.02, -0.1),
-    );
+    let gradient =
+        DMat3::from_cols(DVec3::new(0.12, 0.05, -0.04), DVec3::new(-0.03, -0.08, 0.06), DVec3::new(0.07, 0.02, -0.1));
     for (name, mut engine) in engines(&model, 1e-6, 1) {
-        displaced(engine.as_mut(), &model, |x| {
-            gradient * x + DVec3::new(1e-4, -2e-4, 3e-4)
-        });
+        displaced(engine.as_mut(), &model, |x| gradient * x + DVec3::new(1e-4, -2e-4, 3e-4));
         let forces = engine.internal_forces().unwrap();
         let n = model.mesh.nodes();
         let (mut inside, mut outside): (f64, f64) = (0.0, 0.0);
@@ -150,20 +120,13 @@ fn a_turn_by_two_radians_causes_no_force() {
 /// A scene with a needle, so that cells carry a remaining stiffness.
 fn softened_scene() -> Scene {
     let mut scene = block([1.0; 3], 1.0);
+    scene.solver.hourglass_quartic = HOURGLASS_PUNCTURE.1;
     scene.effects.puncture = Some(puncture::Params::default());
     with_tool(
         &mut scene,
-        Tool::Needle(NeedleShape {
-            name: "18G".into(),
-            radius: 0.635e-3,
-            tip_length: 2e-3,
-            material: "steel".into(),
-        }),
+        Tool::Needle(NeedleShape { name: "18G".into(), radius: 0.635e-3, tip_length: 2e-3, material: "steel".into() }),
         DVec3::NEG_Z,
-        vec![Phase::Insert {
-            speed: 10e-3,
-            depth: 3e-3,
-        }],
+        vec![Phase::Insert { speed: 10e-3, depth: 3e-3 }],
     );
     scene
 }
@@ -192,22 +155,12 @@ fn shaken(engine: &mut dyn Engine, amplitude: f64, seed: u64, smooth: bool) -> S
 
 /// Largest difference of the internal forces of GPU and CPU over several fields, each over its largest force.
 fn force_difference(gpu: &mut dyn Engine, cpu: &mut dyn Engine) -> f64 {
-    let fields = [
-        (0.02, false),
-        (0.1, false),
-        (0.3, false),
-        (0.6, false),
-        (0.5, true),
-        (3.0, true),
-    ];
+    let fields = [(0.02, false), (0.1, false), (0.3, false), (0.6, false), (0.5, true), (3.0, true)];
     let mut worst: f64 = 0.0;
     for (seed, (amplitude, smooth)) in fields.into_iter().enumerate() {
         let state = shaken(gpu, amplitude, seed as u64 + 10, smooth);
         cpu.write_state(&state).unwrap();
-        let (found, expected) = (
-            gpu.internal_forces().unwrap(),
-            cpu.internal_forces().unwrap(),
-        );
+        let (found, expected) = (gpu.internal_forces().unwrap(), cpu.internal_forces().unwrap());
         worst = worst.max(relative_difference(&found, &expected));
     }
     worst
@@ -226,11 +179,7 @@ fn both_engines_agree_on_random_fields() {
             return;
         };
         let mut cpu = CpuEngine::new(model.clone(), 1e-6);
-        at_most(
-            &format!("internal forces, {what}"),
-            force_difference(&mut gpu, &mut cpu),
-            2e-5,
-        );
+        at_most(&format!("internal forces, {what}"), force_difference(&mut gpu, &mut cpu), 2e-5);
     }
 }
 
@@ -241,20 +190,11 @@ fn a_wrong_coefficient_does_not_pass_the_comparison() {
         return;
     };
     for (what, change) in [
-        (
-            "c01",
-            (|s: &mut Scene| s.material.law.c01 *= 1.01) as fn(&mut Scene),
-        ),
+        ("c01", (|s: &mut Scene| s.material.law.c01 *= 1.01) as fn(&mut Scene)),
         ("c10", |s: &mut Scene| s.material.law.c10 *= 1.01),
-        ("bulk modulus", |s: &mut Scene| {
-            s.material.law.bulk_modulus *= 1.001
-        }),
-        ("hourglass stiffness", |s: &mut Scene| {
-            s.solver.hourglass_stiffness *= 1.01
-        }),
-        ("quartic factor", |s: &mut Scene| {
-            s.solver.hourglass_quartic *= 1.01
-        }),
+        ("bulk modulus", |s: &mut Scene| s.material.law.bulk_modulus *= 1.001),
+        ("hourglass stiffness", |s: &mut Scene| s.solver.hourglass_stiffness *= 1.01),
+        ("quartic factor", |s: &mut Scene| s.solver.hourglass_quartic *= 1.01),
     ] {
         let mut scene = block([1.0; 3], 1.0);
         change(&mut scene);
@@ -276,12 +216,7 @@ fn forces_are_the_gradient_of_the_energy() {
         let forces = cpu.internal_forces().unwrap();
         let energy = |u: &[DVec3]| -> f64 {
             let parts = (0..model.mesh.cell_count()).map(|cell| {
-                let m = elements.measure(
-                    &model.mesh,
-                    cell,
-                    &model.mesh.cell_nodes(cell).map(|n| u[n]),
-                    1.0,
-                );
+                let m = elements.measure(&model.mesh, cell, &model.mesh.cell_nodes(cell).map(|n| u[n]), 1.0);
                 m.elastic + m.hourglass
             });
             parts.sum()
@@ -315,23 +250,11 @@ fn cell_measures_of_both_engines_agree() {
         let found = advance(&mut gpu, &model, dt, &mut 0, 1);
         let expected = advance(&mut cpu, &model, dt, &mut 0, 1);
         close("elastic energy", found.elastic, expected.elastic, 1e-5);
-        close(
-            "hourglass energy",
-            found.hourglass,
-            expected.hourglass,
-            1e-5,
-        );
+        close("hourglass energy", found.hourglass, expected.hourglass, 1e-5);
         at_most("J", (found.min_j - expected.min_j).abs(), 1e-5);
-        at_most(
-            "corner J",
-            (found.min_corner_j - expected.min_corner_j).abs(),
-            1e-5,
-        );
+        at_most("corner J", (found.min_corner_j - expected.min_corner_j).abs(), 1e-5);
         assert_eq!(found.inverted_cells, expected.inverted_cells);
-        assert_eq!(
-            found.inverted_cell.is_some(),
-            expected.inverted_cell.is_some()
-        );
+        assert_eq!(found.inverted_cell.is_some(), expected.inverted_cell.is_some());
         if amplitude > 0.7 {
             assert!(found.inverted_cells > 0);
         }
@@ -344,26 +267,14 @@ fn a_state_written_is_the_state_read() {
     for (name, mut engine) in engines(&model, 1e-6, 1) {
         let mut state = shaken(engine.as_mut(), 0.3, 40, false);
         let mut random = Random(41);
-        state
-            .velocity
-            .iter_mut()
-            .for_each(|v| *v = random.vector() * 1e-2);
+        state.velocity.iter_mut().for_each(|v| *v = random.vector() * 1e-2);
         state.tip_coordinate = 1.25e-3;
         engine.write_state(&state).unwrap();
         let back = engine.read_state().unwrap();
-        assert!(
-            relative_difference(&back.velocity, &state.velocity) < 1e-7,
-            "{name}"
-        );
-        assert!(
-            relative_difference(&back.displacement, &state.displacement) < 1e-8,
-            "{name}"
-        );
+        assert!(relative_difference(&back.velocity, &state.velocity) < 1e-7, "{name}");
+        assert!(relative_difference(&back.displacement, &state.displacement) < 1e-8, "{name}");
         assert!((back.tip_coordinate - 1.25e-3).abs() < 1e-9, "{name}");
         let pairs = back.stiffness.iter().zip(&state.stiffness);
-        assert!(
-            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-7,
-            "{name}"
-        );
+        assert!(pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-7, "{name}");
     }
 }

@@ -21,16 +21,10 @@ fn block_under_punch(acceleration: DVec3, mu: f64, damping: f64) -> Arc<Model> {
     scene.effects.gravity = Some(gravity::Params { acceleration });
     scene.solver.mass_damping = damping;
     scene.effects.indentation = Some(indentation::Params::default());
-    scene.effects.friction = Some(friction::Params {
-        coefficient: mu,
-        ..Default::default()
-    });
+    scene.effects.friction = Some(friction::Params { coefficient: mu, ..Default::default() });
     with_tool(
         &mut scene,
-        Tool::FlatPunch {
-            radius: 10e-3,
-            bonded: false,
-        },
+        Tool::FlatPunch { radius: 10e-3, bonded: false },
         DVec3::NEG_Z,
         vec![Phase::Hold { duration: 10.0 }],
     );
@@ -45,15 +39,10 @@ fn start(engine: &mut dyn Engine, model: &Model, g: f64, v0: f64) {
     let mut state = engine.read_state().unwrap();
     let height = model.scene.tissue.size.z;
     let [nx, ny, nz] = model.mesh.nodes();
-    let column = |n: usize| {
-        (0..nz)
-            .map(|k| model.node_mass[n % (nx * ny) + k * nx * ny])
-            .sum::<f64>()
-    };
+    let column = |n: usize| (0..nz).map(|k| model.node_mass[n % (nx * ny) + k * nx * ny]).sum::<f64>();
     for (node, u) in state.displacement.iter_mut().enumerate() {
         let above_base = model.mesh.rest_position(node).z + height;
-        let squeeze =
-            DENSITY * g / MATERIAL_A.p_wave_modulus() * 0.5 * (height.powi(2) - above_base.powi(2));
+        let squeeze = DENSITY * g / MATERIAL_A.p_wave_modulus() * 0.5 * (height.powi(2) - above_base.powi(2));
         u.z = column(node) * g / model.tool_contact_stiffness() + squeeze;
     }
     state.velocity.fill(DVec3::new(v0, 0.0, 0.0));
@@ -62,11 +51,7 @@ fn start(engine: &mut dyn Engine, model: &Model, g: f64, v0: f64) {
 
 /// Mean over the nodal masses.
 fn mean(model: &Model, values: &[DVec3]) -> DVec3 {
-    let sum: DVec3 = values
-        .iter()
-        .zip(&model.node_mass)
-        .map(|(v, m)| *v * *m)
-        .sum();
+    let sum: DVec3 = values.iter().zip(&model.node_mass).map(|(v, m)| *v * *m).sum();
     sum / model.node_mass.iter().sum::<f64>()
 }
 
@@ -79,11 +64,7 @@ fn check_coulomb(name: &str, sums: &FrameSums, mu: f64) {
         "{name}: {sideways:e} of {:e}",
         sums.spreading_impulse
     );
-    assert!(
-        sums.friction_dissipation >= -1e-6 * sideways * 1e-3,
-        "{name}: {:e}",
-        sums.friction_dissipation
-    );
+    assert!(sums.friction_dissipation >= -1e-6 * sideways * 1e-3, "{name}: {:e}", sums.friction_dissipation);
 }
 
 #[test]
@@ -106,16 +87,15 @@ fn a_sliding_block_stops_where_coulomb_says() {
             let (mut step, mut lost) = (0, 0.0);
             // Half way: constant deceleration mu g.
             let half = (0.5 * stop / DT).round() as usize;
-            let run =
-                |engine: &mut dyn Engine, step: &mut u64, lost: &mut f64, mut steps: usize| {
-                    while steps > 0 {
-                        let now = steps.min(500);
-                        let sums = advance(engine, &model, DT, step, now);
-                        check_coulomb(name, &sums, mu);
-                        *lost += sums.friction_dissipation + sums.contact_dissipation;
-                        steps -= now;
-                    }
-                };
+            let run = |engine: &mut dyn Engine, step: &mut u64, lost: &mut f64, mut steps: usize| {
+                while steps > 0 {
+                    let now = steps.min(500);
+                    let sums = advance(engine, &model, DT, step, now);
+                    check_coulomb(name, &sums, mu);
+                    *lost += sums.friction_dissipation + sums.contact_dissipation;
+                    steps -= now;
+                }
+            };
             run(engine.as_mut(), &mut step, &mut lost, half);
             let speed = mean(&model, &engine.read_state().unwrap().velocity);
             let way = mean(&model, &engine.read_state().unwrap().displacement).x;
@@ -128,12 +108,7 @@ fn a_sliding_block_stops_where_coulomb_says() {
             );
             // m v_z = m g t - int N dt: what the block hops is missing from the normal impulse.
             let coulomb = 0.5 * v0 + mu * speed.z;
-            close(
-                &format!("{name}, mu {mu}, v0 {v0}: speed at half the time"),
-                speed.x,
-                coulomb,
-                1e-3,
-            );
+            close(&format!("{name}, mu {mu}, v0 {v0}: speed at half the time"), speed.x, coulomb, 1e-3);
             run(engine.as_mut(), &mut step, &mut lost, half + 500);
             let state = engine.read_state().unwrap();
             // The block is elastic and undamped: before it rests, single nodes stick and slip in its own waves, where
@@ -145,17 +120,8 @@ fn a_sliding_block_stops_where_coulomb_says() {
                 5e-3,
             );
             // Contact damping takes its part of what the sliding stirs up (2 % at mu 0.3), the last waves keep a little.
-            close(
-                &format!("{name}: dissipated"),
-                lost / mass,
-                number(&row["dissipated_J_per_kg"]),
-                2e-3,
-            );
-            at_most(
-                "speed left",
-                mean(&model, &state.velocity).x.abs() / v0,
-                0.02,
-            );
+            close(&format!("{name}: dissipated"), lost / mass, number(&row["dissipated_J_per_kg"]), 2e-3);
+            at_most("speed left", mean(&model, &state.velocity).x.abs() / v0, 0.02);
         }
     }
 }
@@ -172,33 +138,21 @@ fn a_block_on_an_incline_sticks_or_slides() {
         let model = block_under_punch(DVec3::new(theta.sin(), 0.0, theta.cos()) * G, mu, damping);
         for (name, mut engine) in engines(&model, DT, 1000) {
             // A sliding block starts in motion, so that no shaking can bring it to rest.
-            start(
-                engine.as_mut(),
-                &model,
-                G * theta.cos(),
-                if sticks { 0.0 } else { 0.05 },
-            );
+            start(engine.as_mut(), &model, G * theta.cos(), if sticks { 0.0 } else { 0.05 });
             let mut step = 0;
             let mut moments = Vec::new();
             for _ in 0..4 {
                 let sums = advance(engine.as_mut(), &model, DT, &mut step, 1000);
                 check_coulomb(name, &sums, mu);
                 let state = engine.read_state().unwrap();
-                moments.push((
-                    mean(&model, &state.displacement),
-                    mean(&model, &state.velocity),
-                ));
+                moments.push((mean(&model, &state.displacement), mean(&model, &state.velocity)));
             }
             let what = format!("{name}, {} degrees", row["theta_deg"]);
             if sticks {
                 // Frictionless it would go g sin(theta) t^2 / 2 from 20 to 40 ms.
                 let way = (moments[3].0.x - moments[1].0.x).abs();
                 let free = 0.5 * G * theta.sin() * (0.04f64.powi(2) - 0.02f64.powi(2));
-                at_most(
-                    &format!("{what}: creep over the frictionless way"),
-                    way / free,
-                    1e-4,
-                );
+                at_most(&format!("{what}: creep over the frictionless way"), way / free, 1e-4);
             } else {
                 // What the block hops along z is missing from the normal impulse, as above.
                 let gain = moments[3].1 - moments[0].1;
@@ -206,11 +160,7 @@ fn a_block_on_an_incline_sticks_or_slides() {
                 let expected = number(&row["accel_m_s2"]);
                 println!("{what}: {found:.6} m/s^2, expected {expected:.6}");
                 let friction = mu * G * theta.cos();
-                at_most(
-                    &format!("{what}: error over the friction"),
-                    (found - expected).abs() / friction,
-                    1e-3,
-                );
+                at_most(&format!("{what}: error over the friction"), (found - expected).abs() / friction, 1e-3);
             }
         }
     }
@@ -220,36 +170,16 @@ fn a_block_on_an_incline_sticks_or_slides() {
 fn insertion(mu: Option<f64>) -> Scene {
     let mut scene = block([12.0, 12.0, 8.0], 1.0);
     scene.faces[4] = held(true, true, true);
-    scene.effects.puncture = Some(puncture::Params {
-        puncture_force: 0.05,
-        cutting_force: 0.03,
-        ..Default::default()
-    });
+    scene.solver.hourglass_quartic = HOURGLASS_PUNCTURE.1;
+    scene.effects.puncture = Some(puncture::Params { puncture_force: 0.05, cutting_force: 0.03, ..Default::default() });
     scene.effects.mass_scaling = Some(stylet::effects::mass_scaling::Params { factor: 100.0 });
-    scene.effects.friction = mu.map(|coefficient| friction::Params {
-        coefficient,
-        ..Default::default()
-    });
+    scene.effects.friction = mu.map(|coefficient| friction::Params { coefficient, ..Default::default() });
     scene.solver.mass_damping = 40.0;
     with_tool(
         &mut scene,
-        Tool::Needle(NeedleShape {
-            name: "test".into(),
-            radius: 1e-3,
-            tip_length: 1.5e-3,
-            material: "steel".into(),
-        }),
+        Tool::Needle(NeedleShape { name: "test".into(), radius: 1e-3, tip_length: 1.5e-3, material: "steel".into() }),
         DVec3::NEG_Z,
-        vec![
-            Phase::Insert {
-                speed: 20e-3,
-                depth: 5e-3,
-            },
-            Phase::Withdraw {
-                speed: 20e-3,
-                depth: 3e-3,
-            },
-        ],
+        vec![Phase::Insert { speed: 20e-3, depth: 5e-3 }, Phase::Withdraw { speed: 20e-3, depth: 3e-3 }],
     );
     scene
 }
@@ -258,24 +188,18 @@ fn insertion(mu: Option<f64>) -> Scene {
 fn frames(engine: &mut dyn Engine, model: &Model, dt: f64) -> Vec<FrameSums> {
     let steps = (model.duration() / dt) as usize;
     let mut step = 0;
-    (0..steps / 50)
-        .map(|_| advance(engine, model, dt, &mut step, 50))
-        .collect()
+    (0..steps / 50).map(|_| advance(engine, model, dt, &mut step, 50)).collect()
 }
 
 #[test]
 fn a_coefficient_of_zero_is_no_friction_to_the_last_bit() {
     let (with, without) = (model(insertion(Some(0.0))), model(insertion(None)));
     let dt = 8e-5;
-    let (Some(mut a), Some(mut b)) = (gpu_engine(&with, dt, 50), gpu_engine(&without, dt, 50))
-    else {
+    let (Some(mut a), Some(mut b)) = (gpu_engine(&with, dt, 50), gpu_engine(&without, dt, 50)) else {
         return;
     };
     let (fa, fb) = (frames(&mut a, &with, dt), frames(&mut b, &without, dt));
-    assert!(
-        fa.last().unwrap().tip_coordinate > 1e-3,
-        "the needle went in"
-    );
+    assert!(fa.last().unwrap().tip_coordinate > 1e-3, "the needle went in");
     assert_eq!(fa, fb);
     let (sa, sb) = (a.read_state().unwrap(), b.read_state().unwrap());
     assert_eq!(sa.displacement, sb.displacement);
@@ -291,34 +215,18 @@ fn shaft_friction_opposes_the_motion_and_only_dissipates() {
         let frames = frames(engine.as_mut(), &model, dt);
         let scale: f64 = frames.iter().map(|f| f.friction_dissipation).sum();
         assert!(scale > 0.0, "{name}");
-        let least = frames
-            .iter()
-            .map(|f| f.friction_dissipation)
-            .fold(0.0, f64::min);
+        let least = frames.iter().map(|f| f.friction_dissipation).fold(0.0, f64::min);
         assert!(least >= -1e-9 * scale, "{name}: {least:e} of {scale:e}");
         // On the way in the tissue is dragged along, after the stick springs have turned it is dragged back.
-        let way_in = frames
-            .iter()
-            .map(|f| f.friction_impulse)
-            .fold(0.0, f64::max);
-        let way_out = frames
-            .iter()
-            .map(|f| f.friction_impulse)
-            .fold(0.0, f64::min);
+        let way_in = frames.iter().map(|f| f.friction_impulse).fold(0.0, f64::max);
+        let way_out = frames.iter().map(|f| f.friction_impulse).fold(0.0, f64::min);
         let end = frames.last().unwrap().friction_impulse;
-        println!(
-            "{name}: dissipated {scale:.3e} J, impulse in {way_in:.2e}, out {way_out:.2e} N s"
-        );
+        println!("{name}: dissipated {scale:.3e} J, impulse in {way_in:.2e}, out {way_out:.2e} N s");
         assert!(way_in > 0.0 && end < 0.0, "{name}");
         last.push((scale, way_in, way_out));
     }
     if let [cpu, gpu] = last[..] {
         close("friction work, GPU over CPU", gpu.0, cpu.0, 0.02);
-        close(
-            "largest friction on the way out, GPU over CPU",
-            gpu.2,
-            cpu.2,
-            0.02,
-        );
+        close("largest friction on the way out, GPU over CPU", gpu.2, cpu.2, 0.02);
     }
 }

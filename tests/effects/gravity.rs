@@ -17,9 +17,7 @@ fn column(acceleration: f64, factor: f64, damping: f64) -> Arc<Model> {
         *face = held(true, true, false);
     }
     scene.faces[4] = held(true, true, true);
-    scene.effects.gravity = Some(gravity::Params {
-        acceleration: DVec3::new(0.0, 0.0, acceleration),
-    });
+    scene.effects.gravity = Some(gravity::Params { acceleration: DVec3::new(0.0, 0.0, acceleration) });
     if factor != 1.0 {
         scene.effects.mass_scaling = Some(mass_scaling::Params { factor });
     }
@@ -34,9 +32,7 @@ fn a_column_settles_under_its_weight() {
     let expected = DENSITY * g * HEIGHT * HEIGHT / (2.0 * MATERIAL_A.p_wave_modulus());
     for factor in [1.0, 100.0] {
         // Nearly critical for the first mode, omega = pi c / 2H.
-        let omega =
-            0.5 * std::f64::consts::PI * (MATERIAL_A.p_wave_modulus() / (DENSITY * factor)).sqrt()
-                / HEIGHT;
+        let omega = 0.5 * std::f64::consts::PI * (MATERIAL_A.p_wave_modulus() / (DENSITY * factor)).sqrt() / HEIGHT;
         let model = column(g, factor, 1.6 * omega);
         let dt = 0.5 * 2e-3 / model.scaled_wave_speed();
         for (name, mut engine) in engines(&model, dt, 600) {
@@ -44,19 +40,9 @@ fn a_column_settles_under_its_weight() {
             let state = engine.read_state().unwrap();
             let top = state.displacement.last().unwrap().z;
             // Lumped masses give the exact nodal value of the continuous column.
-            close(
-                &format!("{name}, S = {factor}, settlement"),
-                top,
-                expected,
-                0.01,
-            );
+            close(&format!("{name}, S = {factor}, settlement"), top, expected, 0.01);
             let audit = sums.elastic + sums.hourglass + sums.kinetic + sums.damping_dissipation;
-            close(
-                &format!("{name}, S = {factor}, work of the weight"),
-                sums.load_work,
-                audit,
-                0.01,
-            );
+            close(&format!("{name}, S = {factor}, work of the weight"), sums.load_work, audit, 0.01);
         }
     }
 }
@@ -74,10 +60,7 @@ fn no_acceleration_is_no_gravity() {
             .map(|(name, mut engine)| {
                 let mut random = Random(50);
                 let mut state = engine.read_state().unwrap();
-                state
-                    .velocity
-                    .iter_mut()
-                    .for_each(|v| *v = random.vector() * 1e-2);
+                state.velocity.iter_mut().for_each(|v| *v = random.vector() * 1e-2);
                 engine.write_state(&state).unwrap();
                 advance(engine.as_mut(), model, dt, &mut 0, 200);
                 (name, engine.read_state().unwrap())

@@ -6,7 +6,7 @@ use glam::DVec3;
 use stylet::effects::indentation;
 use stylet::model::Model;
 use stylet::scene::{Phase, Scene, Tool};
-use stylet::solver::stable_dt::stable_step;
+use stylet::solver::stable_dt::wave_speed_bound;
 
 use crate::common::*;
 
@@ -25,29 +25,17 @@ fn press(size: [f64; 3], cell: f64, tool: Tool, depth: f64) -> Arc<Model> {
         &mut scene,
         tool,
         DVec3::NEG_Z,
-        vec![
-            Phase::Insert {
-                speed: depth / time,
-                depth,
-            },
-            Phase::Hold {
-                duration: 2.0 * time,
-            },
-        ],
+        vec![Phase::Insert { speed: depth / time, depth }, Phase::Hold { duration: 2.0 * time }],
     );
     model(scene)
 }
 
 /// Axial force at the end and the largest energy gap over the work.
 fn force_at_rest(model: &Arc<Model>) -> Vec<(&'static str, f64)> {
-    let dt = 0.8 * stable_step(model).limit();
+    let dt = 0.8 * wave_speed_bound(model);
     let frames = 20;
     let steps = (model.duration() / dt) as usize / frames;
-    println!(
-        "{} cells, {} steps",
-        model.mesh.cell_count(),
-        steps * frames
-    );
+    println!("{} cells, {} steps", model.mesh.cell_count(), steps * frames);
     let mut found = Vec::new();
     for (name, mut engine) in engines(model, dt, steps) {
         let mut step = 0;
@@ -60,11 +48,7 @@ fn force_at_rest(model: &Arc<Model>) -> Vec<(&'static str, f64)> {
         }
         assert!(sums.kinetic < 1e-4 * sums.elastic, "{name}: not at rest");
         let audit = sums.elastic + sums.hourglass + sums.kinetic + sums.contact_energy + damped;
-        at_most(
-            &format!("{name}, energy gap over the work"),
-            (work - audit).abs() / work,
-            0.02,
-        );
+        at_most(&format!("{name}, energy gap over the work"), (work - audit).abs() / work, 0.02);
         let force = sums.impulse.z / (steps as f64 * dt);
         at_most(
             &format!("{name}, sideways over axial impulse"),
@@ -80,12 +64,7 @@ fn force_at_rest(model: &Arc<Model>) -> Vec<(&'static str, f64)> {
 fn a_sphere_presses_as_hertz_says() {
     let (radius, depth) = (8e-3, 0.5e-3);
     let height = 20e-3;
-    let model = press(
-        [32.0, 32.0, height * 1e3],
-        0.8,
-        Tool::Sphere { radius },
-        depth,
-    );
+    let model = press([32.0, 32.0, height * 1e3], 0.8, Tool::Sphere { radius }, depth);
     let nu = MATERIAL_A.poisson_ratio();
     let modulus = MATERIAL_A.youngs_modulus() / (1.0 - nu * nu);
     let hertz = 4.0 / 3.0 * modulus * radius.sqrt() * depth.powf(1.5);
@@ -102,12 +81,7 @@ fn a_sphere_presses_as_hertz_says() {
             force / (hertz * layer)
         );
         // Two cells per contact radius resolve a Hertz pressure to about 10 %.
-        close(
-            &format!("{name}, Hertz on a layer"),
-            *force,
-            hertz * layer,
-            0.1,
-        );
+        close(&format!("{name}, Hertz on a layer"), *force, hertz * layer, 0.1);
     }
     if let [(_, cpu), (_, gpu)] = found[..] {
         close("GPU over CPU", gpu, cpu, 1e-3);
@@ -117,26 +91,12 @@ fn a_sphere_presses_as_hertz_says() {
 #[test]
 fn a_bonded_punch_presses_as_the_closed_form_says() {
     let (radius, depth) = (3e-3, 0.2e-3);
-    let model = press(
-        [24.0, 24.0, 16.0],
-        1.0,
-        Tool::FlatPunch {
-            radius,
-            bonded: true,
-        },
-        depth,
-    );
+    let model = press([24.0, 24.0, 16.0], 1.0, Tool::FlatPunch { radius, bonded: true }, depth);
     let nu = MATERIAL_A.poisson_ratio();
     let half_space = 2.0 * MATERIAL_A.youngs_modulus() / (1.0 - nu * nu) * radius * depth;
     for (name, force) in force_at_rest(&model) {
-        println!(
-            "{name}: {force:.5e} N, {:.3} of the half-space",
-            force / half_space
-        );
+        println!("{name}: {force:.5e} N, {:.3} of the half-space", force / half_space);
         // The effective radius is uncertain by half a cell (1/6), the layer adds about 20 %.
-        assert!(
-            (0.85..1.45).contains(&(force / half_space)),
-            "{name}: {force}"
-        );
+        assert!((0.85..1.45).contains(&(force / half_space)), "{name}: {force}");
     }
 }

@@ -16,8 +16,7 @@ fn stress_from_energy(law: &MooneyRivlin, h: DMat3) -> DMat3 {
         for row in 0..3 {
             let mut e = DMat3::ZERO;
             e.col_mut(column)[row] = step;
-            p.col_mut(column)[row] =
-                (law.energy_density(h + e) - law.energy_density(h - e)) / (2.0 * step);
+            p.col_mut(column)[row] = (law.energy_density(h + e) - law.energy_density(h - e)) / (2.0 * step);
         }
     }
     p
@@ -39,18 +38,8 @@ fn with_jacobian(random: &mut Random, j: f64) -> DMat3 {
 fn the_stress_is_the_derivative_of_the_energy() {
     let mut random = Random(1);
     let mut worst: f64 = 0.0;
-    for law in [
-        MATERIAL_A,
-        MATERIAL_N,
-        MooneyRivlin {
-            c10: 500.0,
-            c01: 2500.0,
-            bulk_modulus: 2.0e5,
-        },
-    ] {
-        for j in [
-            1.0, 1.4, 0.9, 0.6, 0.31, 0.3, 0.29, 0.2, 0.05, 0.0, -0.1, -0.7, -1.5,
-        ] {
+    for law in [MATERIAL_A, MATERIAL_N, MooneyRivlin { c10: 500.0, c01: 2500.0, bulk_modulus: 2.0e5 }] {
+        for j in [1.0, 1.4, 0.9, 0.6, 0.31, 0.3, 0.29, 0.2, 0.05, 0.0, -0.1, -0.7, -1.5] {
             for _ in 0..20 {
                 let h = with_jacobian(&mut random, j) - DMat3::IDENTITY;
                 let p = law.first_piola_kirchhoff(h);
@@ -60,24 +49,15 @@ fn the_stress_is_the_derivative_of_the_energy() {
         }
     }
     // The third derivative of the energy limits a central difference of 1e-6 to about 1e-7 of the largest entry.
-    at_most(
-        "P against dW/dF, relative to the largest entry",
-        worst,
-        1e-6,
-    );
+    at_most("P against dW/dF, relative to the largest entry", worst, 1e-6);
 }
 
 #[test]
 fn a_wrong_coefficient_does_not_pass_the_derivative_test() {
-    let wrong = MooneyRivlin {
-        c01: MATERIAL_A.c01 * 1.01,
-        ..MATERIAL_A
-    };
+    let wrong = MooneyRivlin { c01: MATERIAL_A.c01 * 1.01, ..MATERIAL_A };
     let h = with_jacobian(&mut Random(2), 1.0) - DMat3::IDENTITY;
     let expected = stress_from_energy(&MATERIAL_A, h);
-    assert!(
-        largest_entry(wrong.first_piola_kirchhoff(h) - expected) / largest_entry(expected) > 1e-6
-    );
+    assert!(largest_entry(wrong.first_piola_kirchhoff(h) - expected) / largest_entry(expected) > 1e-6);
 }
 
 #[test]
@@ -89,15 +69,9 @@ fn energy_and_stress_are_continuous_where_the_continuation_begins() {
             f - DMat3::IDENTITY
         });
         random.signed();
-        let (p, q) = (
-            MATERIAL_A.first_piola_kirchhoff(above),
-            MATERIAL_A.first_piola_kirchhoff(below),
-        );
+        let (p, q) = (MATERIAL_A.first_piola_kirchhoff(above), MATERIAL_A.first_piola_kirchhoff(below));
         assert!(largest_entry(p - q) < 1e-7 * largest_entry(p));
-        let (w, v) = (
-            MATERIAL_A.energy_density(above),
-            MATERIAL_A.energy_density(below),
-        );
+        let (w, v) = (MATERIAL_A.energy_density(above), MATERIAL_A.energy_density(below));
         assert!((w - v).abs() < 1e-7 * w.abs());
     }
 }
@@ -108,9 +82,7 @@ fn a_rotation_alone_costs_nothing() {
     for _ in 0..50 {
         let r = DMat3::from_axis_angle(random.vector().normalize(), 3.0 * random.signed());
         let h = r - DMat3::IDENTITY;
-        assert!(
-            largest_entry(MATERIAL_A.first_piola_kirchhoff(h)) < 1e-8 * MATERIAL_A.bulk_modulus
-        );
+        assert!(largest_entry(MATERIAL_A.first_piola_kirchhoff(h)) < 1e-8 * MATERIAL_A.bulk_modulus);
         assert!(MATERIAL_A.energy_density(h).abs() < 1e-8 * MATERIAL_A.bulk_modulus);
     }
 }
@@ -152,28 +124,14 @@ fn homogeneous_states_in_f64() {
         // The file prints 12 digits of F; what half a unit of the last one can change comes on top.
         let at_print = row.law.first_piola_kirchhoff(h);
         let mut digits = 0.0;
-        for (entry, value) in row
-            .f
-            .to_cols_array()
-            .iter()
-            .enumerate()
-            .filter(|e| *e.1 != 0.0)
-        {
+        for (entry, value) in row.f.to_cols_array().iter().enumerate().filter(|e| *e.1 != 0.0) {
             let mut moved = h.to_cols_array();
             moved[entry] += 0.5 * 10f64.powf(value.abs().log10().floor() - 11.0);
-            digits += largest_entry(
-                row.law
-                    .first_piola_kirchhoff(DMat3::from_cols_array(&moved))
-                    - at_print,
-            );
+            digits += largest_entry(row.law.first_piola_kirchhoff(DMat3::from_cols_array(&moved)) - at_print);
         }
         let excess = |found: DMat3, expected: DMat3| {
             let difference = (largest_entry(found - expected) - digits).max(0.0);
-            if difference == 0.0 {
-                0.0
-            } else {
-                difference / largest_entry(expected)
-            }
+            if difference == 0.0 { 0.0 } else { difference / largest_entry(expected) }
         };
         let p = excess(row.law.first_piola_kirchhoff(h), row.p);
         let cauchy = excess(row.law.cauchy(h), row.cauchy);
@@ -216,11 +174,7 @@ fn homogeneous_states_through_the_element_stage() {
             if scale == 0.0 || row.f == DMat3::IDENTITY {
                 // Rest: nothing may push beyond the rounding of the deviatoric terms, which cancel each other.
                 let allowed = if *name == "gpu" { 1e-6 } else { 1e-12 };
-                assert!(
-                    largest_entry(p) < allowed * row.law.shear_modulus(),
-                    "{name} {}: {p}",
-                    row.label
-                );
+                assert!(largest_entry(p) < allowed * row.law.shear_modulus(), "{name} {}: {p}", row.label);
                 continue;
             }
             // kappa (J - 1) cof F is known no better than J - 1: one unit of the last place of f32 of its terms, which
@@ -229,29 +183,17 @@ fn homogeneous_states_through_the_element_stage() {
             let h = largest_entry(row.f - DMat3::IDENTITY);
             let jacobian = 1.2e-7 * h * h.powi(2).max(1.0) + 2.2e-8;
             let noise = row.law.bulk_modulus * largest_entry(cofactor(row.f)) * jacobian;
-            let (part, zero, noise) = if *name == "gpu" {
-                (1e-3, 1e-5, noise)
-            } else {
-                (1e-6, 1e-5, 0.0)
-            };
+            let (part, zero, noise) = if *name == "gpu" { (1e-3, 1e-5, noise) } else { (1e-6, 1e-5, 0.0) };
             for (found, expected) in p.to_cols_array().iter().zip(row.p.to_cols_array()) {
                 let difference = (found - expected).abs();
                 let is_zero = expected.abs() <= 1e-6 * scale;
-                let allowed = if is_zero {
-                    zero * scale
-                } else {
-                    part * expected.abs()
-                } + noise;
+                let allowed = if is_zero { zero * scale } else { part * expected.abs() } + noise;
                 let measure = if is_zero { &mut worst_zero } else { &mut worst };
                 // Told are the entries that count: large ones, of states beyond small strain.
                 if h > 0.01 && (is_zero || expected.abs() > 0.1 * scale) {
                     measure[kind] = measure[kind].max(difference / scale);
                 }
-                assert!(
-                    difference <= allowed,
-                    "{name} {}: {found} instead of {expected} of {scale}",
-                    row.label
-                );
+                assert!(difference <= allowed, "{name} {}: {found} instead of {expected} of {scale}", row.label);
             }
         }
     }

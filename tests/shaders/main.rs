@@ -18,28 +18,19 @@ const SCENES: [(bool, bool); 4] = [(false, false), (true, false), (false, true),
 fn effect_set(wanted: impl Fn(usize) -> bool) -> EffectSet {
     let set = EffectSet {
         mass_scaling: wanted(0).then_some(mass_scaling::Params { factor: 100.0 }),
-        gravity: wanted(1).then_some(gravity::Params {
-            acceleration: DVec3::NEG_Z,
-        }),
+        gravity: wanted(1).then_some(gravity::Params { acceleration: DVec3::NEG_Z }),
         puncture: wanted(2).then(puncture::Params::default),
         indentation: wanted(3).then(indentation::Params::default),
         friction: wanted(4).then(friction::Params::default),
     };
-    let expected: Vec<&str> = EFFECTS
-        .iter()
-        .enumerate()
-        .filter(|e| wanted(e.0))
-        .map(|e| e.1.key)
-        .collect();
+    let expected: Vec<&str> = EFFECTS.iter().enumerate().filter(|e| wanted(e.0)).map(|e| e.1.key).collect();
     assert_eq!(set.keys(), expected, "order of the effect table");
     set
 }
 
 /// All 32 subsets: none, every single one, all pairs, all together and what lies between.
 fn all_sets() -> Vec<EffectSet> {
-    (0..1usize << EFFECTS.len())
-        .map(|bits| effect_set(|i| bits >> i & 1 == 1))
-        .collect()
+    (0..1usize << EFFECTS.len()).map(|bits| effect_set(|i| bits >> i & 1 == 1)).collect()
 }
 
 /// All stages of a set of effects.
@@ -47,10 +38,7 @@ fn reflected(set: &EffectSet, (loaded, driven): (bool, bool)) -> Vec<Reflected> 
     let defines = defines(set, loaded, driven);
     stages(set)
         .into_iter()
-        .map(|stage| {
-            reflect(stage, &defines)
-                .unwrap_or_else(|e| panic!("{:?} {loaded} {driven}: {e}", set.keys()))
-        })
+        .map(|stage| reflect(stage, &defines).unwrap_or_else(|e| panic!("{:?} {loaded} {driven}: {e}", set.keys())))
         .collect()
 }
 
@@ -68,10 +56,7 @@ fn everything() -> &'static [(String, Reflected)] {
                     let composed = compose(&format!("stages/{}", stage.name()), &defines);
                     let composed = composed.unwrap_or_else(|e| panic!("{what}: {e}"));
                     if seen.insert(composed.source) {
-                        all.push((
-                            what.clone(),
-                            reflect(stage, &defines).unwrap_or_else(|e| panic!("{what}: {e}")),
-                        ));
+                        all.push((what.clone(), reflect(stage, &defines).unwrap_or_else(|e| panic!("{what}: {e}"))));
                     }
                 }
             }
@@ -86,15 +71,8 @@ fn every_combination_composes_validates_and_keeps_the_budget() {
     for (place, r) in everything() {
         let storage = r.bindings.iter().filter(|b| !b.uniform).count();
         assert!(storage <= 8, "{place}: {storage} storage buffers");
-        assert!(
-            r.bindings.iter().all(|b| b.group < 4),
-            "{place}: more than 4 groups"
-        );
-        assert!(
-            r.workgroup_size <= 256,
-            "{place}: workgroup of {}",
-            r.workgroup_size
-        );
+        assert!(r.bindings.iter().all(|b| b.group < 4), "{place}: more than 4 groups");
+        assert!(r.workgroup_size <= 256, "{place}: workgroup of {}", r.workgroup_size);
         let memory: u32 = r
             .module
             .global_variables
@@ -102,22 +80,15 @@ fn every_combination_composes_validates_and_keeps_the_budget() {
             .filter(|(_, v)| v.space == naga::AddressSpace::WorkGroup)
             .map(|(_, v)| r.module.types[v.ty].inner.size(r.module.to_ctx()))
             .sum();
-        assert!(
-            memory <= 16 * 1024,
-            "{place}: {memory} bytes of workgroup memory"
-        );
+        assert!(memory <= 16 * 1024, "{place}: {memory} bytes of workgroup memory");
         for (_, ty) in r.module.types.iter() {
             let scalar = match ty.inner {
                 naga::TypeInner::Scalar(s) | naga::TypeInner::Atomic(s) => Some(s),
-                naga::TypeInner::Vector { scalar, .. } | naga::TypeInner::Matrix { scalar, .. } => {
-                    Some(scalar)
-                }
+                naga::TypeInner::Vector { scalar, .. } | naga::TypeInner::Matrix { scalar, .. } => Some(scalar),
                 _ => None,
             };
             assert!(
-                scalar.is_none_or(
-                    |s| s.width <= 4 && !(s.kind == naga::ScalarKind::Float && s.width != 4)
-                ),
+                scalar.is_none_or(|s| s.width <= 4 && !(s.kind == naga::ScalarKind::Float && s.width != 4)),
                 "{place}: a type that is not portable: {ty:?}"
             );
         }
@@ -136,19 +107,12 @@ fn every_combination_composes_validates_and_keeps_the_budget() {
 
 /// Source without comments.
 fn code(source: &str) -> String {
-    source
-        .lines()
-        .map(|l| l.split("//").next().unwrap_or(""))
-        .collect::<Vec<_>>()
-        .join("\n")
+    source.lines().map(|l| l.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
 }
 
 /// Identifiers of a source.
 fn words(source: &str) -> BTreeSet<&str> {
-    source
-        .split(|c: char| !c.is_alphanumeric() && c != '_')
-        .filter(|w| !w.is_empty())
-        .collect()
+    source.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty()).collect()
 }
 
 #[test]
@@ -164,17 +128,9 @@ fn a_name_has_one_place_and_a_place_one_name() {
             };
             let name = variable.name.clone().unwrap();
             let place = (binding.group, binding.binding);
-            assert_eq!(
-                *place_of.entry(name.clone()).or_insert(place),
-                place,
-                "{name} moves: {what}"
-            );
+            assert_eq!(*place_of.entry(name.clone()).or_insert(place), place, "{name} moves: {what}");
             let uniform = variable.space == naga::AddressSpace::Uniform;
-            assert_eq!(
-                *kind_of.entry(name.clone()).or_insert(uniform),
-                uniform,
-                "{name}: {what}"
-            );
+            assert_eq!(*kind_of.entry(name.clone()).or_insert(uniform), uniform, "{name}: {what}");
             let other = name_at.entry(place).or_insert(name.clone());
             assert_eq!(*other, name, "{place:?} has two names: {what}");
         }
@@ -190,14 +146,10 @@ fn shader_structs() -> BTreeMap<String, ShaderStruct> {
     let mut found: BTreeMap<String, ShaderStruct> = BTreeMap::new();
     for r in reflected(&effect_set(|_| true), (true, true)) {
         for (_, ty) in r.module.types.iter() {
-            let (naga::TypeInner::Struct { members, span }, Some(name)) = (&ty.inner, &ty.name)
-            else {
+            let (naga::TypeInner::Struct { members, span }, Some(name)) = (&ty.inner, &ty.name) else {
                 continue;
             };
-            let members = members
-                .iter()
-                .map(|m| (m.name.clone().unwrap_or_default(), m.offset))
-                .collect();
+            let members = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect();
             let this: ShaderStruct = (*span, members);
             let known = found.entry(name.clone()).or_insert(this.clone());
             assert_eq!(*known, this, "struct {name} differs between stages");
@@ -207,37 +159,22 @@ fn shader_structs() -> BTreeMap<String, ShaderStruct> {
 }
 
 /// Differences between a host struct and its shader struct, one sentence each.
-fn layout_differences(
-    name: &str,
-    size: usize,
-    fields: &[(&str, usize)],
-    shader: Option<&ShaderStruct>,
-) -> Vec<String> {
+fn layout_differences(name: &str, size: usize, fields: &[(&str, usize)], shader: Option<&ShaderStruct>) -> Vec<String> {
     let Some((span, members)) = shader else {
         return vec![format!("struct {name}: not in any shader")];
     };
     let mut wrong = Vec::new();
     if size != *span as usize {
-        wrong.push(format!(
-            "struct {name}: {size} bytes on the host, {span} in the shader"
-        ));
+        wrong.push(format!("struct {name}: {size} bytes on the host, {span} in the shader"));
     }
     if fields.len() != members.len() {
-        wrong.push(format!(
-            "struct {name}: {} fields on the host, {} in the shader",
-            fields.len(),
-            members.len()
-        ));
+        wrong.push(format!("struct {name}: {} fields on the host, {} in the shader", fields.len(), members.len()));
     }
     for ((field, offset), (member, place)) in fields.iter().zip(members) {
         if field != member {
-            wrong.push(format!(
-                "struct {name}: field {field} on the host is {member} in the shader"
-            ));
+            wrong.push(format!("struct {name}: field {field} on the host is {member} in the shader"));
         } else if *offset != *place as usize {
-            wrong.push(format!(
-                "struct {name}, field {field}: offset {offset} on the host, {place} in the shader"
-            ));
+            wrong.push(format!("struct {name}, field {field}: offset {offset} on the host, {place} in the shader"));
         }
     }
     wrong
@@ -253,17 +190,9 @@ fn host_structs_lie_as_the_shaders_read_them() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // Structs that live in buffers must be known to the host.
     let host: BTreeSet<&str> = layouts().into_iter().map(|l| l.0).collect();
-    let local = [
-        "CellEnergy",
-        "IsochoricFactors",
-        "StressState",
-        "AnchorPlace",
-    ];
+    let local = ["CellEnergy", "IsochoricFactors", "StressState", "AnchorPlace"];
     for name in shader.keys().filter(|n| !local.contains(&n.as_str())) {
-        assert!(
-            host.contains(name.as_str()),
-            "struct {name} of the shaders is unknown to the host"
-        );
+        assert!(host.contains(name.as_str()), "struct {name} of the shaders is unknown to the host");
     }
 }
 
@@ -276,15 +205,9 @@ fn a_wrong_layout_is_found_and_named() {
     let mut shifted = fields.clone();
     shifted[2].1 += 4;
     let wrong = layout_differences(name, *size, &shifted, shader.get(*name));
-    assert_eq!(
-        wrong,
-        ["struct CellEdge, field quarter_inverse: offset 12 on the host, 8 in the shader"]
-    );
+    assert_eq!(wrong, ["struct CellEdge, field quarter_inverse: offset 12 on the host, 8 in the shader"]);
     let wrong = layout_differences(name, *size + 16, fields, shader.get(*name));
-    assert_eq!(
-        wrong,
-        ["struct CellEdge: 32 bytes on the host, 16 in the shader"]
-    );
+    assert_eq!(wrong, ["struct CellEdge: 32 bytes on the host, 16 in the shader"]);
     let mut renamed = fields.clone();
     renamed.swap(0, 1);
     assert!(layout_differences(name, *size, &renamed, shader.get(*name))[0].contains("cube_root"));
@@ -292,36 +215,19 @@ fn a_wrong_layout_is_found_and_named() {
 
 /// Words that would betray an effect, by its key.
 const TRACES: [(&str, &[&str]); 5] = [
-    (
-        "mass_scaling",
-        &["mass_scaling", "stable_mass", "selective"],
-    ),
+    ("mass_scaling", &["mass_scaling", "stable_mass", "selective"]),
     ("gravity", &["gravity", "free fall"]),
-    (
-        "puncture",
-        &["puncture", "tip_", "needle", "soften", "remaining"],
-    ),
+    ("puncture", &["puncture", "tip_", "needle", "soften", "remaining"]),
     ("indentation", &["indent", "punch"]),
     ("friction", &["friction", "stick_", "coulomb"]),
 ];
 
 /// Lower-case source and binding names of all stages of a set.
 fn text_of(set: &EffectSet, scene: (bool, bool)) -> Vec<(&'static str, String)> {
-    let names = |r: &Reflected| {
-        r.bindings
-            .iter()
-            .map(|b| b.name.clone())
-            .collect::<Vec<_>>()
-            .join(" ")
-    };
+    let names = |r: &Reflected| r.bindings.iter().map(|b| b.name.clone()).collect::<Vec<_>>().join(" ");
     reflected(set, scene)
         .iter()
-        .map(|r| {
-            (
-                r.stage.name(),
-                format!("{}\n{}", r.composed.source, names(r)).to_lowercase(),
-            )
-        })
+        .map(|r| (r.stage.name(), format!("{}\n{}", r.composed.source, names(r)).to_lowercase()))
         .collect()
 }
 
@@ -330,13 +236,10 @@ fn without_effects_the_shaders_know_nothing_of_them() {
     let none = effect_set(|_| false);
     for scene in SCENES {
         for (stage, text) in text_of(&none, scene) {
-            for word in [
-                "contact", "friction", "cutting", "puncture", "needle", "tip", "stick", "indent",
-            ] {
+            for word in ["contact", "friction", "cutting", "puncture", "needle", "tip", "stick", "indent"] {
                 // The one struct of a step's input serves all scenes that have one; it alone may speak of a tool.
                 let mut lines = text.lines().filter(|l| l.contains(word));
-                let found =
-                    lines.find(|l| !(scene != (false, false) && step_input_lines().contains(*l)));
+                let found = lines.find(|l| !(scene != (false, false) && step_input_lines().contains(*l)));
                 assert!(found.is_none(), "{stage} {scene:?}: {word:?} in {found:?}");
             }
         }
@@ -345,10 +248,7 @@ fn without_effects_the_shaders_know_nothing_of_them() {
 
 /// Lower-case lines of shared/step_input.
 fn step_input_lines() -> BTreeSet<String> {
-    let (_, text) = SOURCES
-        .iter()
-        .find(|(name, _)| *name == "shared/step_input")
-        .unwrap();
+    let (_, text) = SOURCES.iter().find(|(name, _)| *name == "shared/step_input").unwrap();
     text.lines().map(str::to_lowercase).collect()
 }
 
@@ -367,23 +267,13 @@ fn an_absent_effect_leaves_no_trace() {
                     .collect();
                 let mut lines = text.lines().filter(|l| l.contains(word));
                 let found = lines.find(|l| !known.contains(*l));
-                assert!(
-                    found.is_none(),
-                    "{stage} without {key}: {word:?} in {found:?}"
-                );
+                assert!(found.is_none(), "{stage} without {key}: {word:?} in {found:?}");
             }
         }
         // Not a vacuous search: with the effect alone (or with a tool, for friction) the words are there.
-        let present =
-            effect_set(|i| i == absent || (*key == "friction" && EFFECTS[i].key == "puncture"));
-        let all: String = text_of(&present, (false, false))
-            .into_iter()
-            .map(|t| t.1)
-            .collect();
-        assert!(
-            traces.iter().any(|word| all.contains(word)),
-            "{key}: none of {traces:?} with it"
-        );
+        let present = effect_set(|i| i == absent || (*key == "friction" && EFFECTS[i].key == "puncture"));
+        let all: String = text_of(&present, (false, false)).into_iter().map(|t| t.1).collect();
+        assert!(traces.iter().any(|word| all.contains(word)), "{key}: none of {traces:?} with it");
     }
 }
 
@@ -398,46 +288,28 @@ fn every_file_and_every_define_is_used() {
         let path = format!("{}/shaders/{name}.wgsl", env!("CARGO_MANIFEST_DIR"));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), *text, "{path}");
     }
-    for define in SCENE_DEFINES
-        .into_iter()
-        .chain(EFFECTS.iter().map(|e| e.define))
-    {
+    for define in SCENE_DEFINES.into_iter().chain(EFFECTS.iter().map(|e| e.define)) {
         let test = |text: &str| text.lines().any(|l| l.trim() == format!("#ifdef {define}"));
         let stage_of_its_own = ["INDENTATION"];
-        assert!(
-            SOURCES.iter().any(|s| test(s.1)) || stage_of_its_own.contains(&define),
-            "no shader asks for {define}"
-        );
+        assert!(SOURCES.iter().any(|s| test(s.1)) || stage_of_its_own.contains(&define), "no shader asks for {define}");
     }
 }
 
 #[test]
 fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
-    for (name, text) in SOURCES
-        .iter()
-        .filter(|s| s.0 == "stages/element_forces" || s.0 == "stages/integrate_nodes")
-    {
+    for (name, text) in SOURCES.iter().filter(|s| s.0 == "stages/element_forces" || s.0 == "stages/integrate_nodes") {
         let mut last = 0;
         // Imports stand at the top of a file, blocks of code in its functions.
         let body = text.split("fn ").skip(1).collect::<Vec<_>>().join("fn ");
-        for line in body
-            .lines()
-            .filter_map(|l| l.trim().strip_prefix("#ifdef "))
-        {
+        for line in body.lines().filter_map(|l| l.trim().strip_prefix("#ifdef ")) {
             let Some(place) = EFFECTS.iter().position(|e| e.define == line) else {
                 continue;
             };
-            assert!(
-                place >= last,
-                "{name}: the block of {line} comes out of order"
-            );
+            assert!(place >= last, "{name}: the block of {line} comes out of order");
             last = place;
         }
         for effect in &EFFECTS {
-            let count = body
-                .lines()
-                .filter(|l| l.trim() == format!("#ifdef {}", effect.define))
-                .count();
+            let count = body.lines().filter(|l| l.trim() == format!("#ifdef {}", effect.define)).count();
             assert!(count <= 1, "{name}: {count} blocks of {}", effect.key);
         }
     }
@@ -447,10 +319,7 @@ fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
 fn the_readme_lists_the_stages_of_the_step() {
     let path = format!("{}/README.md", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&path).unwrap_or_default();
-    let section = text
-        .split("\n## Stages")
-        .nth(1)
-        .unwrap_or_else(|| panic!("{path} has no heading `## Stages`"));
+    let section = text.split("\n## Stages").nth(1).unwrap_or_else(|| panic!("{path} has no heading `## Stages`"));
     let section = section.split("\n## ").next().unwrap_or_default();
     let listed: Vec<&str> = section
         .lines()
@@ -463,10 +332,7 @@ fn the_readme_lists_the_stages_of_the_step() {
 
 #[test]
 fn every_stage_has_a_file_and_every_file_a_stage() {
-    let files: Vec<&str> = SOURCES
-        .iter()
-        .filter_map(|s| s.0.strip_prefix("stages/"))
-        .collect();
+    let files: Vec<&str> = SOURCES.iter().filter_map(|s| s.0.strip_prefix("stages/")).collect();
     let mut names: Vec<&str> = Stage::ALL.iter().map(|s| s.name()).collect();
     names.sort_unstable();
     assert_eq!(files, names);
@@ -480,45 +346,14 @@ fn a_broken_stage_names_file_and_line() {
     let composed = compose("stages/needle_contact", &defines(&set, false, false)).unwrap();
     for (index, line) in composed.source.lines().enumerate() {
         let place = composed.place(index + 1);
-        let (file, number) = place
-            .strip_prefix("shaders/")
-            .unwrap()
-            .split_once(".wgsl:")
-            .unwrap();
+        let (file, number) = place.strip_prefix("shaders/").unwrap().split_once(".wgsl:").unwrap();
         let text = SOURCES.iter().find(|s| s.0 == file).unwrap().1;
-        assert_eq!(
-            text.lines()
-                .nth(number.parse::<usize>().unwrap() - 1)
-                .unwrap(),
-            line,
-            "{place}"
-        );
+        assert_eq!(text.lines().nth(number.parse::<usize>().unwrap() - 1).unwrap(), line, "{place}");
     }
     // A define without the others that belong to it: `driven_faces` then names a step input that nobody imported.
-    let error = reflect(Stage::IntegrateNodes, &BTreeSet::from(["DRIVEN_FACES"]))
-        .err()
-        .unwrap()
-        .to_string();
-    assert!(
-        error.contains("shaders/shared/driven_faces.wgsl:"),
-        "{error}"
-    );
-    let line: usize = error
-        .split("driven_faces.wgsl:")
-        .nth(1)
-        .unwrap()
-        .split('\n')
-        .next()
-        .unwrap()
-        .parse()
-        .unwrap();
-    let text = SOURCES
-        .iter()
-        .find(|s| s.0 == "shared/driven_faces")
-        .unwrap()
-        .1;
-    assert!(
-        text.lines().nth(line - 1).unwrap().contains("step_input"),
-        "line {line} of driven_faces: {error}"
-    );
+    let error = reflect(Stage::IntegrateNodes, &BTreeSet::from(["DRIVEN_FACES"])).err().unwrap().to_string();
+    assert!(error.contains("shaders/shared/driven_faces.wgsl:"), "{error}");
+    let line: usize = error.split("driven_faces.wgsl:").nth(1).unwrap().split('\n').next().unwrap().parse().unwrap();
+    let text = SOURCES.iter().find(|s| s.0 == "shared/driven_faces").unwrap().1;
+    assert!(text.lines().nth(line - 1).unwrap().contains("step_input"), "line {line} of driven_faces: {error}");
 }
