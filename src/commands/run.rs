@@ -222,12 +222,13 @@ pub fn describe(summary: &Summary) -> String {
         summary.wall_s,
         summary.real_time_factor
     );
-    if summary.peak_force_n.is_some() {
+    if let (Some(peak), Some(depth)) = (summary.puncture_force_n, summary.puncture_depth_m) {
+        let after = newton(summary.force_after_puncture_n);
+        text += &format!("puncture: {peak:.3} N at {:.2} mm, then {after}\n", depth * 1e3);
+    }
+    if summary.peak_force_n.is_some_and(|f| f != 0.0) {
         text += &format!(
-            "force: puncture {} at {}, then {}; {} at {}; largest {}\n",
-            newton(summary.puncture_force_n),
-            mm(summary.puncture_depth_m),
-            newton(summary.force_after_puncture_n),
+            "force: {} at {}; largest {}\n",
             newton(summary.force_at_max_depth_n),
             mm(summary.max_depth_m),
             newton(summary.peak_force_n),

@@ -52,7 +52,7 @@ pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, Str
 /// The text for a file that cannot be read.
 fn unreadable(path: &Path, error: &std::io::Error) -> String {
     let name = path.display();
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("scenes"));
     let mut scenes: Vec<String> = std::fs::read_dir(folder)
         .into_iter()
         .flatten()
