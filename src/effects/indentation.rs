@@ -11,7 +11,7 @@ pub const EFFECT: Effect = Effect {
     define: "INDENTATION",
     summary: "contact of the top face with a rigid sphere or flat punch",
     source: "Wriggers2006",
-    cost: "one dispatch and 96 B per top-face node near the tool",
+    cost: "one dispatch and 160 B per top-face node near the tool",
 };
 
 /// Parameters in SI units.
