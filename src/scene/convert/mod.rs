@@ -49,23 +49,34 @@ pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, Str
     check.scene(path, &file)
 }
 
-/// The text for a file that cannot be read.
-fn unreadable(path: &Path, error: &std::io::Error) -> String {
-    let name = path.display();
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("scenes"));
-    let mut scenes: Vec<String> = std::fs::read_dir(folder)
-        .into_iter()
-        .flatten()
-        .flatten()
+/// Names of the TOML files in a folder, sorted.
+fn toml_files(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .filter(|name| name.ends_with(".toml"))
         .collect();
-    scenes.sort();
+    names.sort();
+    names
+}
+
+/// The text for a file that cannot be read.
+fn unreadable(path: &Path, error: &std::io::Error) -> String {
+    let name = path.display();
+    let named = path.parent().filter(|p| !p.as_os_str().is_empty());
     let stem = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let way_out = match closest(&stem, scenes.iter().map(String::as_str)) {
-        Some(near) => format!("did you mean {}?", folder.join(near).display()),
+    // Beside the file first; a bare name may also mean one of the program's own scenes.
+    let folders = [named.unwrap_or(Path::new(".")), Path::new("scenes")];
+    let near = folders.iter().find_map(|folder| {
+        let scenes = toml_files(folder);
+        closest(&stem, scenes.iter().map(String::as_str)).map(|near| folder.join(near))
+    });
+    let listed = named.unwrap_or(Path::new("scenes"));
+    let scenes = toml_files(listed);
+    let way_out = match near {
+        Some(near) => format!("did you mean {}?", near.strip_prefix(".").unwrap_or(&near).display()),
         None if scenes.is_empty() => "give the path of a scene file (.toml); the program's own lie in scenes/".into(),
-        None => format!("scenes in {}: {}", folder.display(), scenes.join(", ")),
+        None => format!("scenes in {}: {}", listed.display(), scenes.join(", ")),
     };
     format!("error: cannot read the scene file {name}: {error}\n  = way out: {way_out}\n")
 }
