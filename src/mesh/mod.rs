@@ -1,6 +1,7 @@
-//! The structured, graded hexahedral block.
+//! Meshes: the structured, graded hexahedral block and unstructured tetrahedra.
 
 pub mod block;
+pub mod tets;
 
 use glam::DVec3;
 
