@@ -9,6 +9,7 @@ pub mod effects;
 pub mod error;
 pub mod gpu;
 pub mod material;
+pub mod material_point;
 pub mod mesh;
 pub mod model;
 pub mod needle;

@@ -3,9 +3,10 @@
 use glam::DVec3;
 
 use crate::effects::{EffectSet, puncture};
-use crate::mesh::BlockMesh;
+use crate::material_point::Material;
+use crate::mesh::{BlockMesh, Mesh};
 use crate::needle::{Kinematics, PlannedPath, lateral_axes};
-use crate::scene::{Face, FaceCondition, NeedleShape, Scene, Tool};
+use crate::scene::{Cutting, Face, FaceCondition, NeedleShape, RegionShape, Scene, TissueMaterial, Tool};
 
 /// A node that the tool may touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,9 +40,33 @@ pub struct TipAnchor {
     pub axial_offset: f64,
 }
 
+/// A stretch of the path through one material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathSegment {
+    /// Material coordinate at which it begins [m].
+    pub start: f64,
+    pub cutting: Cutting,
+}
+
+/// Most stretches of one path.
+pub const LARGEST_SEGMENT_COUNT: usize = 16;
+
+impl PuncturePlan {
+    /// Tip force at which the tip advances at the coordinate a [N]: from F_pun of the material that it enters down to
+    /// F_cut over the transition length.
+    pub fn threshold(&self, a: f64) -> f64 {
+        let after = self.segments.partition_point(|s| s.start <= a).max(1) - 1;
+        let PathSegment { start, cutting } = self.segments[after];
+        let entry = (1.0 - (a - start) / self.params.transition_length).max(0.0);
+        cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * entry
+    }
+}
+
 /// What the effect `puncture` prepares.
 #[derive(Debug, Clone)]
 pub struct PuncturePlan {
+    /// At least one, ascending.
+    pub segments: Vec<PathSegment>,
     pub params: puncture::Params,
     pub needle: NeedleShape,
     pub path: PlannedPath,
@@ -55,7 +80,13 @@ pub struct PuncturePlan {
 #[derive(Debug, Clone)]
 pub struct Model {
     pub scene: Scene,
-    pub mesh: BlockMesh,
+    pub mesh: Mesh,
+    /// Materials with the effects that are on: the scene's own, then one per region.
+    pub materials: Vec<Material>,
+    /// Index into `materials` per cell; empty where there is one material only.
+    pub cell_material: Vec<u8>,
+    /// Per node: bits 0..2 held or driven components x, y, z; bits 3..8 the faces that it lies on.
+    pub node_flags: Vec<u32>,
     pub effects: EffectSet,
     pub kinematics: Option<Kinematics>,
     /// Nodal mass including the uniform mass scaling [kg].
@@ -77,14 +108,22 @@ pub const ANCHOR_COUNT: usize = 19;
 
 impl Model {
     /// Prepares a scene. The mesh is built from the scene by `BlockMesh::for_scene`.
-    pub fn new(scene: Scene, mesh: BlockMesh) -> Self {
+    pub fn new(scene: Scene, mesh: impl Into<Mesh>) -> Self {
+        let mesh = mesh.into();
         let scaling = scene.effects.mass_scaling.map_or(1.0, |m| m.factor);
-        let density = scene.material.density * scaling;
-        let node_mass = (0..mesh.node_count()).map(|n| density * mesh.node_volume(n)).collect();
+        let materials: Vec<Material> = std::iter::once(&scene.material)
+            .chain(scene.regions.iter().map(|r| &r.material))
+            .map(|m| constants(m, &scene.effects))
+            .collect();
+        let cell_material = if scene.regions.is_empty() { Vec::new() } else { assign_materials(&scene, &mesh) };
+        let node_mass = nodal_masses(&mesh, &materials, &cell_material, scaling);
         let (node_load, load_ramp) = nodal_loads(&scene, &mesh);
         let kinematics = (!scene.motion.phases.is_empty()).then(|| Kinematics::new(&scene.motion));
         let mut model = Model {
             effects: scene.effects.clone(),
+            node_flags: node_flags(&scene, &mesh),
+            materials,
+            cell_material,
             node_mass,
             node_load,
             load_ramp,
@@ -114,15 +153,29 @@ impl Model {
         (self.scene.material.law.p_wave_modulus() / self.scaled_density()).sqrt()
     }
 
-    /// Smallest cell edge [m].
-    pub fn smallest_edge(&self) -> f64 {
-        let steps = self.mesh.lines.iter().flat_map(|l| l.windows(2).map(|w| w[1] - w[0]));
-        steps.fold(f64::INFINITY, f64::min)
+    /// Index into `materials` of a cell.
+    pub fn material_index(&self, cell: usize) -> usize {
+        self.cell_material.get(cell).map_or(0, |m| usize::from(*m))
+    }
+
+    /// Material of a cell.
+    pub fn material(&self, cell: usize) -> &Material {
+        &self.materials[self.material_index(cell)]
+    }
+
+    /// True where cells remember something.
+    pub fn has_history(&self) -> bool {
+        self.effects.plasticity.is_some() || self.effects.viscoelastic.is_some()
+    }
+
+    /// Largest number of Prony terms of a material.
+    pub fn prony_term_count(&self) -> usize {
+        self.materials.iter().filter_map(|m| m.viscoelastic.as_ref()).map(|v| v.terms.len()).max().unwrap_or(0)
     }
 
     /// Largest nodal speed that is let through: 0.05 of the smallest edge per step [m/s].
     pub fn speed_limit(&self, dt: f64) -> f64 {
-        0.05 * self.smallest_edge() / dt
+        0.05 * self.mesh.smallest_edge() / dt
     }
 
     /// Stiffness of a penalty contact, `factor (K + 4/3 mu) l^2 / h` with the reference length l = 0.6 mm [N/m].
@@ -141,7 +194,7 @@ impl Model {
         let needle = needle.clone();
         let path = PlannedPath { entry: self.scene.motion.entry, direction: self.scene.motion.direction };
         let deepest = self.scene.motion.deepest();
-        let mesh = &self.mesh;
+        let Some(mesh) = self.mesh.as_block() else { return };
         let cells = path_cells(mesh, &path, params.softened_radius, deepest);
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the needle radius.
         let anchor_reach = needle.radius + self.scene.tissue.cell_size * 1.5;
@@ -159,6 +212,7 @@ impl Model {
             })
             .collect();
         self.puncture = Some(PuncturePlan {
+            segments: path_segments(&self.scene, &params, &path, deepest),
             anchors: tip_anchors(&path, needle.radius),
             cells,
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
@@ -173,7 +227,7 @@ impl Model {
             (Some(_), Some(Tool::Sphere { radius } | Tool::FlatPunch { radius, .. })) => *radius,
             _ => return,
         };
-        let mesh = &self.mesh;
+        let Some(mesh) = self.mesh.as_block() else { return };
         let entry = self.scene.motion.entry;
         let top = mesh.nodes()[2] - 1;
         self.contact_nodes = (0..mesh.node_count())
@@ -215,18 +269,12 @@ impl Model {
 
     /// Which displacement components of a node are held or driven by a face.
     pub fn fixed_components(&self, node: usize) -> [bool; 3] {
-        let c = self.mesh.node_coordinates(node);
-        let n = self.mesh.nodes();
-        let mut fixed = [false; 3];
-        for face in Face::ALL {
-            let a = face.axis();
-            if c[a] == if face.is_max() { n[a] - 1 } else { 0 } {
-                for (f, g) in fixed.iter_mut().zip(self.faces()[face as usize].fixed) {
-                    *f |= g;
-                }
-            }
-        }
-        fixed
+        std::array::from_fn(|a| self.node_flags[node] >> a & 1 == 1)
+    }
+
+    /// True where a node lies on a face of the bounding box.
+    pub fn lies_on(&self, node: usize, face: Face) -> bool {
+        self.node_flags[node] >> (3 + face as usize) & 1 == 1
     }
 
     /// True where a face moves by prescription.
@@ -236,15 +284,98 @@ impl Model {
 
     /// Centre of a face at rest [m].
     pub fn face_centre(&self, face: Face) -> DVec3 {
-        let mid = |a: usize| {
-            let l = &self.mesh.lines[a];
-            0.5 * (l[0] + l[l.len() - 1])
-        };
-        let mut centre = DVec3::new(mid(0), mid(1), mid(2));
-        let lines = &self.mesh.lines[face.axis()];
-        centre[face.axis()] = if face.is_max() { lines[lines.len() - 1] } else { lines[0] };
+        let (low, high) = self.mesh.bounds();
+        let mut centre = 0.5 * (low + high);
+        centre[face.axis()] = if face.is_max() { high } else { low }[face.axis()];
         centre
     }
+}
+
+/// A material with the effects that are on; what it does not state itself comes from the scene's tables.
+fn constants(material: &TissueMaterial, effects: &crate::effects::EffectSet) -> Material {
+    Material {
+        law: material.law,
+        density: material.density,
+        plasticity: effects.plasticity.map(|p| material.plasticity.unwrap_or(p)),
+        fibres: effects.fibres.map(|p| material.fibres.unwrap_or(p)),
+        viscoelastic: effects.viscoelastic.clone().map(|p| material.viscoelastic.clone().unwrap_or(p)),
+        damage: effects.damage.map(|p| material.damage.unwrap_or(p)),
+    }
+}
+
+/// Material of every cell: the last region that holds its centre, else the scene's own.
+fn assign_materials(scene: &Scene, mesh: &Mesh) -> Vec<u8> {
+    let holds = |shape: &RegionShape, cell: usize| match (shape, mesh) {
+        (RegionShape::MeshTag(name), Mesh::Tets(tets)) => tets.regions[tets.tags[cell] as usize] == *name,
+        _ => shape.contains(mesh.cell_centre(cell)),
+    };
+    (0..mesh.cell_count())
+        .map(|cell| scene.regions.iter().rposition(|r| holds(&r.shape, cell)).map_or(0, |i| i as u8 + 1))
+        .collect()
+}
+
+/// Lumped masses [kg].
+fn nodal_masses(mesh: &Mesh, materials: &[Material], cell_material: &[u8], scaling: f64) -> Vec<f64> {
+    let mut mass = vec![0.0; mesh.node_count()];
+    for cell in 0..mesh.cell_count() {
+        let density = materials[cell_material.get(cell).map_or(0, |m| usize::from(*m))].density * scaling;
+        let nodes = mesh.cell_nodes(cell);
+        let share = density * mesh.cell_volume(cell) / nodes.len() as f64;
+        for node in nodes.iter() {
+            mass[*node] += share;
+        }
+    }
+    mass
+}
+
+/// Held components and faces of every node. A node of a tetrahedral mesh lies on a face where it lies on the bounding
+/// box, within a millionth of its diagonal.
+fn node_flags(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
+    let (low, high) = mesh.bounds();
+    let near = 1e-6 * (high - low).length();
+    let fixed_bits = |fixed: [bool; 3]| (0..3).map(|a| u32::from(fixed[a]) << a).sum::<u32>();
+    let mut flags: Vec<u32> = (0..mesh.node_count())
+        .map(|node| {
+            let x = mesh.rest_position(node);
+            let on = |face: &Face| {
+                let plane = if face.is_max() { high } else { low }[face.axis()];
+                (x[face.axis()] - plane).abs() <= near
+            };
+            Face::ALL
+                .into_iter()
+                .filter(on)
+                .fold(0, |flags, face| flags | 1 << (3 + face as usize) | fixed_bits(scene.faces[face as usize].fixed))
+        })
+        .collect();
+    if let Mesh::Tets(tets) = mesh {
+        for support in &scene.supports {
+            for node in tets.node_sets.get(&support.set).into_iter().flatten() {
+                flags[*node as usize] |= fixed_bits(support.fixed);
+            }
+        }
+    }
+    flags
+}
+
+/// Stretches of the path with their own tip forces, from the materials that its axis passes through.
+fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, deepest: f64) -> Vec<PathSegment> {
+    const STEP: f64 = 2.0e-5;
+    let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
+    let at = |a: f64| {
+        let x = path.entry + path.direction * a;
+        let region = scene.regions.iter().rposition(|r| r.shape.contains(x));
+        (region, region.map_or(scene.material.cutting, |r| scene.regions[r].material.cutting).unwrap_or(own))
+    };
+    let mut segments: Vec<(Option<usize>, PathSegment)> = Vec::new();
+    for i in 0..=(deepest / STEP).ceil() as usize {
+        // The surface itself belongs to what lies under it.
+        let a = i as f64 * STEP;
+        let (region, cutting) = at(a + 0.5 * STEP);
+        if segments.last().is_none_or(|(last, _)| *last != region) {
+            segments.push((region, PathSegment { start: a, cutting }));
+        }
+    }
+    segments.into_iter().map(|s| s.1).take(LARGEST_SEGMENT_COUNT).collect()
 }
 
 /// Lines on which the tip springs are anchored.
@@ -300,7 +431,8 @@ fn path_cells(mesh: &BlockMesh, path: &PlannedPath, radius: f64, deepest: f64) -
 }
 
 /// Nodal forces of all face tractions at full ramp [N], and the ramp time [s].
-fn nodal_loads(scene: &Scene, mesh: &BlockMesh) -> (Vec<DVec3>, f64) {
+fn nodal_loads(scene: &Scene, mesh: &Mesh) -> (Vec<DVec3>, f64) {
+    let Some(mesh) = mesh.as_block() else { return (Vec::new(), 0.0) };
     let loaded: Vec<Face> = Face::ALL.into_iter().filter(|&f| scene.faces[f as usize].traction.is_some()).collect();
     if loaded.is_empty() {
         return (Vec::new(), 0.0);

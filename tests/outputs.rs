@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
 use stylet::effects::EffectSet;
-use stylet::material::MooneyRivlin;
+use stylet::material::ElasticLaw;
 use stylet::mesh::BlockMesh;
 use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord};
 use stylet::output::folder::{ENERGY_TABLE, FORCE_CHART, FORCE_TABLE, SUMMARY};
@@ -120,12 +120,10 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
             growth: 1.25,
             axis_offset_cells: [0.0, 0.0],
         },
-        material: TissueMaterial {
-            name: "constants".into(),
-            source: "made up".into(),
-            law: MooneyRivlin { c10: 2e3, c01: 1e3, bulk_modulus: 1e5 },
-            density: 1060.0,
-        },
+        material: TissueMaterial::new("test", "test", ElasticLaw::mooney_rivlin(2e3, 1e3, 1e5), 1060.0),
+        regions: Vec::new(),
+        mesh: None,
+        supports: Vec::new(),
         faces: std::array::from_fn(|_| FaceCondition::default()),
         tool,
         motion: Motion {

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::effects::{EffectSet, friction, mass_scaling, puncture};
 use crate::error::Result;
 use crate::gpu::{Gpu, GpuEngine};
-use crate::material::MooneyRivlin;
+use crate::material::ElasticLaw;
 use crate::mesh::BlockMesh;
 use crate::model::Model;
 use crate::process;
@@ -97,12 +97,15 @@ fn scene(cells: [usize; 3], needle: bool) -> Scene {
             growth: 1.0,
             axis_offset_cells: [0.0, 0.0],
         },
-        material: TissueMaterial {
-            name: "constants".into(),
-            source: "E 60 kPa, nu 0.45".into(),
-            law: MooneyRivlin::from_moduli(shear, 60e3 / 0.3, 0.7),
-            density: 1060.0,
-        },
+        material: TissueMaterial::new(
+            "bench",
+            "E 60 kPa, nu 0.45",
+            ElasticLaw::from_moduli(shear, 60e3 / 0.3, 0.7),
+            1060.0,
+        ),
+        regions: Vec::new(),
+        mesh: None,
+        supports: Vec::new(),
         faces: [fixed.clone(), fixed.clone(), fixed.clone(), fixed.clone(), fixed, FaceCondition::default()],
         tool: needle.then(|| {
             Tool::Needle(NeedleShape {

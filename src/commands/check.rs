@@ -4,7 +4,8 @@ use std::fmt::Write;
 use std::time::Instant;
 
 use crate::error::Result;
-use crate::material::describe_verdict;
+use crate::material::{describe_constants, describe_verdict};
+use crate::mesh::Mesh;
 use crate::scene::{Face, Scene, Tool};
 use crate::solver::simulation::{EngineChoice, Simulation, tool_mach};
 use crate::solver::stable_dt::power_iteration;
@@ -26,21 +27,27 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     line(format!("scene        {} ({})", scene.name, scene.path.display()));
     line(format!("             {}", scene.title));
     let size = scene.tissue.size * 1e3;
-    let [nx, ny, nz] = model.mesh.cells();
+    let kind = match &model.mesh {
+        Mesh::Block(block) => {
+            let [nx, ny, nz] = block.cells();
+            format!("{nx} x {ny} x {nz} = ")
+        }
+        Mesh::Tets(_) => "tetrahedra, ".into(),
+    };
     line(format!(
-        "tissue       {} x {} x {} mm, {nx} x {ny} x {nz} = {} cells, {} nodes, smallest edge {:.3} mm",
+        "tissue       {} x {} x {} mm, {kind}{} cells, {} nodes, smallest edge {:.3} mm",
         size.x,
         size.y,
         size.z,
         model.mesh.cell_count(),
         model.mesh.node_count(),
-        model.smallest_edge() * 1e3
+        model.mesh.smallest_edge() * 1e3
     ));
     line(format!("material     {}: {}", scene.material.name, scene.material.source));
     line(format!(
-        "             c10 {:.3} kPa, c01 {:.3} kPa, density {} kg/m^3",
-        law.c10 / 1e3,
-        law.c01 / 1e3,
+        "             {}: {}, density {} kg/m^3",
+        law.isochoric.key(),
+        describe_constants(&law),
         scene.material.density
     ));
     line(format!(

@@ -1,16 +1,25 @@
 //! Effects are chosen by the scene. `None` means absent: no define, no buffer, no binding, no code.
 
+pub mod damage;
+pub mod fibres;
 pub mod friction;
 pub mod gravity;
 pub mod indentation;
 pub mod mass_scaling;
+pub mod plasticity;
 pub mod puncture;
+pub mod viscoelastic;
 
 /// The effects of one scene, one field per effect, in the order of [`EFFECTS`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EffectSet {
     pub mass_scaling: Option<mass_scaling::Params>,
     pub gravity: Option<gravity::Params>,
+    /// Parameters of materials that state none of their own; the same for the next three.
+    pub plasticity: Option<plasticity::Params>,
+    pub fibres: Option<fibres::Params>,
+    pub viscoelastic: Option<viscoelastic::Params>,
+    pub damage: Option<damage::Params>,
     pub puncture: Option<puncture::Params>,
     pub indentation: Option<indentation::Params>,
     pub friction: Option<friction::Params>,
@@ -32,8 +41,17 @@ pub struct Effect {
 }
 
 /// All effects. The order is the order of their blocks in the stages.
-pub const EFFECTS: [Effect; 5] =
-    [mass_scaling::EFFECT, gravity::EFFECT, puncture::EFFECT, indentation::EFFECT, friction::EFFECT];
+pub const EFFECTS: [Effect; 9] = [
+    mass_scaling::EFFECT,
+    gravity::EFFECT,
+    plasticity::EFFECT,
+    fibres::EFFECT,
+    viscoelastic::EFFECT,
+    damage::EFFECT,
+    puncture::EFFECT,
+    indentation::EFFECT,
+    friction::EFFECT,
+];
 
 impl EffectSet {
     /// Which effects are on, in the order of [`EFFECTS`].
@@ -41,6 +59,10 @@ impl EffectSet {
         [
             self.mass_scaling.is_some(),
             self.gravity.is_some(),
+            self.plasticity.is_some(),
+            self.fibres.is_some(),
+            self.viscoelastic.is_some(),
+            self.damage.is_some(),
             self.puncture.is_some(),
             self.indentation.is_some(),
             self.friction.is_some(),

@@ -134,7 +134,7 @@ impl GpuEngine {
     pub fn new(model: Arc<Model>, gpu: Gpu, dt: f64, max_steps: usize) -> Result<Self> {
         // Software adapters pay per buffer access: long strips share most planes. Hardware wants many threads.
         let layers = if gpu.is_software() { 8 } else { 4 };
-        let strips = Strips::new(model.mesh.cells(), layers);
+        let strips = Strips::new(model.mesh.block().cells(), layers);
         let defines = defines(&model.effects, !model.node_load.is_empty(), model.has_driven_faces());
         // Composing, validating and compiling go side by side: they are most of the time to the first step.
         let reflected = stages(&model.effects)
@@ -511,6 +511,7 @@ fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads
         "cell_edges" => {
             let edges: Vec<CellEdge> = model
                 .mesh
+                .block()
                 .lines
                 .iter()
                 .flat_map(|l| l.windows(2).map(|w| w[1] - w[0]))
@@ -525,7 +526,7 @@ fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads
         }
         "node_mass" => bytes_of(&model.node_mass.iter().map(|m| *m as f32).collect::<Vec<_>>()),
         "node_load" => bytes_of(&model.node_load.iter().map(|f| vec4(*f)).collect::<Vec<_>>()),
-        "grid_lines" => bytes_of(&model.mesh.lines.iter().flatten().map(|x| *x as f32).collect::<Vec<_>>()),
+        "grid_lines" => bytes_of(&model.mesh.block().lines.iter().flatten().map(|x| *x as f32).collect::<Vec<_>>()),
         "contact_nodes" => bytes_of(&contact_nodes(model, strips)),
         "tip_anchors" => {
             let plan = model.puncture.as_ref();
@@ -595,7 +596,7 @@ fn create_buffer(gpu: &Gpu, name: &str, contents: &Contents, uniform: bool) -> R
 }
 
 fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Params {
-    let [cx, cy, cz] = model.mesh.cells().map(|c| c as u32);
+    let [cx, cy, cz] = model.mesh.block().cells().map(|c| c as u32);
     let law = model.scene.material.law;
     let solver = &model.scene.solver;
     let fixed: Vec<u32> = model.faces().iter().map(|f| (0..3).map(|a| u32::from(f.fixed[a]) << a).sum()).collect();
@@ -617,11 +618,12 @@ fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Para
         fixed_y_max: fixed[3],
         fixed_z_min: fixed[4],
         fixed_z_max: fixed[5],
-        c10: law.c10 as f32,
-        c01: law.c01 as f32,
+        c10: law.isochoric.constants()[0].1 as f32 * 1e3,
+        c01: law.isochoric.constants()[1].1 as f32 * 1e3,
         bulk_modulus: law.bulk_modulus as f32,
         shear_bound: (4.0 / 3.0 * law.shear_modulus()) as f32,
-        hourglass: (solver.hourglass_stiffness * crate::solver::cpu::HOURGLASS_MODULUS * law.shear_modulus()) as f32,
+        hourglass: (solver.hourglass_stiffness * crate::solver::elements::HOURGLASS_MODULUS * law.shear_modulus())
+            as f32,
         quartic: solver.hourglass_quartic as f32,
         dt: dt as f32,
         mass_damping: solver.mass_damping as f32,
@@ -635,7 +637,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
     model.puncture.as_ref().map_or(PunctureParams::zeroed(), |plan| {
         let p = plan.params;
         // s0 depends on z alone, and an anchor acts on the two node planes around it.
-        let tallest = model.mesh.lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let tallest = model.mesh.block().lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
         PunctureParams {
             puncture_force: p.puncture_force as f32,
@@ -672,13 +674,13 @@ fn indentation_params(model: &Model) -> IndentationParams {
 }
 
 fn contact_nodes(model: &Model, strips: &Strips) -> Vec<ContactNode> {
-    let cells = model.mesh.cells();
+    let cells = model.mesh.block().cells();
     let mut nodes: Vec<ContactNode> = model
         .contact_nodes
         .iter()
         .map(|c| {
             let node = c.node as usize;
-            let [i, j, k] = model.mesh.node_coordinates(node);
+            let [i, j, k] = model.mesh.block().node_coordinates(node);
             ContactNode {
                 rest: vec4(model.mesh.rest_position(node)),
                 grid: [i as u32, j as u32, k as u32, 0],
@@ -869,15 +871,18 @@ impl Engine for GpuEngine {
         let bytes = self.read_buffers(&["corner_force"])?;
         let slots: Vec<[f32; 4]> = read_all(&bytes[0]).collect();
         let strips = &self.strips;
-        let [nx, ny, nz] = self.model.mesh.cells();
+        let [nx, ny, nz] = self.model.mesh.block().cells();
         let mut force = vec![DVec3::ZERO; self.model.mesh.node_count()];
         for strip in 0..strips.count {
             let first = strip * strips.layers;
             for k in first..=(first + strips.layers).min(nz as u32) {
                 for (j, i, corner) in (0..ny).flat_map(|j| (0..nx).flat_map(move |i| (0..4).map(move |c| (j, i, c)))) {
                     let f = slots[strips.slot(strip, k, corner, i as u32, j as u32) as usize];
-                    let node =
-                        self.model.mesh.node_index(i + (corner & 1) as usize, j + (corner >> 1) as usize, k as usize);
+                    let node = self.model.mesh.block().node_index(
+                        i + (corner & 1) as usize,
+                        j + (corner >> 1) as usize,
+                        k as usize,
+                    );
                     force[node] -= DVec3::new(f[0].into(), f[1].into(), f[2].into());
                 }
             }

@@ -1,20 +1,278 @@
 //! Elastic laws, one file each, and the verdict on their constants.
+//!
+//! Every law is an isochoric energy and a volumetric penalty,
+//! ```text
+//! W = W_iso + kappa/2 (J - 1)^2,   P = P_iso + kappa (J - 1) cof F                     [J/m^3], [Pa]
+//! P_iso = 2 w1 a F + 2 w2 b (I1 F - F C) + (w1 a' I1 + w2 b' I2) cof F
+//! ```
+//! with `w1 = dW_iso/dI1bar`, `w2 = dW_iso/dI2bar`, `I1bar = a I1`, `I2bar = b I2`, `a = J^(-2/3)`, `b = J^(-4/3)` for
+//! J >= 0.3 and their second-order Taylor polynomials below, so that W is twice differentiable and finite for every F,
+//! inverted ones included. Ogden's law alone needs the principal stretches; its form is in `ogden`.
+//! Source: the split of Flory 1961; penalty as in [Lv2022] Eq. 1, kappa = 2/D; continuation: this project.
 
+pub mod demiray;
+pub mod kinematics;
 pub mod mooney_rivlin;
+pub mod neo_hookean;
+pub mod ogden;
+pub mod yeoh;
 
+pub use demiray::Demiray;
 pub use mooney_rivlin::MooneyRivlin;
+pub use neo_hookean::NeoHookean;
+pub use ogden::Ogden;
+pub use yeoh::Yeoh;
 
-use mooney_rivlin::Verdict;
+use glam::{DMat3, DVec3};
+use kinematics::{cofactor, double_dot, invariants, isochoric_factor, jacobian_minus_one};
+
+/// Largest stretch that a numerical verdict looks at.
+pub const LARGEST_STRETCH: f64 = 6.0;
+
+/// Derivatives of W_iso by `I1bar` and `I2bar` [Pa]: `w1`, `w2`, and `w11 = d^2 W/dI1bar^2`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Slopes {
+    pub w1: f64,
+    pub w2: f64,
+    pub w11: f64,
+}
+
+/// What the constants mean for stability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Verdict {
+    /// Elliptic for every deformation.
+    Stable,
+    /// Elliptic while every principal stretch of an isochoric deformation stays below the limit.
+    StableBelow(f64),
+    /// Elliptic while every principal stretch of an isochoric deformation stays above the limit.
+    StableAbove(f64),
+    /// Ground-state shear modulus <= 0, or bulk modulus <= 0: unstable at rest.
+    Unstable,
+}
+
+/// The isochoric part of a law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Isochoric {
+    NeoHookean(NeoHookean),
+    MooneyRivlin(MooneyRivlin),
+    Yeoh(Yeoh),
+    Ogden(Ogden),
+    Demiray(Demiray),
+}
+
+impl Isochoric {
+    /// Name in scene files and outputs: the stem of its files.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Isochoric::NeoHookean(_) => "neo_hookean",
+            Isochoric::MooneyRivlin(_) => "mooney_rivlin",
+            Isochoric::Yeoh(_) => "yeoh",
+            Isochoric::Ogden(_) => "ogden",
+            Isochoric::Demiray(_) => "demiray",
+        }
+    }
+
+    /// Constants with the keys and units of a scene file: stresses in kPa, exponents without a unit.
+    pub fn constants(&self) -> Vec<(&'static str, f64)> {
+        let kpa = 1e-3;
+        match self {
+            Isochoric::NeoHookean(l) => vec![("c10_kpa", l.c10 * kpa)],
+            Isochoric::MooneyRivlin(l) => vec![("c10_kpa", l.c10 * kpa), ("c01_kpa", l.c01 * kpa)],
+            Isochoric::Yeoh(l) => {
+                vec![("c10_kpa", l.c10 * kpa), ("c20_kpa", l.c20 * kpa), ("c30_kpa", l.c30 * kpa)]
+            }
+            Isochoric::Ogden(l) => vec![("mu_kpa", l.mu * kpa), ("alpha", l.alpha)],
+            Isochoric::Demiray(l) => vec![("mu_kpa", l.mu * kpa), ("b", l.b)],
+        }
+    }
+
+    /// Ground-state shear modulus mu0 [Pa].
+    pub fn shear_modulus(&self) -> f64 {
+        match self {
+            Isochoric::NeoHookean(l) => l.shear_modulus(),
+            Isochoric::MooneyRivlin(l) => l.shear_modulus(),
+            Isochoric::Yeoh(l) => l.shear_modulus(),
+            Isochoric::Ogden(l) => l.shear_modulus(),
+            Isochoric::Demiray(l) => l.shear_modulus(),
+        }
+    }
+
+    /// Slopes for `I1bar - 3` and `I2bar - 3`; `None` for Ogden's law, which is no function of them.
+    fn slopes(&self, i1: f64) -> Option<Slopes> {
+        match self {
+            Isochoric::NeoHookean(l) => Some(l.slopes()),
+            Isochoric::MooneyRivlin(l) => Some(l.slopes()),
+            Isochoric::Yeoh(l) => Some(l.slopes(i1)),
+            Isochoric::Ogden(_) => None,
+            Isochoric::Demiray(l) => Some(l.slopes(i1)),
+        }
+    }
+
+    pub fn verdict(&self) -> Verdict {
+        match self {
+            Isochoric::NeoHookean(l) => l.verdict(),
+            Isochoric::MooneyRivlin(l) => l.verdict(),
+            Isochoric::Yeoh(l) => l.verdict(),
+            Isochoric::Ogden(l) => l.verdict(),
+            Isochoric::Demiray(l) => l.verdict(),
+        }
+    }
+}
+
+/// Isochoric energy and bulk modulus.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ElasticLaw {
+    pub isochoric: Isochoric,
+    /// Bulk modulus kappa = 2/D [Pa].
+    pub bulk_modulus: f64,
+}
+
+impl ElasticLaw {
+    /// c10, c01 and bulk modulus [Pa].
+    pub const fn mooney_rivlin(c10: f64, c01: f64, bulk_modulus: f64) -> Self {
+        ElasticLaw { isochoric: Isochoric::MooneyRivlin(MooneyRivlin { c10, c01 }), bulk_modulus }
+    }
+
+    /// Mooney-Rivlin constants from ground-state moduli: `share` of the shear modulus goes to c10, the rest to c01.
+    ///
+    /// `shear_modulus` mu0 [Pa], `bulk_modulus` [Pa], `share` 0..1.
+    pub fn from_moduli(shear_modulus: f64, bulk_modulus: f64, share: f64) -> Self {
+        Self::mooney_rivlin(0.5 * shear_modulus * share, 0.5 * shear_modulus * (1.0 - share), bulk_modulus)
+    }
+
+    /// Ground-state shear modulus mu0 [Pa].
+    pub fn shear_modulus(&self) -> f64 {
+        self.isochoric.shear_modulus()
+    }
+
+    /// Young's modulus at rest [Pa].
+    pub fn youngs_modulus(&self) -> f64 {
+        let (k, mu) = (self.bulk_modulus, self.shear_modulus());
+        9.0 * k * mu / (3.0 * k + mu)
+    }
+
+    /// Poisson's ratio at rest.
+    pub fn poisson_ratio(&self) -> f64 {
+        let (k, mu) = (self.bulk_modulus, self.shear_modulus());
+        (3.0 * k - 2.0 * mu) / (2.0 * (3.0 * k + mu))
+    }
+
+    /// P-wave modulus K + 4/3 mu [Pa].
+    pub fn p_wave_modulus(&self) -> f64 {
+        self.bulk_modulus + 4.0 / 3.0 * self.shear_modulus()
+    }
+
+    /// Stability of the constants over all deformations.
+    pub fn verdict(&self) -> Verdict {
+        if self.bulk_modulus > 0.0 && self.bulk_modulus.is_finite() {
+            self.isochoric.verdict()
+        } else {
+            Verdict::Unstable
+        }
+    }
+
+    /// Isochoric energy density for the displacement gradient H = F - I [J/m^3].
+    pub fn isochoric_energy(&self, h: DMat3) -> f64 {
+        let f = DMat3::IDENTITY + h;
+        let j = 1.0 + jacobian_minus_one(h);
+        let (i1, i2) = invariants(f);
+        let i1 = isochoric_factor(j, -2.0 / 3.0).0 * i1 - 3.0;
+        let i2 = isochoric_factor(j, -4.0 / 3.0).0 * i2 - 3.0;
+        match &self.isochoric {
+            Isochoric::NeoHookean(l) => l.energy(i1),
+            Isochoric::MooneyRivlin(l) => l.energy(i1, i2),
+            Isochoric::Yeoh(l) => l.energy(i1),
+            Isochoric::Ogden(l) => l.energy(h),
+            Isochoric::Demiray(l) => l.energy(i1),
+        }
+    }
+
+    /// Isochoric first Piola-Kirchhoff stress P_iso for H = F - I [Pa].
+    pub fn isochoric_stress(&self, h: DMat3) -> DMat3 {
+        if let Isochoric::Ogden(l) = &self.isochoric {
+            return l.isochoric_stress(h);
+        }
+        let f = DMat3::IDENTITY + h;
+        let j = 1.0 + jacobian_minus_one(h);
+        let (a, da) = isochoric_factor(j, -2.0 / 3.0);
+        let (b, db) = isochoric_factor(j, -4.0 / 3.0);
+        let (i1, i2) = invariants(f);
+        let s = self.isochoric.slopes(a * i1 - 3.0).unwrap_or_default();
+        let c = f.transpose() * f;
+        f * (2.0 * s.w1 * a) + (f * i1 - f * c) * (2.0 * s.w2 * b) + cofactor(f) * (s.w1 * da * i1 + s.w2 * db * i2)
+    }
+
+    /// Energy density W for H = F - I [J/m^3].
+    pub fn energy_density(&self, h: DMat3) -> f64 {
+        let dj = jacobian_minus_one(h);
+        self.isochoric_energy(h) + 0.5 * self.bulk_modulus * dj * dj
+    }
+
+    /// First Piola-Kirchhoff stress P for H = F - I [Pa].
+    pub fn first_piola_kirchhoff(&self, h: DMat3) -> DMat3 {
+        let f = DMat3::IDENTITY + h;
+        self.isochoric_stress(h) + cofactor(f) * (self.bulk_modulus * jacobian_minus_one(h))
+    }
+
+    /// Cauchy stress sigma = P F^T / J [Pa]; meaningful for J > 0 only.
+    pub fn cauchy(&self, h: DMat3) -> DMat3 {
+        let f = DMat3::IDENTITY + h;
+        self.first_piola_kirchhoff(h) * f.transpose() * (1.0 / f.determinant())
+    }
+
+    /// Bound of the isochoric tangent modulus for the stable step [Pa].
+    ///
+    /// `4/3 2 (w1 + w2) max(1, I1/3) + 4 w11 I1 (I1 I2/9 - 1)`: the second term is the squared gradient of I1bar at
+    /// J = 1. At rest it is 4/3 mu0.
+    pub fn tangent_bound(&self, h: DMat3) -> f64 {
+        if let Isochoric::Ogden(l) = &self.isochoric {
+            return l.tangent_bound(h);
+        }
+        let f = DMat3::IDENTITY + h;
+        let (a, _) = isochoric_factor(1.0 + jacobian_minus_one(h), -2.0 / 3.0);
+        let (i1, i2) = invariants(f);
+        let s = self.isochoric.slopes(a * i1 - 3.0).unwrap_or_default();
+        let stiffening = 4.0 * s.w11.max(0.0) * a * i1 * (a * i1 * i2 * a * a / 9.0 - 1.0).max(0.0);
+        8.0 / 3.0 * (s.w1 + s.w2) * (i1 / 3.0).max(1.0) + stiffening
+    }
+}
+
+/// Stretch up to which a law of I1bar alone is elliptic: `w1 > 0` and `w1 + 2 w11 (l_max - l_min)^2 > 0` in uniaxial,
+/// equibiaxial and planar isochoric states. (The largest square of `a.F N` over unit vectors with `a.F^-T N = 0` is
+/// `(l_max - l_min)^2`.)
+fn stable_range(slopes: &dyn Fn(f64) -> Slopes) -> Verdict {
+    const STEP: f64 = 1e-3;
+    let stable = |l: f64| {
+        let states = [[l, l.powf(-0.5), l.powf(-0.5)], [l, l, l.powi(-2)], [l, 1.0, 1.0 / l]];
+        states.iter().all(|s| {
+            let e = s.iter().map(|l| l * l).sum::<f64>() - 3.0;
+            let spread = s.iter().cloned().fold(0.0, f64::max) - s.iter().cloned().fold(f64::INFINITY, f64::min);
+            let w = slopes(e);
+            w.w1 > 0.0 && w.w1 + 2.0 * w.w11 * spread * spread > 0.0
+        })
+    };
+    let mut stretches = (1..).map(|i| 1.0 + f64::from(i) * STEP).take_while(|l| *l < LARGEST_STRETCH);
+    stretches.find(|l| !stable(*l)).map_or(Verdict::Stable, Verdict::StableBelow)
+}
 
 /// A number for a message: four significant digits, no trailing zeros.
 pub fn four_digits(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
+/// The constants of a law with names and units.
+pub fn describe_constants(law: &ElasticLaw) -> String {
+    let constant = |(key, value): (&str, f64)| match key.strip_suffix("_kpa") {
+        Some(name) => format!("{name} {} kPa", four_digits(value)),
+        None => format!("{key} {}", four_digits(value)),
+    };
+    law.isochoric.constants().into_iter().map(constant).collect::<Vec<_>>().join(", ")
+}
+
 /// The verdict on a tissue law in one or two sentences, with the moduli at rest.
-pub fn describe_verdict(law: &MooneyRivlin) -> String {
+pub fn describe_verdict(law: &ElasticLaw) -> String {
     let kpa = |value: f64| four_digits(value * 1e-3);
-    let constants = format!("c10 {} kPa, c01 {} kPa", kpa(law.c10), kpa(law.c01));
+    let constants = describe_constants(law);
     let moduli = format!(
         "E {} kPa, nu {}, K {} kPa at rest",
         kpa(law.youngs_modulus()),
@@ -31,27 +289,50 @@ pub fn describe_verdict(law: &MooneyRivlin) -> String {
         Verdict::Unstable if law.bulk_modulus <= 0.0 => {
             format!("unstable at rest: bulk modulus {} kPa is not positive ({constants})", kpa(law.bulk_modulus))
         }
-        Verdict::Unstable => format!(
-            "unstable at rest: c10 + c01 = {} kPa, shear modulus {} kPa is not positive ({constants})",
-            kpa(law.c10 + law.c01),
-            kpa(law.shear_modulus())
-        ),
+        Verdict::Unstable => match &law.isochoric {
+            Isochoric::MooneyRivlin(l) => format!(
+                "unstable at rest: c10 + c01 = {} kPa, shear modulus {} kPa is not positive ({constants})",
+                kpa(l.c10 + l.c01),
+                kpa(law.shear_modulus())
+            ),
+            _ => format!(
+                "unstable at rest: shear modulus {} kPa is not positive, or a constant is out of range ({constants})",
+                kpa(law.shear_modulus())
+            ),
+        },
     }
 }
 
 /// Time in which a ripple of half wavelength `length` [m] grows by the factor e in an unstable tissue at rest [s]:
 /// `length/pi * sqrt(rho / |mu0|)`; `None` where the shear modulus is not negative.
-pub fn ripple_growth_time(law: &MooneyRivlin, density: f64, length: f64) -> Option<f64> {
+pub fn ripple_growth_time(law: &ElasticLaw, density: f64, length: f64) -> Option<f64> {
     let shear = law.shear_modulus();
     (shear < 0.0).then(|| length / std::f64::consts::PI * (density / -shear).sqrt())
+}
+
+/// Von Mises equivalent of a symmetric stress [Pa].
+pub fn von_mises(sigma: DMat3) -> f64 {
+    let d = DVec3::new(sigma.x_axis.x, sigma.y_axis.y, sigma.z_axis.z);
+    let shear = sigma.x_axis.y.powi(2) + sigma.y_axis.z.powi(2) + sigma.z_axis.x.powi(2);
+    (0.5 * ((d.x - d.y).powi(2) + (d.y - d.z).powi(2) + (d.z - d.x).powi(2)) + 3.0 * shear).sqrt()
+}
+
+/// Deviator of a second-order tensor.
+pub fn deviator(a: DMat3) -> DMat3 {
+    a - DMat3::IDENTITY * (kinematics::trace(a) / 3.0)
+}
+
+/// `sqrt(3/2 A : A)` of a deviator.
+pub fn equivalent(deviator: DMat3) -> f64 {
+    (1.5 * double_dot(deviator, deviator)).sqrt()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn law(c10: f64, c01: f64) -> MooneyRivlin {
-        MooneyRivlin { c10: c10 * 1e3, c01: c01 * 1e3, bulk_modulus: 5.0e5 }
+    fn law(c10: f64, c01: f64) -> ElasticLaw {
+        ElasticLaw::mooney_rivlin(c10 * 1e3, c01 * 1e3, 5.0e5)
     }
 
     #[test]

@@ -3,97 +3,139 @@
 pub mod block;
 pub mod tets;
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
-/// A rectilinear block of hexahedral cells: three lists of grid lines.
-///
-/// Node `(i, j, k)` has the index `(k * (ny + 1) + j) * (nx + 1) + i`, cell `(i, j, k)` the index
-/// `(k * ny + j) * nx + i`; k grows upwards, the top face (z = 0) is the last plane.
+pub use block::BlockMesh;
+pub use tets::TetMesh;
+
+/// The mesh of a model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BlockMesh {
-    /// Grid lines per axis [m], ascending.
-    pub lines: [Vec<f64>; 3],
+pub enum Mesh {
+    Block(BlockMesh),
+    Tets(Arc<TetMesh>),
 }
 
-impl BlockMesh {
-    /// Cells per axis.
-    pub fn cells(&self) -> [usize; 3] {
-        std::array::from_fn(|a| self.lines[a].len() - 1)
-    }
+/// Nodes of one cell: eight of a hexahedron in VTK order, four of a tetrahedron.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CellNodes {
+    nodes: [usize; 8],
+    count: usize,
+}
 
-    /// Nodes per axis.
-    pub fn nodes(&self) -> [usize; 3] {
-        std::array::from_fn(|a| self.lines[a].len())
+impl std::ops::Deref for CellNodes {
+    type Target = [usize];
+
+    fn deref(&self) -> &[usize] {
+        &self.nodes[..self.count]
+    }
+}
+
+impl From<BlockMesh> for Mesh {
+    fn from(mesh: BlockMesh) -> Self {
+        Mesh::Block(mesh)
+    }
+}
+
+impl From<Arc<TetMesh>> for Mesh {
+    fn from(mesh: Arc<TetMesh>) -> Self {
+        Mesh::Tets(mesh)
+    }
+}
+
+impl Mesh {
+    pub fn node_count(&self) -> usize {
+        match self {
+            Mesh::Block(mesh) => mesh.node_count(),
+            Mesh::Tets(mesh) => mesh.positions.len(),
+        }
     }
 
     pub fn cell_count(&self) -> usize {
-        self.cells().iter().product()
-    }
-
-    pub fn node_count(&self) -> usize {
-        self.nodes().iter().product()
-    }
-
-    pub fn node_index(&self, i: usize, j: usize, k: usize) -> usize {
-        let [nx, ny, _] = self.nodes();
-        (k * ny + j) * nx + i
-    }
-
-    pub fn cell_index(&self, i: usize, j: usize, k: usize) -> usize {
-        let [nx, ny, _] = self.cells();
-        (k * ny + j) * nx + i
-    }
-
-    /// Grid coordinates of a node.
-    pub fn node_coordinates(&self, node: usize) -> [usize; 3] {
-        let [nx, ny, _] = self.nodes();
-        [node % nx, node / nx % ny, node / (nx * ny)]
-    }
-
-    /// Grid coordinates of a cell.
-    pub fn cell_coordinates(&self, cell: usize) -> [usize; 3] {
-        let [nx, ny, _] = self.cells();
-        [cell % nx, cell / nx % ny, cell / (nx * ny)]
+        match self {
+            Mesh::Block(mesh) => mesh.cell_count(),
+            Mesh::Tets(mesh) => mesh.tets.len(),
+        }
     }
 
     /// Rest position X of a node [m].
     pub fn rest_position(&self, node: usize) -> DVec3 {
-        let [i, j, k] = self.node_coordinates(node);
-        DVec3::new(self.lines[0][i], self.lines[1][j], self.lines[2][k])
+        match self {
+            Mesh::Block(mesh) => mesh.rest_position(node),
+            Mesh::Tets(mesh) => mesh.positions[node],
+        }
     }
 
-    /// Edge lengths of a cell [m].
-    pub fn cell_size(&self, cell: usize) -> DVec3 {
-        let c = self.cell_coordinates(cell);
-        let d = |a: usize| self.lines[a][c[a] + 1] - self.lines[a][c[a]];
-        DVec3::new(d(0), d(1), d(2))
+    pub fn cell_nodes(&self, cell: usize) -> CellNodes {
+        match self {
+            Mesh::Block(mesh) => CellNodes { nodes: mesh.cell_nodes(cell), count: 8 },
+            Mesh::Tets(mesh) => {
+                let [a, b, c, d] = mesh.tets[cell].map(|n| n as usize);
+                CellNodes { nodes: [a, b, c, d, 0, 0, 0, 0], count: 4 }
+            }
+        }
     }
 
-    /// The eight nodes of a cell in VTK order (bottom ring, then top ring, both counter-clockwise).
-    pub fn cell_nodes(&self, cell: usize) -> [usize; 8] {
-        let [i, j, k] = self.cell_coordinates(cell);
-        [
-            self.node_index(i, j, k),
-            self.node_index(i + 1, j, k),
-            self.node_index(i + 1, j + 1, k),
-            self.node_index(i, j + 1, k),
-            self.node_index(i, j, k + 1),
-            self.node_index(i + 1, j, k + 1),
-            self.node_index(i + 1, j + 1, k + 1),
-            self.node_index(i, j + 1, k + 1),
-        ]
+    /// Rest volume of a cell [m^3].
+    pub fn cell_volume(&self, cell: usize) -> f64 {
+        match self {
+            Mesh::Block(mesh) => mesh.cell_size(cell).to_array().iter().product(),
+            Mesh::Tets(mesh) => mesh.volume(cell),
+        }
     }
 
-    /// Tributary volume of a node, an eighth of every cell around it [m^3].
-    pub fn node_volume(&self, node: usize) -> f64 {
-        let c = self.node_coordinates(node);
-        (0..3)
-            .map(|a| {
-                let l = &self.lines[a];
-                let below = if c[a] > 0 { l[c[a]] - l[c[a] - 1] } else { 0.0 };
-                let above = if c[a] + 1 < l.len() { l[c[a] + 1] - l[c[a]] } else { 0.0 };
-                0.5 * (below + above)
-            })
-            .product()
+    /// Centre of a cell at rest [m].
+    pub fn cell_centre(&self, cell: usize) -> DVec3 {
+        let nodes = self.cell_nodes(cell);
+        nodes.iter().map(|n| self.rest_position(*n)).sum::<DVec3>() / nodes.len() as f64
+    }
+
+    /// Smallest edge of a hexahedron or altitude of a tetrahedron [m].
+    pub fn smallest_edge(&self) -> f64 {
+        match self {
+            Mesh::Block(mesh) => {
+                let steps = mesh.lines.iter().flat_map(|l| l.windows(2).map(|w| w[1] - w[0]));
+                steps.fold(f64::INFINITY, f64::min)
+            }
+            Mesh::Tets(mesh) => (0..mesh.tets.len()).map(|t| mesh.smallest_altitude(t)).fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// Lowest and highest corner of the bounding box at rest [m].
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        match self {
+            Mesh::Block(mesh) => {
+                let end = |last: bool| {
+                    DVec3::from(std::array::from_fn(|a| {
+                        let lines = &mesh.lines[a];
+                        lines[if last { lines.len() - 1 } else { 0 }]
+                    }))
+                };
+                (end(false), end(true))
+            }
+            Mesh::Tets(mesh) => mesh.bounds(),
+        }
+    }
+
+    /// The structured block, if it is one.
+    pub fn as_block(&self) -> Option<&BlockMesh> {
+        match self {
+            Mesh::Block(mesh) => Some(mesh),
+            Mesh::Tets(_) => None,
+        }
+    }
+
+    /// The structured block, where the caller knows that it is one.
+    pub fn block(&self) -> &BlockMesh {
+        self.as_block().expect("this part of the program serves the structured block only")
+    }
+
+    /// The tetrahedra, if they are.
+    pub fn as_tets(&self) -> Option<&Arc<TetMesh>> {
+        match self {
+            Mesh::Block(_) => None,
+            Mesh::Tets(mesh) => Some(mesh),
+        }
     }
 }

@@ -35,6 +35,10 @@ pub struct EnergyAccount {
     pub friction: f64,
     /// Dissipated by the tip law and by the softening of the path.
     pub cutting: f64,
+    /// Dissipated by plastic flow, by damage and by the viscous terms.
+    pub plastic: f64,
+    pub damage: f64,
+    pub viscous: f64,
     /// Stored in contact, stick and tip springs, plus what contact damping dissipated.
     pub contact: f64,
     /// Largest |external| so far, the scale of the imbalance.
@@ -44,7 +48,16 @@ pub struct EnergyAccount {
 impl EnergyAccount {
     /// Sum of everything that external work turned into [J].
     pub fn accounted(&self) -> f64 {
-        self.elastic + self.kinetic + self.hourglass + self.damping + self.friction + self.cutting + self.contact
+        self.elastic
+            + self.kinetic
+            + self.hourglass
+            + self.damping
+            + self.friction
+            + self.cutting
+            + self.plastic
+            + self.damage
+            + self.viscous
+            + self.contact
     }
 
     /// (external - accounted) / largest external work; 0 while nothing has happened.
@@ -63,6 +76,10 @@ pub struct Health {
     pub inverted_cells: u32,
     /// Index of one of them.
     pub inverted_cell: Option<u32>,
+    /// Largest damage d; cells deleted so far; cell steps whose return mapping did not meet the yield condition.
+    pub largest_damage: f64,
+    pub deleted_cells: u32,
+    pub return_failures: u32,
     /// Nodes whose speed was clamped, summed over the steps of the frame.
     pub clamped_nodes: u32,
     /// Largest nodal speed [m/s].
@@ -89,6 +106,8 @@ pub struct FrameRecord {
     pub force: ForceParts,
     /// Material coordinate of the tip along its path, a [m].
     pub tip_coordinate: f64,
+    /// What each face exerts on the tissue at the end of the frame, indexed by `Face` [N]; zero without driven faces.
+    pub reactions: [DVec3; 6],
     pub energy: EnergyAccount,
     pub health: Health,
 }
@@ -115,6 +134,11 @@ pub struct FieldSnapshot {
     pub pressure: Vec<f64>,
     /// Remaining stiffness per cell, 1 = intact; empty without the effect `puncture`.
     pub stiffness: Vec<f64>,
+    /// Equivalent plastic strain alpha and damage d per cell; empty without `plasticity`, `damage`.
+    pub plastic_strain: Vec<f64>,
+    pub damage: Vec<f64>,
+    /// Index of the material per cell, 0 outside all regions; empty without regions.
+    pub material: Vec<f64>,
 }
 
 mod recorder;

@@ -30,6 +30,9 @@ impl Recorder {
         e.damping += sums.damping_dissipation;
         e.friction += sums.friction_dissipation;
         e.cutting += sums.tip_dissipation + sums.softening_dissipation;
+        e.plastic += sums.plastic_dissipation;
+        e.damage += sums.damage_dissipation;
+        e.viscous = sums.viscous_dissipation;
         self.contact_dissipation += sums.contact_dissipation;
         e.contact = sums.contact_energy + self.contact_dissipation;
         let mean_pose = model.kinematics.as_ref().map(|k| k.pose(0.5 * (begin + end)));
@@ -50,12 +53,16 @@ impl Recorder {
                 torque: sums.angular_impulse / duration,
             },
             tip_coordinate: sums.tip_coordinate,
+            reactions: sums.reactions,
             energy: *e,
             health: Health {
                 min_j: sums.min_j,
                 min_corner_j: sums.min_corner_j,
                 inverted_cells: sums.inverted_cells,
                 inverted_cell: sums.inverted_cell,
+                largest_damage: sums.largest_damage,
+                deleted_cells: sums.deleted_cells,
+                return_failures: sums.return_failures,
                 clamped_nodes: sums.clamped_nodes,
                 max_speed: sums.max_speed,
                 raised_mass: sums.raised_mass,

@@ -8,11 +8,12 @@ use std::path::PathBuf;
 
 use super::folder::{FIELD_COLLECTION, FIELD_FOLDER, OutputFolder};
 use super::whole_file;
-use crate::mesh::BlockMesh;
+use crate::mesh::Mesh;
 use crate::observables::FieldSnapshot;
 use crate::{Error, Result};
 
-/// VTK cell type of a hexahedron with eight nodes.
+/// VTK cell types of a tetrahedron with four and a hexahedron with eight nodes.
+const VTK_TETRAHEDRON: u8 = 10;
 const VTK_HEXAHEDRON: u8 = 12;
 
 /// The VTU files of one run and their collection.
@@ -30,7 +31,7 @@ impl FieldFiles {
     }
 
     /// Writes one frame, then the collection with it; returns the path of the frame.
-    pub fn write(&mut self, mesh: &BlockMesh, snapshot: &FieldSnapshot) -> Result<PathBuf> {
+    pub fn write(&mut self, mesh: &Mesh, snapshot: &FieldSnapshot) -> Result<PathBuf> {
         let fields = self.folder.file(FIELD_FOLDER);
         std::fs::create_dir_all(&fields).map_err(|source| Error::file(&fields, source))?;
         let name = OutputFolder::field_name(snapshot.frame);
@@ -44,13 +45,17 @@ impl FieldFiles {
 }
 
 /// Text of one VTU file. Empty cell fields are left out.
-pub fn vtu(mesh: &BlockMesh, snapshot: &FieldSnapshot) -> String {
+pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot) -> String {
     let (nodes, cells) = (mesh.node_count(), mesh.cell_count());
     assert_eq!(snapshot.displacement.len(), nodes, "a snapshot holds one displacement per node");
     let points = (0..nodes).flat_map(|n| mesh.rest_position(n).to_array());
     let displacement = snapshot.displacement.iter().flat_map(|u| u.to_array());
-    let connectivity = (0..cells).flat_map(|c| mesh.cell_nodes(c));
-    let offsets = (1..=cells).map(|c| 8 * c);
+    let connectivity = (0..cells).flat_map(|c| mesh.cell_nodes(c).to_vec());
+    let (corners, kind) = match mesh {
+        Mesh::Block(_) => (8, VTK_HEXAHEDRON),
+        Mesh::Tets(_) => (4, VTK_TETRAHEDRON),
+    };
+    let offsets = (1..=cells).map(|c| corners * c);
 
     let mut text = String::from(
         "<?xml version=\"1.0\"?>\n\
@@ -62,7 +67,7 @@ pub fn vtu(mesh: &BlockMesh, snapshot: &FieldSnapshot) -> String {
     text += "</Points>\n<Cells>\n";
     text += &array("connectivity", "Int32", 1, integers(connectivity));
     text += &array("offsets", "Int32", 1, integers(offsets));
-    text += &array("types", "UInt8", 1, vec![VTK_HEXAHEDRON; cells]);
+    text += &array("types", "UInt8", 1, vec![kind; cells]);
     text += "</Cells>\n<PointData Vectors=\"displacement_m\">\n";
     text += &array("displacement_m", "Float32", 3, floats(displacement));
     text += "</PointData>\n<CellData Scalars=\"von_mises_pa\">\n";
@@ -71,6 +76,9 @@ pub fn vtu(mesh: &BlockMesh, snapshot: &FieldSnapshot) -> String {
         ("jacobian", &snapshot.jacobian),
         ("pressure_pa", &snapshot.pressure),
         ("stiffness", &snapshot.stiffness),
+        ("plastic_strain", &snapshot.plastic_strain),
+        ("damage", &snapshot.damage),
+        ("material", &snapshot.material),
     ] {
         if !field.is_empty() {
             assert_eq!(field.len(), cells, "a snapshot holds one {name} per cell");

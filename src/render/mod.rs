@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use crate::mesh::BlockMesh;
+use crate::mesh::Mesh;
 use crate::observables::FieldSnapshot;
 use crate::output::whole_file;
 use crate::scene::Scene;
@@ -45,7 +45,7 @@ impl Image {
 /// Draws the state of a run; with a device on it, without on the processor.
 pub fn draw(
     scene: &Scene,
-    mesh: &BlockMesh,
+    mesh: &Mesh,
     snapshot: &FieldSnapshot,
     device: Option<(&wgpu::Device, &wgpu::Queue)>,
 ) -> Result<Image> {

@@ -16,7 +16,7 @@ use glam::DVec2;
 
 use super::slice::{self, Plane, Slice};
 use super::stroke_font;
-use crate::mesh::BlockMesh;
+use crate::mesh::Mesh;
 use crate::observables::FieldSnapshot;
 use crate::scene::{Scene, Tool};
 
@@ -65,7 +65,7 @@ pub struct Picture {
 
 impl Picture {
     /// Composes the picture of one moment.
-    pub fn compose(scene: &Scene, mesh: &BlockMesh, snapshot: &FieldSnapshot) -> Self {
+    pub fn compose(scene: &Scene, mesh: &Mesh, snapshot: &FieldSnapshot) -> Self {
         let plane = Plane::of_scene(scene, snapshot);
         let slice = slice::cut(mesh, snapshot, &plane, scene.tissue.cell_size);
         let layout = Layout::new(scene, mesh, &plane, &slice);
@@ -163,7 +163,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn new(scene: &Scene, mesh: &BlockMesh, plane: &Plane, slice: &Slice) -> Self {
+    fn new(scene: &Scene, mesh: &Mesh, plane: &Plane, slice: &Slice) -> Self {
         let width = match scene.outputs.picture_width {
             0 => DEFAULT_WIDTH,
             width => width.clamp(*WIDTHS.start(), *WIDTHS.end()),
@@ -208,11 +208,9 @@ impl Layout {
 
 /// Bounds of the tissue in the cut [m]; at most a quarter larger than the block at rest, so that one wild cell does
 /// not shrink the picture.
-fn extent(mesh: &BlockMesh, plane: &Plane, slice: &Slice) -> (DVec2, DVec2) {
-    let ends = |axis: usize| {
-        let lines = &mesh.lines[axis];
-        [lines[0], lines[lines.len() - 1]]
-    };
+fn extent(mesh: &Mesh, plane: &Plane, slice: &Slice) -> (DVec2, DVec2) {
+    let (low, high) = mesh.bounds();
+    let ends = |axis: usize| [low[axis], high[axis]];
     let mut rest = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for x in ends(0) {
         for y in ends(1) {

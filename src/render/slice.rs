@@ -3,9 +3,11 @@
 //! Every hexahedron is split into the six tetrahedra around its diagonal 0-6 (Kuhn subdivision): neighbours of a
 //! structured block then share the diagonals of their common face, and the cut has no cracks.
 
+use std::collections::HashSet;
+
 use glam::{DVec2, DVec3};
 
-use crate::mesh::BlockMesh;
+use crate::mesh::{Mesh, TetMesh};
 use crate::observables::FieldSnapshot;
 use crate::scene::{Scene, Tool};
 
@@ -104,25 +106,29 @@ pub struct Slice {
 }
 
 /// Cuts the deformed mesh.
-pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64) -> Slice {
+pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64) -> Slice {
     let mut plane = *plane;
     plane.origin -= plane.normal * (BESIDE_GRID_LINES * cell_size);
     let von_mises = smoothed_to_nodes(mesh, &snapshot.von_mises, &snapshot.stiffness);
-    let farthest =
-        FARTHEST_MOVE * (0..3).map(|a| mesh.lines[a][mesh.lines[a].len() - 1] - mesh.lines[a][0]).fold(0.0, f64::max);
-    let cells = mesh.cells();
+    let (low, high) = mesh.bounds();
+    let farthest = FARTHEST_MOVE * (high - low).max_element();
+    let borders = match mesh {
+        Mesh::Block(_) => HashSet::new(),
+        Mesh::Tets(tets) => border_faces(tets),
+    };
     let mut slice = Slice::default();
     for cell in 0..mesh.cell_count() {
         let nodes = mesh.cell_nodes(cell);
-        let displacement = nodes.map(|n| snapshot.displacement.get(n).copied().unwrap_or_default());
+        let displacement: Vec<DVec3> =
+            nodes.iter().map(|n| snapshot.displacement.get(*n).copied().unwrap_or_default()).collect();
         // Written so that NaN counts as too far.
         let drawable = displacement.iter().all(|u| u.length() <= farthest);
-        let corner: [DVec3; 8] = std::array::from_fn(|c| mesh.rest_position(nodes[c]) + displacement[c]);
+        let corner: Vec<DVec3> = nodes.iter().zip(&displacement).map(|(n, u)| mesh.rest_position(*n) + *u).collect();
         if !drawable {
             slice.cells_left_out += 1;
             continue;
         }
-        let height = corner.map(|p| plane.height(p));
+        let height: Vec<f64> = corner.iter().map(|p| plane.height(*p)).collect();
         if height.iter().all(|&h| h >= 0.0) || height.iter().all(|&h| h < 0.0) {
             continue;
         }
@@ -134,7 +140,8 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
                 von_mises[nodes[a]] + t * (von_mises[nodes[b]] - von_mises[nodes[a]]),
             )
         };
-        for tetrahedron in TETRAHEDRA {
+        let parts: &[[usize; 4]] = if nodes.len() == 8 { &TETRAHEDRA } else { &[[0, 1, 2, 3]] };
+        for tetrahedron in parts.iter().copied() {
             let (above, below): (Vec<usize>, Vec<usize>) = tetrahedron.into_iter().partition(|&c| height[c] >= 0.0);
             let mut push = |corners: [(DVec2, f64); 3]| {
                 slice.triangles.push(SliceTriangle {
@@ -155,22 +162,33 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
                 _ => {}
             }
         }
-        let at = mesh.cell_coordinates(cell);
-        for (axis, at_max, triangles) in FACES {
-            let last = at[axis] + 1 == cells[axis];
-            // A shared face is drawn once, by the cell above it.
-            if at_max && !last {
-                continue;
+        let mut edge = |triangle: [usize; 3], border: bool| {
+            let ends: Vec<DVec2> = (0..3)
+                .map(|e| (triangle[e], triangle[(e + 1) % 3]))
+                .filter(|&(a, b)| (height[a] >= 0.0) != (height[b] >= 0.0))
+                .map(|(a, b)| crossing(a, b).0)
+                .collect();
+            if let &[a, b] = ends.as_slice() {
+                slice.lines.push(SliceLine { points: [a, b], border });
             }
-            let border = if at_max { last } else { at[axis] == 0 };
-            for triangle in triangles {
-                let ends: Vec<DVec2> = (0..3)
-                    .map(|e| (triangle[e], triangle[(e + 1) % 3]))
-                    .filter(|&(a, b)| (height[a] >= 0.0) != (height[b] >= 0.0))
-                    .map(|(a, b)| crossing(a, b).0)
-                    .collect();
-                if let &[a, b] = ends.as_slice() {
-                    slice.lines.push(SliceLine { points: [a, b], border });
+        };
+        match mesh {
+            Mesh::Block(block) => {
+                let (at, cells) = (block.cell_coordinates(cell), block.cells());
+                for (axis, at_max, triangles) in FACES {
+                    let last = at[axis] + 1 == cells[axis];
+                    // A shared face is drawn once, by the cell above it.
+                    if at_max && !last {
+                        continue;
+                    }
+                    let border = if at_max { last } else { at[axis] == 0 };
+                    triangles.into_iter().for_each(|triangle| edge(triangle, border));
+                }
+            }
+            Mesh::Tets(_) => {
+                for triangle in TETRAHEDRON_FACES {
+                    let face = sorted(triangle.map(|c| nodes[c] as u32));
+                    edge(triangle, borders.contains(&face));
                 }
             }
         }
@@ -178,21 +196,43 @@ pub fn cut(mesh: &BlockMesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size:
     slice
 }
 
+/// Corners of the four faces of a tetrahedron.
+const TETRAHEDRON_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
+}
+
+/// Faces that belong to one tetrahedron only.
+fn border_faces(mesh: &TetMesh) -> HashSet<[u32; 3]> {
+    let mut border = HashSet::new();
+    for tet in &mesh.tets {
+        for face in TETRAHEDRON_FACES.map(|f| sorted(f.map(|c| tet[c]))) {
+            // The second of two takes out what the first put in.
+            if !border.insert(face) {
+                border.remove(&face);
+            }
+        }
+    }
+    border
+}
+
 /// Cell values at the nodes, the mean of the cells around weighted with their rest volumes. Opened cells and values
 /// that are not finite do not count where there is another cell.
-fn smoothed_to_nodes(mesh: &BlockMesh, values: &[f64], stiffness: &[f64]) -> Vec<f64> {
+fn smoothed_to_nodes(mesh: &Mesh, values: &[f64], stiffness: &[f64]) -> Vec<f64> {
     let mut intact = vec![(0.0, 0.0); mesh.node_count()];
     let mut opened = intact.clone();
     for (cell, &value) in values.iter().enumerate() {
         if !value.is_finite() {
             continue;
         }
-        let volume = mesh.cell_size(cell).to_array().iter().product::<f64>();
+        let volume = mesh.cell_volume(cell);
         let is_opened = stiffness.get(cell).is_some_and(|&s| s < OPENED_BELOW);
         let sums = if is_opened { &mut opened } else { &mut intact };
-        for node in mesh.cell_nodes(cell) {
-            sums[node].0 += volume * value;
-            sums[node].1 += volume;
+        for node in mesh.cell_nodes(cell).iter() {
+            sums[*node].0 += volume * value;
+            sums[*node].1 += volume;
         }
     }
     intact
@@ -208,10 +248,11 @@ fn smoothed_to_nodes(mesh: &BlockMesh, values: &[f64], stiffness: &[f64]) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::BlockMesh;
 
-    fn mesh() -> BlockMesh {
+    fn mesh() -> Mesh {
         let lines = |low: f64, high: f64, n: usize| (0..=n).map(|i| low + (high - low) * i as f64 / n as f64).collect();
-        BlockMesh { lines: [lines(-0.01, 0.01, 5), lines(-0.01, 0.01, 4), lines(-0.016, 0.0, 4)] }
+        Mesh::Block(BlockMesh { lines: [lines(-0.01, 0.01, 5), lines(-0.01, 0.01, 4), lines(-0.016, 0.0, 4)] })
     }
 
     fn plane(up: DVec3) -> Plane {
@@ -230,7 +271,7 @@ mod tests {
             .sum()
     }
 
-    fn snapshot(mesh: &BlockMesh, displacement: impl Fn(DVec3) -> DVec3) -> FieldSnapshot {
+    fn snapshot(mesh: &Mesh, displacement: impl Fn(DVec3) -> DVec3) -> FieldSnapshot {
         FieldSnapshot {
             displacement: (0..mesh.node_count()).map(|n| displacement(mesh.rest_position(n))).collect(),
             von_mises: vec![7.0; mesh.cell_count()],

@@ -9,11 +9,13 @@ pub mod file;
 pub mod presets;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::effects::EffectSet;
-use crate::material::MooneyRivlin;
+use crate::effects::{self, EffectSet};
+use crate::material::ElasticLaw;
+use crate::mesh::tets::TetMesh;
 use crate::{Error, Result};
 
 /// One simulation: what is there, what moves, what is simulated and what is written.
@@ -26,7 +28,14 @@ pub struct Scene {
     /// File that the scene was read from.
     pub path: PathBuf,
     pub tissue: Tissue,
+    /// Material outside all regions.
     pub material: TissueMaterial,
+    /// Parts of another material; where two overlap, the later one counts.
+    pub regions: Vec<Region>,
+    /// Tetrahedra instead of the structured block.
+    pub mesh: Option<Arc<TetMesh>>,
+    /// Node sets of the tetrahedral mesh whose displacement components are held at zero.
+    pub supports: Vec<Support>,
     /// Conditions on the six faces, indexed by [`Face`].
     pub faces: [FaceCondition; 6],
     pub tool: Option<Tool>,
@@ -75,9 +84,103 @@ pub struct TissueMaterial {
     pub name: String,
     /// Where the constants come from, one line.
     pub source: String,
-    pub law: MooneyRivlin,
+    pub law: ElasticLaw,
     /// Density [kg/m^3].
     pub density: f64,
+    /// Parameters of this material's own; `None`: those of the scene's table, if the effect is on.
+    pub plasticity: Option<effects::plasticity::Params>,
+    pub fibres: Option<effects::fibres::Params>,
+    pub viscoelastic: Option<effects::viscoelastic::Params>,
+    pub damage: Option<effects::damage::Params>,
+    /// Tip forces in this material; `None`: those of the scene's puncture table.
+    pub cutting: Option<Cutting>,
+}
+
+impl TissueMaterial {
+    /// A material without parameters of its own for the effects. `density` [kg/m^3].
+    pub fn new(name: impl Into<String>, source: impl Into<String>, law: ElasticLaw, density: f64) -> Self {
+        TissueMaterial {
+            name: name.into(),
+            source: source.into(),
+            law,
+            density,
+            plasticity: None,
+            fibres: None,
+            viscoelastic: None,
+            damage: None,
+            cutting: None,
+        }
+    }
+}
+
+/// Tip forces of one material [N].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cutting {
+    /// Force at which the tip enters the material, F_pun.
+    pub puncture_force: f64,
+    /// Force of steady cutting, F_cut = G_c w.
+    pub cutting_force: f64,
+}
+
+/// A part of the tissue with a material of its own.
+#[derive(Debug, Clone)]
+pub struct Region {
+    /// Name for messages and outputs, e.g. `skin`.
+    pub name: String,
+    pub shape: RegionShape,
+    pub material: TissueMaterial,
+}
+
+/// Where a region lies [m], in the coordinates of the scene. A cell belongs to it when its centre does.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RegionShape {
+    /// Depths below the top face, `top <= -z < bottom`.
+    Layer {
+        top: f64,
+        bottom: f64,
+    },
+    /// Axis-parallel box.
+    Box {
+        low: DVec3,
+        high: DVec3,
+    },
+    Sphere {
+        centre: DVec3,
+        radius: f64,
+    },
+    /// Cylinder between two points of its axis.
+    Cylinder {
+        from: DVec3,
+        to: DVec3,
+        radius: f64,
+    },
+    /// Cells of a tetrahedral mesh that carry this region name.
+    MeshTag(String),
+}
+
+impl RegionShape {
+    /// True where the point lies inside; a mesh tag has no shape.
+    pub fn contains(&self, x: DVec3) -> bool {
+        match self {
+            RegionShape::Layer { top, bottom } => -x.z >= *top && -x.z < *bottom,
+            RegionShape::Box { low, high } => x.cmpge(*low).all() && x.cmple(*high).all(),
+            RegionShape::Sphere { centre, radius } => x.distance(*centre) <= *radius,
+            RegionShape::Cylinder { from, to, radius } => {
+                let axis = *to - *from;
+                let along = (x - *from).dot(axis) / axis.length_squared();
+                (0.0..=1.0).contains(&along) && (x - *from - axis * along).length() <= *radius
+            }
+            RegionShape::MeshTag(_) => false,
+        }
+    }
+}
+
+/// A named node set that is held.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Support {
+    pub set: String,
+    /// Components held at zero: x, y, z.
+    pub fixed: [bool; 3],
 }
 
 /// The six faces of the block. The discriminant is the index into [`Scene::faces`].

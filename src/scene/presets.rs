@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use crate::material::MooneyRivlin;
+use crate::material::ElasticLaw;
 
 /// A tissue material with its origin and range of validity.
 #[derive(Debug, Clone)]
@@ -16,7 +16,7 @@ pub struct TissuePreset {
     pub source: String,
     /// Where they hold.
     pub range: String,
-    pub law: MooneyRivlin,
+    pub law: ElasticLaw,
     /// Density [kg/m^3].
     pub density: f64,
 }
@@ -83,9 +83,9 @@ pub fn bulk_modulus_from_poisson(shear_modulus: f64, poisson_ratio: f64) -> f64 
 }
 
 /// Law from E [Pa], nu and the share of c10: mu = E / (2 (1 + nu)).
-pub fn law_from_youngs_modulus(youngs_modulus: f64, poisson_ratio: f64, share: f64) -> MooneyRivlin {
+pub fn law_from_youngs_modulus(youngs_modulus: f64, poisson_ratio: f64, share: f64) -> ElasticLaw {
     let shear = youngs_modulus / (2.0 * (1.0 + poisson_ratio));
-    MooneyRivlin::from_moduli(shear, bulk_modulus_from_poisson(shear, poisson_ratio), share)
+    ElasticLaw::from_moduli(shear, bulk_modulus_from_poisson(shear, poisson_ratio), share)
 }
 
 static NEEDLES: LazyLock<(Vec<NeedlePreset>, Vec<NeedleMaterial>)> = LazyLock::new(read_needles);
@@ -117,7 +117,7 @@ fn read_tissues() -> Vec<TissuePreset> {
     let preset = |entry: Entry| TissuePreset {
         law: match entry.constants {
             Constants::MooneyRivlin { c10_kpa, c01_kpa, d_per_mpa } => {
-                MooneyRivlin { c10: c10_kpa * 1e3, c01: c01_kpa * 1e3, bulk_modulus: 2.0e6 / d_per_mpa }
+                ElasticLaw::mooney_rivlin(c10_kpa * 1e3, c01_kpa * 1e3, 2.0e6 / d_per_mpa)
             }
             Constants::Moduli { youngs_modulus_kpa, poisson_ratio, c10_share } => {
                 law_from_youngs_modulus(youngs_modulus_kpa * 1e3, poisson_ratio, c10_share)
@@ -179,7 +179,7 @@ fn read_needles() -> (Vec<NeedlePreset>, Vec<NeedleMaterial>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::mooney_rivlin::Verdict;
+    use crate::material::Verdict;
 
     #[test]
     fn every_tissue_preset_is_stable_and_has_an_origin() {

@@ -5,197 +5,14 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::elements::{CORNERS, CellForces, CellMeasure, CellStates, Elements};
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
 use crate::error::{Error, Result};
-use crate::material::MooneyRivlin;
-use crate::material::mooney_rivlin::{cofactor, jacobian_minus_one};
+use crate::material_point::PointState;
 use crate::mesh::BlockMesh;
 use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
 use crate::scene::{Face, Tool};
-
-/// Hourglass coefficient of a linear elastic cube, [Joldes2008] via physics of the one-point hexahedron.
-pub const HOURGLASS_MODULUS: f64 = 3.11;
-
-/// Corner signs (xi, eta, zeta) in the node order of `BlockMesh::cell_nodes`.
-const CORNERS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
-
-/// The four hourglass base vectors at a corner: eta zeta, zeta xi, xi eta, xi eta zeta.
-fn hourglass_signs([x, y, z]: [f64; 3]) -> [f64; 4] {
-    [y * z, z * x, x * y, x * y * z]
-}
-
-/// One-point hexahedra on a rectilinear block.
-///
-/// ```text
-/// H   = sum_i u_i (x) B_i,  B_i = (xi_i/(4 dx), eta_i/(4 dy), zeta_i/(4 dz))
-/// f_i = V P B_i + hourglass,  q_m = sum_i Gamma_mi u_i / 8,  q2 = sum_m |q_m|^2
-/// E_h = 1/2 kappa 3.11 mu0 V^(1/3) q2 (1 + c/2 q2 / V^(2/3))
-/// ```
-/// Source: Flanagan & Belytschko 1981; Joldes, Wittek & Miller 2008 (total Lagrangian); the quartic term is this
-/// project's (a linear hourglass force lets surface cells fold under a needle tip).
-#[derive(Debug, Clone)]
-pub struct Elements {
-    law: MooneyRivlin,
-    /// kappa 3.11 mu0 [Pa].
-    hourglass: f64,
-    /// c.
-    quartic: f64,
-}
-
-/// What one cell tells about itself.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct CellMeasure {
-    pub elastic: f64,
-    pub hourglass: f64,
-    pub jacobian: f64,
-    pub corner_jacobian: f64,
-}
-
-impl Elements {
-    pub fn new(model: &Model) -> Self {
-        let solver = &model.scene.solver;
-        let law = model.scene.material.law;
-        Elements {
-            law,
-            hourglass: solver.hourglass_stiffness * HOURGLASS_MODULUS * law.shear_modulus(),
-            quartic: solver.hourglass_quartic,
-        }
-    }
-
-    /// Gradient operator of a corner [1/m].
-    fn gradient(size: DVec3, corner: usize) -> DVec3 {
-        DVec3::from(CORNERS[corner]) / (4.0 * size)
-    }
-
-    /// H = F - I (or its rate) at the centre of a cell.
-    pub fn displacement_gradient(values: &[DVec3; 8], size: DVec3) -> DMat3 {
-        let mut h = DMat3::ZERO;
-        for (i, u) in values.iter().enumerate() {
-            let b = Self::gradient(size, i);
-            h += DMat3::from_cols(*u * b.x, *u * b.y, *u * b.z);
-        }
-        h
-    }
-
-    fn hourglass_modes(values: &[DVec3; 8]) -> [DVec3; 4] {
-        let mut q = [DVec3::ZERO; 4];
-        for (u, signs) in values.iter().zip(CORNERS) {
-            for (q, gamma) in q.iter_mut().zip(hourglass_signs(signs)) {
-                *q += *u * (gamma / 8.0);
-            }
-        }
-        q
-    }
-
-    /// Bound of the stiffness that a cell adds to each of its corners [N/m]:
-    /// `V (kappa |cof B|max sum|cof B| + 4/3 mu0 max(1, I1/3) |B| sum|B|)` and the hourglass stiffness.
-    pub fn stiffness_bound(&self, model: &Model, cell: usize, cof: DMat3, bulk: f64, i1_third: f64, q2: f64) -> f64 {
-        let size = model.mesh.cell_size(cell);
-        let volume = size.x * size.y * size.z;
-        let inv = 0.25 / size;
-        let columns = [cof.x_axis * inv.x, cof.y_axis * inv.y, cof.z_axis * inv.z];
-        let [a, b, c] = columns;
-        let cof_b = a.length_squared()
-            + b.length_squared()
-            + c.length_squared()
-            + 2.0 * (a.dot(b).abs() + b.dot(c).abs() + c.dot(a).abs());
-        let shear = 4.0 / 3.0 * self.law.shear_modulus() * i1_third.max(1.0) * inv.length_squared();
-        let edge = volume.cbrt();
-        let hourglass = self.hourglass * edge * (1.0 + 3.0 * self.quartic * q2 / (edge * edge)) / 8.0;
-        8.0 * volume * (bulk * cof_b + shear) + hourglass
-    }
-
-    /// Forces of the cell on its corners with the minus sign of the motion left out (f_int) and the stiffness bound.
-    /// `stiffness` scales elastic and hourglass parts.
-    fn corner_forces(&self, model: &Model, cell: usize, u: &[DVec3; 8], stiffness: f64) -> ([DVec3; 8], f64) {
-        let size = model.mesh.cell_size(cell);
-        let volume = size.x * size.y * size.z;
-        let h = Self::displacement_gradient(u, size);
-        let p = self.law.first_piola_kirchhoff(h) * stiffness;
-        let q = Self::hourglass_modes(u);
-        let q2: f64 = q.iter().map(|q| q.length_squared()).sum();
-        let edge = volume.cbrt();
-        let kh = stiffness * self.hourglass * edge * (1.0 + self.quartic * q2 / (edge * edge));
-        let force = std::array::from_fn(|i| {
-            let mut f = p * Self::gradient(size, i) * volume;
-            for (q, gamma) in q.iter().zip(hourglass_signs(CORNERS[i])) {
-                f += *q * (kh * gamma / 8.0);
-            }
-            f
-        });
-        let f = DMat3::IDENTITY + h;
-        let i1 = f.x_axis.length_squared() + f.y_axis.length_squared() + f.z_axis.length_squared();
-        let bound = self.stiffness_bound(model, cell, cofactor(f), self.law.bulk_modulus, i1 / 3.0, q2);
-        (force, bound * stiffness)
-    }
-
-    /// Energies and Jacobians of one cell; `stiffness` scales the energies.
-    pub fn measure(&self, mesh: &BlockMesh, cell: usize, u: &[DVec3; 8], stiffness: f64) -> CellMeasure {
-        let size = mesh.cell_size(cell);
-        let volume = size.x * size.y * size.z;
-        let h = Self::displacement_gradient(u, size);
-        let q2: f64 = Self::hourglass_modes(u).iter().map(|q| q.length_squared()).sum();
-        let edge = volume.cbrt();
-        let e2 = edge * edge;
-        // Edges that meet in a corner, each along its axis: node order of `cell_nodes`.
-        const NEIGHBOURS: [[usize; 3]; 8] =
-            [[1, 3, 4], [0, 2, 5], [3, 1, 6], [2, 0, 7], [5, 7, 0], [4, 6, 1], [7, 5, 2], [6, 4, 3]];
-        let corner_jacobian = (0..8)
-            .map(|i| {
-                let column = |a: usize| {
-                    let du = u[NEIGHBOURS[i][a]] - u[i];
-                    let mut unit = DVec3::ZERO;
-                    unit[a] = 1.0;
-                    unit - du * (CORNERS[i][a] / size[a])
-                };
-                DMat3::from_cols(column(0), column(1), column(2)).determinant()
-            })
-            .fold(f64::INFINITY, f64::min);
-        CellMeasure {
-            elastic: stiffness * volume * self.law.energy_density(h),
-            hourglass: stiffness * 0.5 * self.hourglass * edge * q2 * (1.0 + 0.5 * self.quartic * q2 / e2),
-            jacobian: 1.0 + jacobian_minus_one(h),
-            corner_jacobian,
-        }
-    }
-
-    /// Internal nodal forces f_int [N] of a displacement field; `stiffness` per cell, empty = all intact.
-    pub fn internal_forces(&self, model: &Model, u: &[DVec3], stiffness: &[f64]) -> Vec<DVec3> {
-        let mesh = &model.mesh;
-        let corner: Vec<[DVec3; 8]> = (0..mesh.cell_count())
-            .into_par_iter()
-            .map(|cell| {
-                let nodes = mesh.cell_nodes(cell);
-                let stiffness = stiffness.get(cell).copied().unwrap_or(1.0);
-                self.corner_forces(model, cell, &nodes.map(|n| u[n]), stiffness).0
-            })
-            .collect();
-        let mut force = vec![DVec3::ZERO; mesh.node_count()];
-        for (cell, f) in corner.iter().enumerate() {
-            for (node, f) in mesh.cell_nodes(cell).into_iter().zip(f) {
-                force[node] += *f;
-            }
-        }
-        force
-    }
-}
-
-/// Per-cell result of the element stage.
-#[derive(Debug, Clone, Copy, Default)]
-struct CellForces {
-    force: [DVec3; 8],
-    bound: f64,
-}
 
 /// Sums of one contact node over one step.
 #[derive(Debug, Clone, Copy, Default)]
@@ -223,6 +40,8 @@ pub struct CpuEngine {
     tip_forces: Vec<(f64, [usize; 8], [f64; 8])>,
     tip_energy: f64,
     contact_energy: f64,
+    /// Plastic and damage dissipation that earlier frames have told [J].
+    booked: (f64, f64),
     finished: std::collections::VecDeque<FrameSums>,
     sums: FrameSums,
 }
@@ -238,10 +57,12 @@ impl CpuEngine {
             stiffness: if model.puncture.is_some() { vec![1.0; cells] } else { Vec::new() },
             tip_coordinate: 0.0,
             contact: vec![ContactState::default(); model.contact_nodes.len()],
+            points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
         };
         let bytes = nodes * (3 * size_of::<DVec3>() + 8)
             + cells * size_of::<CellForces>()
             + state.stiffness.len() * 8
+            + state.points.len() * (size_of::<PointState>() + model.prony_term_count() * size_of::<DMat3>())
             + state.contact.len() * (size_of::<ContactState>() + size_of::<ContactSums>());
         CpuEngine {
             elements: Elements::new(&model),
@@ -259,6 +80,7 @@ impl CpuEngine {
             tip_forces: Vec::new(),
             tip_energy: 0.0,
             contact_energy: 0.0,
+            booked: (0.0, 0.0),
             finished: Default::default(),
             sums: FrameSums::default(),
             model,
@@ -273,7 +95,7 @@ impl CpuEngine {
             self.advance_tip(plan, &pose);
             self.soften_path(plan);
         }
-        self.element_forces();
+        self.element_forces(input);
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             self.needle_contact(plan, &pose);
         }
@@ -310,7 +132,7 @@ impl CpuEngine {
     /// where F > F_c: `a += min((F - F_c) / (k_tip lambda), cap)`, `lambda = <dx_k/da . t>` clamped to 0.2..3.
     fn advance_tip(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
         let model = self.model.clone();
-        let mesh = &model.mesh;
+        let mesh = model.mesh.block();
         let u = &self.state.displacement;
         let t = pose.direction;
         let spring = plan.params.tip_stiffness / plan.anchors.len() as f64;
@@ -335,8 +157,7 @@ impl CpuEngine {
         let mut springs = gaps(a);
         let force: f64 = springs.iter().map(|s| spring * s.0).sum();
         let p = &plan.params;
-        let threshold =
-            p.cutting_force + (p.puncture_force - p.cutting_force) * (1.0 - a / p.transition_length).max(0.0);
+        let threshold = plan.threshold(a);
         if force > threshold {
             let lambda = springs.iter().map(|s| s.1).sum::<f64>() / springs.len() as f64;
             let speed = pose.velocity.length();
@@ -367,27 +188,47 @@ impl CpuEngine {
             if factor < old {
                 // Half a step back: the mean of the energies before and after the step, as the leapfrog work has it.
                 let half = 0.5 * self.dt;
-                let u = self
-                    .model
-                    .mesh
-                    .cell_nodes(cell)
-                    .map(|n| self.state.displacement[n] - self.state.velocity[n] * half);
-                let m = self.elements.measure(&self.model.mesh, cell, &u, 1.0);
+                let mut u = [DVec3::ZERO; 8];
+                for (u, n) in u.iter_mut().zip(self.model.mesh.cell_nodes(cell).iter()) {
+                    *u = self.state.displacement[*n] - self.state.velocity[*n] * half;
+                }
+                let intact = CellStates { points: &self.state.points, stiffness: &[] };
+                let m = self.elements.measure_corners(&self.model, cell, &u, None, intact);
                 self.sums.softening_dissipation += (old - factor) * (m.elastic + m.hourglass);
                 self.state.stiffness[cell] = factor;
             }
         }
     }
 
-    /// Stage `element_forces`.
-    fn element_forces(&mut self) {
-        let (model, elements, state) = (&self.model, &self.elements, &self.state);
-        self.cells.par_iter_mut().with_min_len(256).enumerate().for_each(|(cell, out)| {
-            let nodes = model.mesh.cell_nodes(cell);
-            let stiffness = state.stiffness.get(cell).copied().unwrap_or(1.0);
-            let (force, bound) = elements.corner_forces(model, cell, &nodes.map(|n| state.displacement[n]), stiffness);
-            *out = CellForces { force, bound };
-        });
+    /// Stage `element_forces`; tetrahedra get their averaged pressure first.
+    fn element_forces(&mut self, input: &StepInput) {
+        let (model, elements, dt) = (&self.model, &self.elements, self.dt);
+        let State { displacement, stiffness, points, .. } = &mut self.state;
+        let states = CellStates { points, stiffness };
+        let averaged = elements.averaged_volumetrics(model, displacement, states);
+        let forces = |cell: usize, point: Option<&mut PointState>| {
+            let remaining = stiffness.get(cell).copied().unwrap_or(1.0);
+            let volumetric = averaged.as_ref().map(|a| a[cell]);
+            let advance = Some((dt, input.step));
+            elements.corner_forces(model, cell, displacement, volumetric, remaining, point, advance)
+        };
+        if points.is_empty() {
+            self.cells.par_iter_mut().with_min_len(256).enumerate().for_each(|(cell, out)| *out = forces(cell, None).0);
+            return;
+        }
+        let failures: u32 = self
+            .cells
+            .par_iter_mut()
+            .zip(points.par_iter_mut())
+            .with_min_len(64)
+            .enumerate()
+            .map(|(cell, (out, point))| {
+                let (forces, met) = forces(cell, Some(point));
+                *out = forces;
+                u32::from(!met)
+            })
+            .sum();
+        self.sums.return_failures += failures;
     }
 
     /// Stage `needle_contact`: nodes of the ring that the tip has passed keep `r >= r_e(s)`,
@@ -543,8 +384,7 @@ impl CpuEngine {
         let limit = model.speed_limit(dt);
         let selective = model.effects.mass_scaling.is_some();
         let gravity = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling());
-        let [nx, ny, nz] = mesh.cells();
-        let cells = &self.cells;
+        let (cells, elements) = (&self.cells, &self.elements);
         let external = &self.external;
         let result: (f64, f64, u32, u32) = self
             .state
@@ -554,20 +394,7 @@ impl CpuEngine {
             .enumerate()
             .with_min_len(256)
             .map(|(node, (u, v))| {
-                let [i, j, k] = mesh.node_coordinates(node);
-                let (mut force, mut bound) = (DVec3::ZERO, 0.0);
-                for (corner, signs) in CORNERS.iter().enumerate() {
-                    // The cell of which this node is `corner` lies on the other side of the sign.
-                    let at = |n: usize, s: f64, count: usize| {
-                        if s < 0.0 { (n < count).then_some(n) } else { n.checked_sub(1) }
-                    };
-                    if let (Some(i), Some(j), Some(k)) = (at(i, signs[0], nx), at(j, signs[1], ny), at(k, signs[2], nz))
-                    {
-                        let cell = &cells[mesh.cell_index(i, j, k)];
-                        force -= cell.force[corner];
-                        bound += cell.bound;
-                    }
-                }
+                let (mut force, bound) = elements.gather(mesh, cells, node);
                 let scaled = model.node_mass[node];
                 let mut load = gravity * scaled;
                 if let Some(f) = model.node_load.get(node) {
@@ -629,22 +456,35 @@ impl CpuEngine {
     /// Stages `measure_cells`, `measure_nodes`, `measure_contact`.
     fn measure(&mut self) {
         let (model, elements, state) = (&self.model, &self.elements, &self.state);
+        let states = CellStates { points: &state.points, stiffness: &state.stiffness };
+        let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
         let measures: Vec<CellMeasure> = (0..model.mesh.cell_count())
             .into_par_iter()
-            .map(|cell| {
-                let u = model.mesh.cell_nodes(cell).map(|n| state.displacement[n]);
-                let stiffness = state.stiffness.get(cell).copied().unwrap_or(1.0);
-                elements.measure(&model.mesh, cell, &u, stiffness)
-            })
+            .map(|cell| elements.measure(model, cell, &state.displacement, averaged.as_ref().map(|a| a[cell]), states))
             .collect();
         let sums = &mut self.sums;
         sums.elastic = measures.iter().map(|m| m.elastic).sum();
         sums.hourglass = measures.iter().map(|m| m.hourglass).sum();
-        sums.min_j = measures.iter().map(|m| m.jacobian).fold(f64::INFINITY, f64::min);
-        sums.min_corner_j = measures.iter().map(|m| m.corner_jacobian).fold(f64::INFINITY, f64::min);
-        let inverted = |m: &CellMeasure| m.jacobian <= 0.0 || m.corner_jacobian <= 0.0;
+        sums.viscous_dissipation = measures.iter().map(|m| m.viscous).sum();
+        // What deletion has taken out may be turned inside out.
+        let present = || measures.iter().filter(|m| m.damage < 1.0);
+        sums.deleted_cells = (measures.len() - present().count()) as u32;
+        sums.largest_damage = measures.iter().map(|m| m.damage).fold(0.0, f64::max);
+        sums.min_j = present().map(|m| m.jacobian).fold(f64::INFINITY, f64::min);
+        sums.min_corner_j = present().map(|m| m.corner_jacobian).fold(f64::INFINITY, f64::min);
+        let inverted = |m: &CellMeasure| m.damage < 1.0 && (m.jacobian <= 0.0 || m.corner_jacobian <= 0.0);
         sums.inverted_cells = measures.iter().filter(|m| inverted(m)).count() as u32;
         sums.inverted_cell = measures.iter().position(inverted).map(|c| c as u32);
+        let dissipated = state.points.iter().enumerate().fold((0.0, 0.0), |sum, (cell, p)| {
+            let v = model.mesh.cell_volume(cell);
+            (sum.0 + v * p.plastic_dissipation, sum.1 + v * p.damage_dissipation)
+        });
+        sums.plastic_dissipation = dissipated.0 - self.booked.0;
+        sums.damage_dissipation = dissipated.1 - self.booked.1;
+        self.booked = dissipated;
+        if model.has_driven_faces() {
+            sums.reactions = face_reactions(model, &elements.nodal_forces(&model.mesh, &self.cells));
+        }
         sums.kinetic = state.velocity.iter().zip(&model.node_mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
         sums.max_speed = state.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
         sums.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
@@ -669,14 +509,12 @@ impl FrameSums {
 
 /// Velocity that the driven faces prescribe at a node (zero where a face only holds) [m/s].
 fn prescribed_velocity(model: &Model, node: usize, input: &StepInput, dt: f64) -> DVec3 {
-    let c = model.mesh.node_coordinates(node);
-    let n = model.mesh.nodes();
     let mut velocity = DVec3::ZERO;
     for face in Face::ALL {
-        let axis = face.axis();
-        if c[axis] != if face.is_max() { n[axis] - 1 } else { 0 } || model.faces()[face as usize].drive.is_none() {
+        if !model.lies_on(node, face) || model.faces()[face as usize].drive.is_none() {
             continue;
         }
+        let axis = face.axis();
         let drive = input.drives[face as usize];
         let arm = model.mesh.rest_position(node) - model.face_centre(face);
         let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -686,6 +524,19 @@ fn prescribed_velocity(model: &Model, node: usize, input: &StepInput, dt: f64) -
         velocity += du / dt;
     }
     velocity
+}
+
+/// What each face exerts on the tissue to hold or move its nodes, without inertia and loads [N].
+pub fn face_reactions(model: &Model, internal_force: &[DVec3]) -> [DVec3; 6] {
+    let mut reactions = [DVec3::ZERO; 6];
+    for (node, force) in internal_force.iter().enumerate() {
+        for face in Face::ALL {
+            if model.lies_on(node, face) {
+                reactions[face as usize] += *force;
+            }
+        }
+    }
+    reactions
 }
 
 impl Engine for CpuEngine {
@@ -720,6 +571,7 @@ impl Engine for CpuEngine {
     }
 
     fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
-        Ok(self.elements.internal_forces(&self.model, &self.state.displacement, &self.state.stiffness))
+        let states = CellStates { points: &self.state.points, stiffness: &self.state.stiffness };
+        Ok(self.elements.internal_forces(&self.model, &self.state.displacement, states))
     }
 }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::error::Result;
+use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::ToolPose;
 use crate::scene::Face;
@@ -16,6 +17,8 @@ pub struct StepInput {
     pub load_factor: f64,
     /// Motion of the driven faces during the step.
     pub drives: [DriveStep; 6],
+    /// Number of the step since t = 0.
+    pub step: u64,
 }
 
 /// Displacement increment of a driven face during one step: `du = translation + (R1 - R0)(X - c)`.
@@ -60,6 +63,7 @@ impl StepInput {
             pose: model.kinematics.as_ref().map(|k| k.pose(time)),
             load_factor: ramp(time, model.load_ramp),
             drives,
+            step: (time / dt).round() as u64,
         }
     }
 }
@@ -84,6 +88,13 @@ pub struct FrameSums {
     pub contact_dissipation: f64,
     pub tip_dissipation: f64,
     pub softening_dissipation: f64,
+    /// Dissipated by plastic flow and by damage [J].
+    pub plastic_dissipation: f64,
+    pub damage_dissipation: f64,
+    /// Total: dissipated by the Prony terms [J].
+    pub viscous_dissipation: f64,
+    /// What each face exerts on the tissue at the last step [N]; zero without driven faces.
+    pub reactions: [DVec3; 6],
     /// Total: stored in contact, stick and tip springs [J].
     pub contact_energy: f64,
     /// Total: material coordinate a of the tip [m].
@@ -102,6 +113,10 @@ pub struct FrameSums {
     pub min_corner_j: f64,
     pub inverted_cells: u32,
     pub inverted_cell: Option<u32>,
+    /// Largest d; cells that were deleted; cell steps whose return mapping did not meet the yield condition.
+    pub largest_damage: f64,
+    pub deleted_cells: u32,
+    pub return_failures: u32,
     pub clamped_nodes: u32,
     pub raised_mass: u32,
     pub max_speed: f64,
@@ -122,6 +137,8 @@ pub struct State {
     /// Memory per contact node: stretch of the stick spring [m], overlap at activation [m], axial position at
     /// activation [m]; `touching` tells whether the last two are set.
     pub contact: Vec<ContactState>,
+    /// History per cell; empty without `plasticity` and `viscoelastic`.
+    pub points: Vec<PointState>,
 }
 
 /// Memory of one contact node.

@@ -1,6 +1,7 @@
 //! The step: one list of stages, two engines.
 
 pub mod cpu;
+pub mod elements;
 pub mod engine;
 pub mod simulation;
 pub mod stable_dt;

@@ -6,13 +6,15 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::cpu::{CpuEngine, Elements};
+use super::cpu::CpuEngine;
+use super::elements::{CellShape, CellStates, Elements};
 use super::engine::{Engine, FramePlan, State, StepInput};
 use super::stable_dt::{power_iteration, wave_speed_bound};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuEngine};
-use crate::material::mooney_rivlin::{Verdict, von_mises};
-use crate::mesh::BlockMesh;
+use crate::material::{Verdict, von_mises};
+use crate::material_point::PointState;
+use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
 use crate::observables::{FieldSnapshot, FrameRecord, Recorder};
 use crate::scene::Scene;
@@ -94,12 +96,15 @@ impl Simulation {
     /// # Errors
     /// `Error::Adapter` where the wanted engine is not to be had, `Error::Input` where the mesh does not fit the device.
     pub fn new(scene: Scene, choice: EngineChoice) -> Result<Self> {
-        let mesh = BlockMesh::for_scene(&scene);
+        let mesh = match &scene.mesh {
+            Some(tets) => Mesh::Tets(tets.clone()),
+            None => Mesh::Block(BlockMesh::for_scene(&scene)),
+        };
         Self::with_mesh(scene, mesh, choice)
     }
 
     /// The same on a given mesh.
-    pub fn with_mesh(scene: Scene, mesh: BlockMesh, choice: EngineChoice) -> Result<Self> {
+    pub fn with_mesh(scene: Scene, mesh: impl Into<Mesh>, choice: EngineChoice) -> Result<Self> {
         let mut notices = Vec::new();
         let device = match choice {
             EngineChoice::Cpu => None,
@@ -144,7 +149,7 @@ impl Simulation {
         let total_steps = ((model.duration() / dt) * (1.0 - 1e-9)).ceil() as u64;
         // The first frame is a single step, so that the time to the first step can be told.
         let frames = 1 + total_steps.saturating_sub(1).div_ceil(steps_per_frame);
-        let watch_stretch = !matches!(model.scene.material.law.verdict(), Verdict::Stable);
+        let watch_stretch = model.materials.iter().any(|m| !matches!(m.law.verdict(), Verdict::Stable));
         Ok(Simulation {
             stable_dt,
             dt,
@@ -310,11 +315,11 @@ impl Simulation {
 
     /// Stops when an element leaves the stretch range in which the material is stable.
     fn check_stretch(&mut self, record: &FrameRecord) -> Result<()> {
-        let verdict = self.model.scene.material.law.verdict();
+        let verdicts: Vec<Verdict> = self.model.materials.iter().map(|m| m.law.verdict()).collect();
         let state = self.engine.read_state()?;
         for (cell, h) in displacement_gradients(&self.model.mesh, &state).into_iter().enumerate() {
             let (low, high) = principal_stretch_range(glam::DMat3::IDENTITY + h);
-            let (broken, limit, value) = match verdict {
+            let (broken, limit, value) = match verdicts[self.model.material_index(cell)] {
                 Verdict::StableBelow(limit) => (high > limit, limit, high),
                 Verdict::StableAbove(limit) => (low < limit, limit, low),
                 _ => (false, 0.0, 0.0),
@@ -344,11 +349,11 @@ impl Simulation {
 }
 
 /// H = F - I at the centre of every cell.
-fn displacement_gradients(mesh: &BlockMesh, state: &State) -> Vec<glam::DMat3> {
+fn displacement_gradients(mesh: &Mesh, state: &State) -> Vec<glam::DMat3> {
     (0..mesh.cell_count())
         .map(|cell| {
-            let u = mesh.cell_nodes(cell).map(|n| state.displacement[n]);
-            Elements::displacement_gradient(&u, mesh.cell_size(cell))
+            let shape = CellShape::new(mesh, cell);
+            shape.displacement_gradient(&shape.gather(&state.displacement))
         })
         .collect()
 }
@@ -372,7 +377,7 @@ fn principal_stretch_range(f: glam::DMat3) -> (f64, f64) {
 
 /// Stresses and Jacobians of a state, in f64.
 pub fn snapshot(model: &Model, record: &FrameRecord, state: State) -> FieldSnapshot {
-    let law = &model.scene.material.law;
+    let elements = Elements::new(model);
     let gradients = displacement_gradients(&model.mesh, &state);
     let mut fields = FieldSnapshot {
         frame: record.frame,
@@ -385,15 +390,34 @@ pub fn snapshot(model: &Model, record: &FrameRecord, state: State) -> FieldSnaps
         }),
         ..Default::default()
     };
+    let states = CellStates { points: &state.points, stiffness: &state.stiffness };
+    let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
+    let fresh = PointState::default();
     for (cell, h) in gradients.into_iter().enumerate() {
         let f = glam::DMat3::IDENTITY + h;
         let j = f.determinant();
-        let stiffness = state.stiffness.get(cell).copied().unwrap_or(1.0);
+        let material = model.material(cell);
+        let point = states.point(cell).unwrap_or(&fresh);
+        let damage = material.degradation(point, model.mesh.cell_volume(cell).cbrt());
+        let intact = states.remaining(cell) * (1.0 - damage);
+        let volumetric = averaged.as_ref().map_or_else(|| material.volumetric(h, intact), |a| a[cell]);
         // An inverted cell has no Cauchy stress; its J tells.
-        let sigma = if j > 0.0 { law.cauchy(h) * stiffness } else { glam::DMat3::ZERO };
+        let sigma = match j > 0.0 {
+            true => material.stress(h, volumetric, intact, point) * f.transpose() * (1.0 / j),
+            false => glam::DMat3::ZERO,
+        };
         fields.von_mises.push(von_mises(sigma));
         fields.jacobian.push(j);
         fields.pressure.push(-(sigma.x_axis.x + sigma.y_axis.y + sigma.z_axis.z) / 3.0);
+        if model.effects.plasticity.is_some() {
+            fields.plastic_strain.push(point.plastic.alpha);
+        }
+        if model.effects.damage.is_some() {
+            fields.damage.push(damage);
+        }
+    }
+    if !model.cell_material.is_empty() {
+        fields.material = model.cell_material.iter().map(|m| f64::from(*m)).collect();
     }
     fields.displacement = state.displacement;
     fields.stiffness = state.stiffness;

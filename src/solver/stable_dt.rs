@@ -3,7 +3,9 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::cpu::Elements;
+use super::elements::{CellStates, Elements};
+use crate::material_point::PointState;
+use crate::mesh::Mesh;
 use crate::model::Model;
 
 /// Wave-speed bound of the undamped central difference at rest [s]: `2 sqrt(m / k)` with the Gershgorin bound `k` of
@@ -14,12 +16,12 @@ use crate::model::Model;
 /// nodes and creates a third of the work as energy (measured), with 0.8 of this bound none.
 pub fn wave_speed_bound(model: &Model) -> f64 {
     let elements = Elements::new(model);
-    let bulk = model.scene.material.law.bulk_modulus;
     let mut bound = vec![0.0; model.mesh.node_count()];
     for cell in 0..model.mesh.cell_count() {
-        let k = elements.stiffness_bound(model, cell, DMat3::IDENTITY, bulk, 1.0, 0.0);
-        for node in model.mesh.cell_nodes(cell) {
-            bound[node] += k;
+        let tangent = model.material(cell).tangent_bound(DMat3::ZERO, &PointState::default());
+        let k = elements.stiffness_bound(model, cell, DMat3::IDENTITY, tangent, 0.0);
+        for (node, k) in model.mesh.cell_nodes(cell).iter().zip(k) {
+            bound[*node] += k;
         }
     }
     let steps = bound.iter().zip(&model.node_mass).map(|(k, m)| 2.0 * (m / k).sqrt());
@@ -32,12 +34,15 @@ pub fn power_iteration(model: &Model) -> f64 {
     let elements = Elements::new(model);
     const ITERATIONS: usize = 60;
     let count = model.mesh.node_count();
-    let smallest = model.smallest_edge();
+    let smallest = model.mesh.smallest_edge();
     // A checkerboard start is close to the highest mode; the perturbation breaks its symmetry.
     let mut mode: Vec<DVec3> = (0..count)
         .map(|n| {
-            let [i, j, k] = model.mesh.node_coordinates(n);
-            let sign = if (i + j + k) % 2 == 0 { 1.0 } else { -1.0 };
+            let parity = match &model.mesh {
+                Mesh::Block(block) => block.node_coordinates(n).iter().sum(),
+                Mesh::Tets(_) => n,
+            };
+            let sign = if parity % 2 == 0 { 1.0 } else { -1.0 };
             let ripple = ((n * 2654435761) % 1000) as f64 * 1e-3;
             DVec3::new(sign, sign * (0.5 + 0.3 * ripple), 0.7 * sign - 0.2 * ripple)
         })
@@ -58,7 +63,7 @@ pub fn power_iteration(model: &Model) -> f64 {
         }
         let scale = 1e-5 * smallest / largest;
         let u: Vec<DVec3> = mode.iter().map(|v| *v * scale).collect();
-        let force = elements.internal_forces(model, &u, &[]);
+        let force = elements.internal_forces(model, &u, CellStates::default());
         let next: Vec<DVec3> = force.par_iter().zip(&model.node_mass).map(|(f, m)| *f / (*m * scale)).collect();
         // Rayleigh quotient with the mass matrix.
         let (mut top, mut bottom) = (0.0, 0.0);

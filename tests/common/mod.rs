@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 use serde_json::Value;
 use stylet::effects::EffectSet;
 use stylet::gpu::{Gpu, GpuEngine};
-use stylet::material::MooneyRivlin;
+use stylet::material::ElasticLaw;
 use stylet::mesh::BlockMesh;
 use stylet::model::Model;
 use stylet::scene::{FaceCondition, Motion, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool};
@@ -16,9 +16,9 @@ use stylet::solver::cpu::CpuEngine;
 use stylet::solver::engine::{Engine, FramePlan, FrameSums, State, StepInput};
 
 /// Material A of the reference files.
-pub const MATERIAL_A: MooneyRivlin = MooneyRivlin { c10: 2300.0, c01: 1000.0, bulk_modulus: 5.0e5 };
+pub const MATERIAL_A: ElasticLaw = ElasticLaw::mooney_rivlin(2300.0, 1000.0, 5.0e5);
 /// Material N of the reference files.
-pub const MATERIAL_N: MooneyRivlin = MooneyRivlin { c10: 3300.0, c01: 0.0, bulk_modulus: 5.0e5 };
+pub const MATERIAL_N: ElasticLaw = ElasticLaw::mooney_rivlin(3300.0, 0.0, 5.0e5);
 /// Density of the reference files [kg/m^3].
 pub const DENSITY: f64 = 1060.0;
 /// Default hourglass constants of a scene without and with the effect `puncture`.
@@ -71,12 +71,10 @@ pub fn block(size_mm: [f64; 3], cell_mm: f64) -> Scene {
             growth: 1.25,
             axis_offset_cells: [0.23, 0.31],
         },
-        material: TissueMaterial {
-            name: "A".into(),
-            source: "reference files".into(),
-            law: MATERIAL_A,
-            density: DENSITY,
-        },
+        material: TissueMaterial::new("A", "reference files", MATERIAL_A, DENSITY),
+        regions: Vec::new(),
+        mesh: None,
+        supports: Vec::new(),
         faces: Default::default(),
         tool: None,
         motion: Motion::default(),

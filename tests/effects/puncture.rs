@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use stylet::effects::{mass_scaling, puncture};
-use stylet::material::MooneyRivlin;
+use stylet::material::ElasticLaw;
 use stylet::model::Model;
 use stylet::scene::{NeedleShape, Phase, Tool};
 use stylet::solver::engine::{Engine, FrameSums, State};
@@ -18,7 +18,7 @@ const STEPS: usize = 5;
 /// The muscle of the scenes (E 60 kPa, nu 0.45) and a 2 mm needle, cells of 0.9 mm.
 fn insertion(depth: f64) -> Arc<Model> {
     let mut scene = block([16.0, 16.0, 10.0], 0.9);
-    scene.material.law = MooneyRivlin::from_moduli(20_690.0, 200_000.0, 0.7);
+    scene.material.law = ElasticLaw::from_moduli(20_690.0, 200_000.0, 0.7);
     scene.faces[4] = held(true, true, true);
     for face in &mut scene.faces[..4] {
         *face = held(true, true, true);

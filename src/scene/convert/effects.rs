@@ -90,6 +90,10 @@ impl Check<'_> {
         EffectSet {
             mass_scaling: listed("mass_scaling").then_some(effects::mass_scaling::Params { factor }),
             gravity: listed("gravity").then_some(gravity),
+            plasticity: listed("plasticity").then(Default::default),
+            fibres: listed("fibres").then(Default::default),
+            viscoelastic: listed("viscoelastic").then(Default::default),
+            damage: listed("damage").then(Default::default),
             puncture: listed("puncture").then_some(puncture),
             indentation: listed("indentation").then_some(indentation),
             friction: listed("friction").then_some(friction),

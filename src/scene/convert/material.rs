@@ -3,8 +3,7 @@
 use super::super::file::MaterialTable;
 use super::super::{TissueMaterial, presets};
 use super::{Check, KPA, MM, Within};
-use crate::material::mooney_rivlin::{MooneyRivlin, Verdict};
-use crate::material::{describe_verdict, four_digits, ripple_growth_time};
+use crate::material::{ElasticLaw, Isochoric, Verdict, describe_verdict, four_digits, ripple_growth_time};
 
 /// Young's modulus above which a material is no soft tissue [Pa].
 const LARGEST_TISSUE_MODULUS: f64 = 10.0e6;
@@ -24,12 +23,7 @@ impl Check<'_> {
             Within::Between(100.0, 5000.0),
         );
         // Stands in after a reported problem, so that the other tables are still checked; it never leaves `scene`.
-        let placeholder = TissueMaterial {
-            name: "refused".into(),
-            source: String::new(),
-            law: MooneyRivlin { c10: 1.0, c01: 1.0, bulk_modulus: 1.0 },
-            density,
-        };
+        let placeholder = TissueMaterial::new("refused", "", ElasticLaw::mooney_rivlin(1.0, 1.0, 1.0), density);
         // Ranges first: signs of c10 and c01 are the verdict's business.
         for (key, value) in [("c10_kpa", table.c10_kpa), ("c01_kpa", table.c01_kpa)] {
             if let Some(value) = value {
@@ -101,6 +95,7 @@ impl Check<'_> {
                     source: format!("{}; valid: {}", preset.source, preset.range),
                     law,
                     density: if table.density_kg_m3.is_some() { density } else { preset.density },
+                    ..placeholder
                 }
             }
             (Some(_), _, _) => {
@@ -126,8 +121,8 @@ impl Check<'_> {
                 TissueMaterial {
                     name: "constants".into(),
                     source: "c10, c01 of the scene file".into(),
-                    law: MooneyRivlin { c10: c10 * KPA, c01: c01 * KPA, bulk_modulus },
-                    density,
+                    law: ElasticLaw::mooney_rivlin(c10 * KPA, c01 * KPA, bulk_modulus),
+                    ..placeholder
                 }
             }
             (None, None, None) if table.youngs_modulus_kpa.is_some() => {
@@ -153,7 +148,7 @@ impl Check<'_> {
                     name: "constants".into(),
                     source: "E and nu of the scene file".into(),
                     law: presets::law_from_youngs_modulus(young, nu, table.c10_share.unwrap_or(C10_SHARE)),
-                    density,
+                    ..placeholder
                 }
             }
             _ => {
@@ -189,7 +184,10 @@ impl Check<'_> {
         let place = if table.c01_kpa.is_some() { "material.c01_kpa" } else { "material" };
         match law.verdict() {
             Verdict::Unstable => {
-                let (c10, c01) = (law.c10 / KPA, law.c01 / KPA);
+                let (c10, c01) = match law.isochoric {
+                    Isochoric::MooneyRivlin(l) => (l.c10 / KPA, l.c01 / KPA),
+                    _ => (0.5 * law.shear_modulus() / KPA, 0.0),
+                };
                 let shear = four_digits(law.shear_modulus() / KPA);
                 let growth = match ripple_growth_time(law, material.density, cell_size) {
                     Some(time) => format!(

@@ -1,0 +1,62 @@
+//! Damage: shear failure that degrades all stress, driven by the plastic displacement.
+//!
+//! ```text
+//! P = (1 - d) P_undamaged,  d = min(u_pl/u_f, d_max),  u_pl = L_e (alpha - alpha_0)
+//! dissipated by the flow after onset: (2 d_max - d_max^2) G_f per area,  G_f = sigma u_f/2      [J/m^2]
+//! ```
+//! `L_e = V^(1/3)`: edge of the cell; `alpha`: equivalent plastic strain of the effect `plasticity`, which this one needs;
+//! the yield condition sees the undamaged stress. A cell at d_max may be deleted (d = 1); its mass stays. What the elastic
+//! energy loses, `W dd`, is booked as damage. The hourglass force degrades with the stress. Driven by the plastic
+//! displacement the dissipation does not depend on the mesh; the secant law with the same cap would.
+//! Range of validity: `L_e < E u_f/sigma`, or the cell snaps back. Source: Hillerborg 1976, Lubliner et al. 1989;
+//! [Lv2022] Eq. 12-14 with the kinematics of Eq. 8.
+
+use super::Effect;
+
+pub const EFFECT: Effect = Effect {
+    key: "damage",
+    define: "DAMAGE",
+    summary: "failure by plastic displacement, regularised by the cell size; needs plasticity",
+    source: "Lubliner1989; Lv2022 Eq. 12-14",
+    cost: "no state of its own",
+};
+
+/// Parameters in SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Equivalent plastic strain at which damage begins, alpha_0.
+    pub onset: f64,
+    /// Plastic displacement at which d would be 1, u_f [m].
+    pub failure_displacement: f64,
+    /// Largest degradation d_max, 0..1.
+    pub largest: f64,
+    /// Delete a cell that has reached d_max.
+    pub deletion: bool,
+}
+
+impl Default for Params {
+    /// Muscle: the plastic strain at a stretch of 1.65; u_f of the tough end of the resolvable window.
+    fn default() -> Self {
+        Params { onset: 0.0625, failure_displacement: 1.0e-3, largest: 0.95, deletion: false }
+    }
+}
+
+impl Params {
+    /// d for the plastic strain `alpha` of a cell of edge `length` [m].
+    pub fn degradation(&self, alpha: f64, length: f64) -> f64 {
+        let d = ((alpha - self.onset) * length / self.failure_displacement).max(0.0);
+        if d < self.largest {
+            d
+        } else if self.deletion {
+            1.0
+        } else {
+            self.largest
+        }
+    }
+
+    /// Energy that the flow dissipates per area from onset to d_max at a constant flow stress [J/m^2].
+    pub fn dissipation_per_area(&self, flow_stress: f64) -> f64 {
+        let d = self.largest;
+        (2.0 * d - d * d) * 0.5 * flow_stress * self.failure_displacement
+    }
+}

@@ -1,0 +1,76 @@
+//! Fibres: one family, exponential in the isochoric square of the fibre stretch, in tension only.
+//!
+//! ```text
+//! W_f = k1/(2 k2) (exp(k2 <e>^2) - 1),  e = I4bar - 1,  I4bar = a(J) |F n|^2        [J/m^3]
+//! P_f = k1 <e> exp(k2 <e>^2) (2 a F n (x) n + a' |F n|^2 cof F)                      [Pa]
+//! ```
+//! `n`: unit vector along the fibres at rest; `<x> = max(x, 0)`; `a = J^(-2/3)` as in `src/material/mod.rs`. Beyond
+//! `k2 e^2 = 10` the exponential continues as its second-order Taylor polynomial. Stiffness along the fibres at rest
+//! grows from 0: 4 k1 is the slope of W_f' at the onset. Source: Holzapfel, Gasser & Ogden 2000 with one family.
+
+use glam::{DMat3, DVec3};
+
+use super::Effect;
+use crate::material::demiray::capped_exponential;
+use crate::material::kinematics::{cofactor, isochoric_factor, jacobian_minus_one};
+
+pub const EFFECT: Effect = Effect {
+    key: "fibres",
+    define: "FIBRES",
+    summary: "one family of fibres that stiffen exponentially in tension",
+    source: "Holzapfel2000",
+    cost: "no state; about 40 operations per cell",
+};
+
+/// Parameters in SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Unit vector along the fibres at rest, n.
+    pub direction: DVec3,
+    /// Stiffness k1 [Pa].
+    pub k1: f64,
+    /// Exponent k2 (dimensionless), greater than 0.
+    pub k2: f64,
+}
+
+impl Default for Params {
+    /// Together with `across-fibre` and its plasticity: 85 kPa along and 26 kPa across at a stretch of 1.65.
+    fn default() -> Self {
+        Params { direction: DVec3::X, k1: 4.26e3, k2: 0.3 }
+    }
+}
+
+impl Params {
+    /// `<I4bar - 1>`, a, a' and |F n|^2.
+    fn strain(&self, h: DMat3) -> (f64, f64, f64, f64) {
+        let stretched = self.direction + h * self.direction;
+        let square = stretched.length_squared();
+        let (a, da) = isochoric_factor(1.0 + jacobian_minus_one(h), -2.0 / 3.0);
+        ((a * square - 1.0).max(0.0), a, da, square)
+    }
+
+    /// W_f for H = F - I [J/m^3].
+    pub fn energy_density(&self, h: DMat3) -> f64 {
+        let (e, ..) = self.strain(h);
+        0.5 * self.k1 / self.k2 * capped_exponential(self.k2 * e * e).0
+    }
+
+    /// P_f for H = F - I [Pa].
+    pub fn first_piola_kirchhoff(&self, h: DMat3) -> DMat3 {
+        let (e, a, da, square) = self.strain(h);
+        let slope = self.k1 * e * capped_exponential(self.k2 * e * e).1;
+        let f = DMat3::IDENTITY + h;
+        let n = self.direction;
+        let fn_ = f * n;
+        let along = DMat3::from_cols(fn_ * n.x, fn_ * n.y, fn_ * n.z);
+        (along * (2.0 * a) + cofactor(f) * (da * square)) * slope
+    }
+
+    /// Bound of the tangent modulus [Pa]: `4 a^2 |F n|^2 d^2W/de^2 + 2 a dW/de`.
+    pub fn tangent_bound(&self, h: DMat3) -> f64 {
+        let (e, a, _, square) = self.strain(h);
+        let (_, first, second) = capped_exponential(self.k2 * e * e);
+        let curvature = self.k1 * (first + 2.0 * self.k2 * e * e * second);
+        4.0 * a * a * square * curvature + 2.0 * a * self.k1 * e * first
+    }
+}

@@ -1,0 +1,202 @@
+//! One material point with all constitutive effects, in f64 and in the order of the element stage.
+//!
+//! ```text
+//! plasticity    Fe = F G, flow until the yield condition holds      first: all others see the elastic part it leaves
+//! elastic law   P_iso(Fe) G^T + p cof F                             the volumetric part sees F: det G = 1
+//! fibres        + P_f(F)                                            intact fibres bridge a matrix that flows
+//! viscoelastic  - F sum q_i, driven by F^-1 (P_iso + P_f)           relaxes what matrix and fibres hold together
+//! damage        (1 - d) times the sum                               last: what has failed carries nothing of it
+//! ```
+//! The path of the effect `puncture` multiplies the result once more, in the element stage.
+
+use glam::DMat3;
+
+use crate::effects::{damage, fibres, plasticity, viscoelastic};
+use crate::material::ElasticLaw;
+use crate::material::kinematics::{cofactor, double_dot, jacobian_minus_one, norm_squared};
+
+/// Constants of one material with the effects that are on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    pub law: ElasticLaw,
+    /// Density without mass scaling [kg/m^3].
+    pub density: f64,
+    pub plasticity: Option<plasticity::Params>,
+    pub fibres: Option<fibres::Params>,
+    pub viscoelastic: Option<viscoelastic::Params>,
+    pub damage: Option<damage::Params>,
+}
+
+/// History of one material point. Energies are per rest volume and since t = 0 [J/m^3].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PointState {
+    pub plastic: plasticity::State,
+    /// q_i [Pa], one symmetric tensor per Prony term; empty: all zero.
+    pub viscous: Vec<DMat3>,
+    /// Dissipated by plastic flow and by damage.
+    pub plastic_dissipation: f64,
+    pub damage_dissipation: f64,
+    /// sum E:dq, weighted with the stiffness that was left.
+    pub viscous_work: f64,
+}
+
+/// Volumetric answer. A hexahedron has its own J; tetrahedra share averaged nodal values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Volumetric {
+    /// Pressure-like stress p [Pa] of `P = ... + p cof F`, with all that damage and path left of it.
+    pub stress: f64,
+    /// Energy U of the undamaged point [J/m^3].
+    pub energy: f64,
+}
+
+/// What surrounds a point in one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surroundings {
+    /// Edge of the cell, V^(1/3) [m].
+    pub length: f64,
+    /// Time step [s] and number of the step.
+    pub dt: f64,
+    pub step: u64,
+    /// Stiffness that the opened path left, 0..1.
+    pub remaining: f64,
+    /// Other energy that damage takes along: hourglass energy per volume [J/m^3].
+    pub other_energy: f64,
+}
+
+/// Energies per rest volume [J/m^3].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PointEnergy {
+    /// Stored: elastic, fibres, volumetric, and what the Prony terms hold.
+    pub stored: f64,
+    /// `Xi`, the part of the viscous work that is stored.
+    pub viscous_stored: f64,
+}
+
+impl Material {
+    /// K/2 (J - 1)^2 of a point that keeps the part `intact` of its stiffness, and its derivative.
+    pub fn volumetric(&self, h: DMat3, intact: f64) -> Volumetric {
+        let dj = jacobian_minus_one(h);
+        Volumetric { stress: intact * self.law.bulk_modulus * dj, energy: 0.5 * self.law.bulk_modulus * dj * dj }
+    }
+
+    /// Degradation d of the point.
+    pub fn degradation(&self, state: &PointState, length: f64) -> f64 {
+        self.damage.map_or(0.0, |damage| damage.degradation(state.plastic.alpha, length))
+    }
+
+    /// Isochoric stress of matrix and fibres [Pa].
+    fn isochoric_stress(&self, h: DMat3, state: &PointState) -> DMat3 {
+        let mut p = match self.plasticity {
+            None => self.law.isochoric_stress(h),
+            Some(_) => {
+                let he = plasticity::elastic_gradient(h, &state.plastic);
+                self.law.isochoric_stress(he) * (DMat3::IDENTITY + state.plastic.inverse_flow).transpose()
+            }
+        };
+        if let Some(fibres) = &self.fibres {
+            p += fibres.first_piola_kirchhoff(h);
+        }
+        p
+    }
+
+    /// `F^-1 P_iso`; below J = 0.2, where the point is as good as inverted, with J = 0.2.
+    fn second_piola_kirchhoff(h: DMat3, p: DMat3) -> DMat3 {
+        let f = DMat3::IDENTITY + h;
+        let s = cofactor(f).transpose() * p * (1.0 / (1.0 + jacobian_minus_one(h)).max(0.2));
+        (s + s.transpose()) * 0.5
+    }
+
+    fn viscous_sum(state: &PointState) -> DMat3 {
+        state.viscous.iter().fold(DMat3::ZERO, |sum, q| sum + *q)
+    }
+
+    /// Brings the history to this step. Returns false where the return mapping failed.
+    pub fn advance(&self, h: DMat3, volumetric_energy: f64, around: &Surroundings, state: &mut PointState) -> bool {
+        let before = self.degradation(state, around.length);
+        let mut met = true;
+        if let Some(params) = &self.plasticity {
+            let flow = plasticity::return_mapping(&self.law, params, h, &mut state.plastic);
+            state.plastic_dissipation += around.remaining * (1.0 - before) * flow.dissipation;
+            met = !flow.failed;
+        }
+        let intact = around.remaining * (1.0 - self.degradation(state, around.length));
+        if let Some(params) = &self.viscoelastic
+            && params.terms.iter().any(|t| t.is_due(around.step, around.dt))
+        {
+            let s = Self::second_piola_kirchhoff(h, self.isochoric_stress(h, state));
+            let strain = (h + h.transpose() + h.transpose() * h) * 0.5;
+            state.viscous.resize(params.terms.len(), DMat3::ZERO);
+            for (term, q) in params.terms.iter().zip(&mut state.viscous) {
+                if term.is_due(around.step, around.dt) {
+                    let dq = (s * term.ratio - *q) * term.decay(around.dt);
+                    *q += dq;
+                    state.viscous_work += intact * double_dot(strain, dq);
+                }
+            }
+        }
+        let grown = self.degradation(state, around.length) - before;
+        if grown > 0.0 {
+            let energy = self.free_energy(h, volumetric_energy, state) + around.other_energy;
+            state.damage_dissipation += around.remaining * grown * energy;
+        }
+        met
+    }
+
+    /// First Piola-Kirchhoff stress [Pa] for H = F - I of a point that keeps the part `intact` of its stiffness.
+    pub fn stress(&self, h: DMat3, volumetric: Volumetric, intact: f64, state: &PointState) -> DMat3 {
+        let f = DMat3::IDENTITY + h;
+        let mut p = self.isochoric_stress(h, state);
+        if self.viscoelastic.is_some() {
+            p -= f * Self::viscous_sum(state);
+        }
+        p * intact + cofactor(f) * volumetric.stress
+    }
+
+    /// `W - q:E` of the undamaged point [J/m^3].
+    fn free_energy(&self, h: DMat3, volumetric_energy: f64, state: &PointState) -> f64 {
+        let he = match self.plasticity {
+            None => h,
+            Some(_) => plasticity::elastic_gradient(h, &state.plastic),
+        };
+        let mut energy = self.law.isochoric_energy(he) + volumetric_energy;
+        if let Some(fibres) = &self.fibres {
+            energy += fibres.energy_density(h);
+        }
+        if self.viscoelastic.is_some() {
+            let strain = (h + h.transpose() + h.transpose() * h) * 0.5;
+            energy -= double_dot(Self::viscous_sum(state), strain);
+        }
+        energy
+    }
+
+    /// Energies of a point that keeps the part `intact` of its stiffness.
+    pub fn energy(&self, h: DMat3, volumetric_energy: f64, intact: f64, state: &PointState) -> PointEnergy {
+        let held: f64 = match &self.viscoelastic {
+            None => 0.0,
+            Some(params) => {
+                let held = |(t, q): (&viscoelastic::Term, &DMat3)| {
+                    norm_squared(*q) / (4.0 * self.law.shear_modulus() * t.ratio.max(1e-12))
+                };
+                params.terms.iter().zip(&state.viscous).map(held).sum()
+            }
+        };
+        PointEnergy {
+            stored: intact * (self.free_energy(h, volumetric_energy, state) + held),
+            viscous_stored: intact * held,
+        }
+    }
+
+    /// Bound of the isochoric tangent modulus [Pa] for the stable step; flow and relaxation only lower it.
+    pub fn tangent_bound(&self, h: DMat3, state: &PointState) -> f64 {
+        let matrix = match self.plasticity {
+            None => self.law.tangent_bound(h),
+            Some(_) => self.law.tangent_bound(plasticity::elastic_gradient(h, &state.plastic)),
+        };
+        matrix + self.fibres.map_or(0.0, |fibres| fibres.tangent_bound(h))
+    }
+
+    /// True where a point of this material remembers something.
+    pub fn has_history(&self) -> bool {
+        self.plasticity.is_some() || self.viscoelastic.is_some()
+    }
+}

@@ -1,0 +1,452 @@
+//! Cells in f64: displacement gradients, nodal forces, stiffness bounds and energies of both elements.
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use crate::material::kinematics::{cofactor, jacobian_minus_one};
+use crate::material_point::{Material, PointState, Surroundings, Volumetric};
+use crate::mesh::tets::TetMesh;
+use crate::mesh::{CellNodes, Mesh};
+use crate::model::Model;
+
+/// Hourglass coefficient of a linear elastic cube, [Joldes2008] via physics of the one-point hexahedron.
+pub const HOURGLASS_MODULUS: f64 = 3.11;
+
+/// Corner signs (xi, eta, zeta) in the node order of `BlockMesh::cell_nodes`.
+pub const CORNERS: [[f64; 3]; 8] = [
+    [-1.0, -1.0, -1.0],
+    [1.0, -1.0, -1.0],
+    [1.0, 1.0, -1.0],
+    [-1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [1.0, -1.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+];
+
+/// The four hourglass base vectors at a corner: eta zeta, zeta xi, xi eta, xi eta zeta.
+fn hourglass_signs([x, y, z]: [f64; 3]) -> [f64; 4] {
+    [y * z, z * x, x * y, x * y * z]
+}
+
+/// A cell at rest.
+#[derive(Debug, Clone, Copy)]
+pub struct CellShape {
+    pub nodes: CellNodes,
+    /// Rest volume V [m^3].
+    pub volume: f64,
+    /// Gradients `B_i` [1/m], one per node: `H = sum_i u_i (x) B_i`.
+    gradients: [DVec3; 8],
+    /// Edge lengths of a hexahedron [m]; `None` for a tetrahedron.
+    size: Option<DVec3>,
+}
+
+impl CellShape {
+    pub fn new(mesh: &Mesh, cell: usize) -> Self {
+        let nodes = mesh.cell_nodes(cell);
+        match mesh {
+            Mesh::Block(block) => {
+                let size = block.cell_size(cell);
+                CellShape {
+                    nodes,
+                    volume: size.x * size.y * size.z,
+                    gradients: CORNERS.map(|c| DVec3::from(c) / (4.0 * size)),
+                    size: Some(size),
+                }
+            }
+            Mesh::Tets(tets) => {
+                let [a, b, c, d] = tets.gradients(cell);
+                let none = DVec3::ZERO;
+                CellShape {
+                    nodes,
+                    volume: tets.volume(cell),
+                    gradients: [a, b, c, d, none, none, none, none],
+                    size: None,
+                }
+            }
+        }
+    }
+
+    pub fn gradients(&self) -> &[DVec3] {
+        &self.gradients[..self.nodes.len()]
+    }
+
+    /// V^(1/3) [m].
+    pub fn edge(&self) -> f64 {
+        self.volume.cbrt()
+    }
+
+    /// Values at the corners.
+    pub fn gather(&self, values: &[DVec3]) -> [DVec3; 8] {
+        let mut corners = [DVec3::ZERO; 8];
+        for (corner, node) in corners.iter_mut().zip(self.nodes.iter()) {
+            *corner = values[*node];
+        }
+        corners
+    }
+
+    /// H = F - I of the cell (at the centre of a hexahedron) from its corner displacements.
+    pub fn displacement_gradient(&self, u: &[DVec3; 8]) -> DMat3 {
+        let mut h = DMat3::ZERO;
+        for (u, b) in u.iter().zip(self.gradients()) {
+            h += DMat3::from_cols(*u * b.x, *u * b.y, *u * b.z);
+        }
+        h
+    }
+
+    /// `q_m = sum_i Gamma_mi u_i / 8`; zero for a tetrahedron, which has no hourglass modes.
+    fn hourglass_modes(&self, u: &[DVec3; 8]) -> [DVec3; 4] {
+        let mut q = [DVec3::ZERO; 4];
+        if self.size.is_some() {
+            for (u, signs) in u.iter().zip(CORNERS) {
+                for (q, gamma) in q.iter_mut().zip(hourglass_signs(signs)) {
+                    *q += *u * (gamma / 8.0);
+                }
+            }
+        }
+        q
+    }
+}
+
+/// Forces of all cells.
+///
+/// One-point hexahedra on a rectilinear block:
+/// ```text
+/// H   = sum_i u_i (x) B_i,  B_i = (xi_i/(4 dx), eta_i/(4 dy), zeta_i/(4 dz))
+/// f_i = V P B_i + hourglass,  q_m = sum_i Gamma_mi u_i / 8,  q2 = sum_m |q_m|^2
+/// E_h = 1/2 kappa 3.11 mu0 V^(1/3) q2 (1 + c/2 q2 / V^(2/3))
+/// ```
+/// Source: Flanagan & Belytschko 1981; Joldes, Wittek & Miller 2008 (total Lagrangian); the quartic term is this
+/// project's (a linear hourglass force lets surface cells fold under a needle tip).
+///
+/// Tetrahedra with averaged nodal pressure:
+/// ```text
+/// V_a = sum_e V_e/4,  Jbar_a = sum_e J_e V_e/4 / V_a,  K_a = sum_e w_e K_e V_e/4 / V_a
+/// E_vol = sum_a 1/2 K_a V_a (Jbar_a - 1)^2,  p_e = mean of K_a (Jbar_a - 1) over the corners
+/// ```
+/// with the stiffness `w_e` that damage and path left; `p_e` is the derivative of E_vol, so energy is kept also between
+/// materials. Source: Bonet & Burton 1998.
+#[derive(Debug, Clone)]
+pub struct Elements {
+    /// kappa 3.11 mu0 [Pa] per material.
+    hourglass: Vec<f64>,
+    /// c.
+    quartic: f64,
+    /// Node to cells of a tetrahedral mesh, else empty: offsets and cells.
+    offsets: Vec<usize>,
+    cells: Vec<u32>,
+}
+
+/// State of the cells that their forces depend on; empty slices stand for cells without history or path.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CellStates<'a> {
+    pub points: &'a [PointState],
+    /// Stiffness that the path left, per cell.
+    pub stiffness: &'a [f64],
+}
+
+impl<'a> CellStates<'a> {
+    pub fn point(&self, cell: usize) -> Option<&'a PointState> {
+        self.points.get(cell)
+    }
+
+    pub fn remaining(&self, cell: usize) -> f64 {
+        self.stiffness.get(cell).copied().unwrap_or(1.0)
+    }
+}
+
+/// What one cell tells about itself.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CellMeasure {
+    /// Stored energies [J], path and damage included.
+    pub elastic: f64,
+    pub hourglass: f64,
+    /// Dissipated by the viscous terms since t = 0 [J].
+    pub viscous: f64,
+    pub jacobian: f64,
+    pub corner_jacobian: f64,
+    /// Degradation d.
+    pub damage: f64,
+}
+
+/// Forces on the corners with the sign of f_int, and the stiffness bound of each corner [N/m].
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CellForces {
+    pub force: [DVec3; 8],
+    pub bound: [f64; 8],
+}
+
+impl Elements {
+    pub fn new(model: &Model) -> Self {
+        let solver = &model.scene.solver;
+        let hourglass = |m: &Material| solver.hourglass_stiffness * HOURGLASS_MODULUS * m.law.shear_modulus();
+        let (offsets, cells) = match &model.mesh {
+            Mesh::Block(_) => Default::default(),
+            Mesh::Tets(tets) => cells_of_nodes(tets),
+        };
+        Elements {
+            hourglass: model.materials.iter().map(hourglass).collect(),
+            quartic: solver.hourglass_quartic,
+            offsets,
+            cells,
+        }
+    }
+
+    /// Bound of the stiffness that a cell adds to each of its corners [N/m]:
+    /// `V (kappa |cof B_i| sum|cof B_j| + t |B_i| sum|B_j|)` with the tangent bound t, and the hourglass stiffness. For a
+    /// hexahedron the largest corner counts for all.
+    pub fn stiffness_bound(&self, model: &Model, cell: usize, cof: DMat3, tangent: f64, q2: f64) -> [f64; 8] {
+        let shape = CellShape::new(&model.mesh, cell);
+        let bulk = model.material(cell).law.bulk_modulus;
+        let volume = shape.volume;
+        let Some(size) = shape.size else {
+            let mut bound = [0.0; 8];
+            let lengths = shape.gradients().iter().map(|b| ((cof * *b).length(), b.length()));
+            let (sum_cof, sum) = lengths.clone().fold((0.0, 0.0), |s, l| (s.0 + l.0, s.1 + l.1));
+            for (bound, l) in bound.iter_mut().zip(lengths) {
+                *bound = volume * (bulk * l.0 * sum_cof + tangent * l.1 * sum);
+            }
+            return bound;
+        };
+        let inv = 0.25 / size;
+        let [a, b, c] = [cof.x_axis * inv.x, cof.y_axis * inv.y, cof.z_axis * inv.z];
+        let cof_b = a.length_squared()
+            + b.length_squared()
+            + c.length_squared()
+            + 2.0 * (a.dot(b).abs() + b.dot(c).abs() + c.dot(a).abs());
+        let edge = shape.edge();
+        let hourglass = self.hourglass(model, cell) * edge * (1.0 + 3.0 * self.quartic * q2 / (edge * edge)) / 8.0;
+        [8.0 * volume * (bulk * cof_b + tangent * inv.length_squared()) + hourglass; 8]
+    }
+
+    fn hourglass(&self, model: &Model, cell: usize) -> f64 {
+        self.hourglass[model.material_index(cell)]
+    }
+
+    /// E_h of an intact cell [J].
+    fn hourglass_energy(&self, model: &Model, cell: usize, edge: f64, q2: f64) -> f64 {
+        0.5 * self.hourglass(model, cell) * edge * q2 * (1.0 + 0.5 * self.quartic * q2 / (edge * edge))
+    }
+
+    /// Volumetric answers of tetrahedra by averaged nodal pressure; `None` for hexahedra, which have their own.
+    pub fn averaged_volumetrics(&self, model: &Model, u: &[DVec3], states: CellStates) -> Option<Vec<Volumetric>> {
+        let tets = model.mesh.as_tets()?;
+        // Volume share V_e/4, J - 1 and w K of every cell.
+        let cells: Vec<(f64, f64, f64)> = (0..tets.tets.len())
+            .into_par_iter()
+            .map(|cell| {
+                let shape = CellShape::new(&model.mesh, cell);
+                let dj = jacobian_minus_one(shape.displacement_gradient(&shape.gather(u)));
+                let material = model.material(cell);
+                let d = states.point(cell).map_or(0.0, |p| material.degradation(p, shape.edge()));
+                (0.25 * shape.volume, dj, states.remaining(cell) * (1.0 - d) * material.law.bulk_modulus)
+            })
+            .collect();
+        // Jbar - 1 and K_a of every node.
+        let nodes: Vec<(f64, f64)> = (0..u.len())
+            .into_par_iter()
+            .map(|node| {
+                let around = &self.cells[self.offsets[node]..self.offsets[node + 1]];
+                let sums = around
+                    .iter()
+                    .map(|c| cells[*c as usize])
+                    .fold((0.0, 0.0, 0.0), |s, (v, dj, k)| (s.0 + v, s.1 + v * dj, s.2 + v * k));
+                (sums.1 / sums.0, sums.2 / sums.0)
+            })
+            .collect();
+        let answer = |cell: usize| {
+            let corners = tets.tets[cell].map(|n| nodes[n as usize]);
+            let bulk = model.material(cell).law.bulk_modulus;
+            Volumetric {
+                stress: corners.iter().map(|(theta, k)| 0.25 * k * theta).sum(),
+                energy: corners.iter().map(|(theta, _)| 0.125 * bulk * theta * theta).sum(),
+            }
+        };
+        Some((0..tets.tets.len()).into_par_iter().map(answer).collect())
+    }
+
+    /// Forces of one cell; with `advance` (time step [s], step number) the history is brought to this step first.
+    /// The flag tells whether the return mapping met the yield condition.
+    pub fn corner_forces(
+        &self,
+        model: &Model,
+        cell: usize,
+        u: &[DVec3],
+        averaged: Option<Volumetric>,
+        remaining: f64,
+        point: Option<&mut PointState>,
+        advance: Option<(f64, u64)>,
+    ) -> (CellForces, bool) {
+        let shape = CellShape::new(&model.mesh, cell);
+        let material = model.material(cell);
+        let u = shape.gather(u);
+        let h = shape.displacement_gradient(&u);
+        let q = shape.hourglass_modes(&u);
+        let q2: f64 = q.iter().map(|q| q.length_squared()).sum();
+        let edge = shape.edge();
+        let mut fresh = PointState::default();
+        let state = point.unwrap_or(&mut fresh);
+        let mut met = true;
+        if let Some((dt, step)) = advance.filter(|_| material.has_history()) {
+            let around = Surroundings {
+                length: edge,
+                dt,
+                step,
+                remaining,
+                other_energy: self.hourglass_energy(model, cell, edge, q2) / shape.volume,
+            };
+            let energy = averaged.unwrap_or_else(|| material.volumetric(h, 1.0)).energy;
+            met = material.advance(h, energy, &around, state);
+        }
+        let intact = remaining * (1.0 - material.degradation(state, edge));
+        let volumetric = averaged.unwrap_or_else(|| material.volumetric(h, intact));
+        let p = material.stress(h, volumetric, intact, state);
+        let kh = intact * self.hourglass(model, cell) * edge * (1.0 + self.quartic * q2 / (edge * edge));
+        let mut out = CellForces::default();
+        for (i, b) in shape.gradients().iter().enumerate() {
+            out.force[i] = p * *b * shape.volume;
+            if shape.size.is_some() {
+                for (q, gamma) in q.iter().zip(hourglass_signs(CORNERS[i])) {
+                    out.force[i] += *q * (kh * gamma / 8.0);
+                }
+            }
+        }
+        let f = DMat3::IDENTITY + h;
+        let bound = self.stiffness_bound(model, cell, cofactor(f), material.tangent_bound(h, state), q2);
+        // Averaged pressure carries over from neighbours that may be intact, so it is not weakened with this cell.
+        out.bound = bound.map(|b| if averaged.is_some() { b } else { b * intact });
+        (out, met)
+    }
+
+    /// Energies and Jacobians of one cell.
+    pub fn measure(
+        &self,
+        model: &Model,
+        cell: usize,
+        u: &[DVec3],
+        averaged: Option<Volumetric>,
+        states: CellStates,
+    ) -> CellMeasure {
+        let shape = CellShape::new(&model.mesh, cell);
+        self.measure_corners(model, cell, &shape.gather(u), averaged, states)
+    }
+
+    /// The same from the displacements of the corners.
+    pub fn measure_corners(
+        &self,
+        model: &Model,
+        cell: usize,
+        u: &[DVec3; 8],
+        averaged: Option<Volumetric>,
+        states: CellStates,
+    ) -> CellMeasure {
+        let shape = CellShape::new(&model.mesh, cell);
+        let material = model.material(cell);
+        let h = shape.displacement_gradient(u);
+        let q2: f64 = shape.hourglass_modes(u).iter().map(|q| q.length_squared()).sum();
+        let edge = shape.edge();
+        let fresh = PointState::default();
+        let point = states.point(cell).unwrap_or(&fresh);
+        let damage = material.degradation(point, edge);
+        let intact = states.remaining(cell) * (1.0 - damage);
+        let volumetric = averaged.unwrap_or_else(|| material.volumetric(h, 1.0)).energy;
+        let energy = material.energy(h, volumetric, intact, point);
+        let jacobian = 1.0 + jacobian_minus_one(h);
+        CellMeasure {
+            elastic: shape.volume * energy.stored,
+            hourglass: intact * self.hourglass_energy(model, cell, edge, q2),
+            viscous: shape.volume * (point.viscous_work - energy.viscous_stored),
+            jacobian,
+            corner_jacobian: shape.size.map_or(jacobian, |size| smallest_corner_jacobian(u, size)),
+            damage,
+        }
+    }
+
+    /// Force on a node (-f_int) [N] and its stiffness bound [N/m].
+    pub fn gather(&self, mesh: &Mesh, cells: &[CellForces], node: usize) -> (DVec3, f64) {
+        let (mut force, mut bound) = (DVec3::ZERO, 0.0);
+        match mesh {
+            Mesh::Block(block) => {
+                let (at, counts) = (block.node_coordinates(node), block.cells());
+                for (corner, signs) in CORNERS.iter().enumerate() {
+                    // The cell of which this node is `corner` lies on the other side of the sign.
+                    let index = |a: usize| match signs[a] < 0.0 {
+                        true => (at[a] < counts[a]).then_some(at[a]),
+                        false => at[a].checked_sub(1),
+                    };
+                    if let (Some(i), Some(j), Some(k)) = (index(0), index(1), index(2)) {
+                        let cell = &cells[block.cell_index(i, j, k)];
+                        force -= cell.force[corner];
+                        bound += cell.bound[corner];
+                    }
+                }
+            }
+            Mesh::Tets(tets) => {
+                for cell in &self.cells[self.offsets[node]..self.offsets[node + 1]] {
+                    let cell = *cell as usize;
+                    let corner = tets.tets[cell].iter().position(|n| *n as usize == node).unwrap_or(0);
+                    force -= cells[cell].force[corner];
+                    bound += cells[cell].bound[corner];
+                }
+            }
+        }
+        (force, bound)
+    }
+
+    /// f_int of all nodes [N].
+    pub fn nodal_forces(&self, mesh: &Mesh, cells: &[CellForces]) -> Vec<DVec3> {
+        (0..mesh.node_count()).into_par_iter().map(|n| -self.gather(mesh, cells, n).0).collect()
+    }
+
+    /// Internal nodal forces f_int [N] of a displacement field.
+    pub fn internal_forces(&self, model: &Model, u: &[DVec3], states: CellStates) -> Vec<DVec3> {
+        let averaged = self.averaged_volumetrics(model, u, states);
+        let cells: Vec<CellForces> = (0..model.mesh.cell_count())
+            .into_par_iter()
+            .map(|cell| {
+                let volumetric = averaged.as_ref().map(|a| a[cell]);
+                let mut point = states.point(cell).cloned();
+                self.corner_forces(model, cell, u, volumetric, states.remaining(cell), point.as_mut(), None).0
+            })
+            .collect();
+        self.nodal_forces(&model.mesh, &cells)
+    }
+}
+
+/// Cells around every node in compressed rows.
+pub fn cells_of_nodes(mesh: &TetMesh) -> (Vec<usize>, Vec<u32>) {
+    let mut offsets = vec![0usize; mesh.positions.len() + 1];
+    for node in mesh.tets.iter().flatten() {
+        offsets[*node as usize + 1] += 1;
+    }
+    for i in 1..offsets.len() {
+        offsets[i] += offsets[i - 1];
+    }
+    let mut next = offsets.clone();
+    let mut cells = vec![0u32; mesh.tets.len() * 4];
+    for (cell, tet) in mesh.tets.iter().enumerate() {
+        for node in tet {
+            cells[next[*node as usize]] = cell as u32;
+            next[*node as usize] += 1;
+        }
+    }
+    (offsets, cells)
+}
+
+/// Smallest J at a corner of a hexahedron, from its three edges.
+fn smallest_corner_jacobian(u: &[DVec3; 8], size: DVec3) -> f64 {
+    // Edges that meet in a corner, each along its axis: node order of `cell_nodes`.
+    const NEIGHBOURS: [[usize; 3]; 8] =
+        [[1, 3, 4], [0, 2, 5], [3, 1, 6], [2, 0, 7], [5, 7, 0], [4, 6, 1], [7, 5, 2], [6, 4, 3]];
+    (0..8)
+        .map(|i| {
+            let column = |a: usize| {
+                let du = u[NEIGHBOURS[i][a]] - u[i];
+                let mut unit = DVec3::ZERO;
+                unit[a] = 1.0;
+                unit - du * (CORNERS[i][a] / size[a])
+            };
+            DMat3::from_cols(column(0), column(1), column(2)).determinant()
+        })
+        .fold(f64::INFINITY, f64::min)
+}
