@@ -20,6 +20,11 @@ struct StepInput {
     load_factor: f32,
     // Offset of this step for rounding prescribed motion to the fixed point, 0..1, equidistributed over the steps.
     rounding: f32,
+    // Number of the step since t = 0.
+    step: u32,
+    _pad0: u32,
+    _pad1: u32,
+    _pad2: u32,
     drives: array<DriveStep, 6>,
 }
 
