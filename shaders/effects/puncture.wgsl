@@ -54,9 +54,10 @@ struct PathCell {
     axial_end: f32,
     // Energy that softening took in this frame [J].
     dissipation: f32,
-    _pad0: f32,
-    _pad1: f32,
-    _pad2: f32,
+    // Index of its material.
+    material: u32,
+    _pad0: u32,
+    _pad1: u32,
 }
 
 @group(0) @binding(3) var<uniform> puncture: PunctureParams;

@@ -17,8 +17,8 @@ fn corner_node(cell: vec3<u32>, corner: u32) -> u32 {
     return (at.z * params.nodes_y + at.y) * params.nodes_x + at.x;
 }
 
-// `kept`: part of the stiffness that the cell keeps for other reasons than its material's.
-fn cell_energy(cell: vec3<u32>, kept: f32, u: ptr<function, array<vec3<f32>, 8>>) -> CellEnergy {
+// `number`: its material; `kept`: part of the stiffness that the cell keeps for other reasons than its material's.
+fn cell_energy(cell: vec3<u32>, number: u32, kept: f32, u: ptr<function, array<vec3<f32>, 8>>) -> CellEnergy {
     let edge_x = cell_edges[cell.x];
     let edge_y = cell_edges[params.cells_x + cell.y];
     let edge_z = cell_edges[params.cells_x + params.cells_y + cell.z];
@@ -57,7 +57,6 @@ fn cell_energy(cell: vec3<u32>, kept: f32, u: ptr<function, array<vec3<f32>, 8>>
     let q2 = dot(q[0], q[0]) + dot(q[1], q[1]) + dot(q[2], q[2]) + dot(q[3], q[3]);
     var e: CellEnergy;
     let index = (cell.z * params.cells_y + cell.y) * params.cells_x + cell.x;
-    let number = material_of(index);
     let point = point_energy(PointPlace(index, number, size, kept, 0.0, 0.0), H);
     e.elastic = volume * point.stored;
     e.held = volume * point.held;

@@ -36,7 +36,7 @@ struct PointAnswer {
     cof: mat3x3<f32>,
     dj: f32,
     tangent: f32,
-    // Part of the stiffness that is left; P is not multiplied by it yet.
+    // Part of the stiffness that is left; P does not know it yet.
     intact: f32,
 }
 

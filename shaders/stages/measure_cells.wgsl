@@ -55,7 +55,7 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
 #ifdef PUNCTURE
         kept = cell_stiffness[index];
 #endif
-        let energy = cell_energy(cell, kept, &u);
+        let energy = cell_energy(cell, material_of(index), kept, &u);
         sums.elastic += energy.elastic;
         sums.hourglass += energy.hourglass;
 #ifdef HISTORY

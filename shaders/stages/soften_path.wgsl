@@ -34,7 +34,7 @@ fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
             u[corner] = vec3<f32>(node_displacement[node].xyz) * DISPLACEMENT_UNIT
                 - node_velocity[node].xyz * (0.5 * params.dt);
         }
-        let energy = cell_energy(cell, 1.0, &u);
+        let energy = cell_energy(cell, path.material, 1.0, &u);
         path_cells[index].dissipation += (old - remaining) * (energy.elastic + energy.hourglass);
         cell_stiffness[path.cell] = remaining;
     }

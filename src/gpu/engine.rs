@@ -618,6 +618,7 @@ fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads
                     fraction: c.fraction as f32,
                     axial_start: c.axial_start as f32,
                     axial_end: c.axial_end as f32,
+                    material: model.material_index(c.cell as usize) as u32,
                     ..PathCell::zeroed()
                 })
                 .collect();

@@ -192,9 +192,9 @@ shared_structs! {
         axial_start: f32,
         axial_end: f32,
         dissipation: f32,
-        _pad0: f32,
-        _pad1: f32,
-        _pad2: f32,
+        material: u32,
+        _pad0: u32,
+        _pad1: u32,
     }
     /// shaders/effects/friction.wgsl
     struct FrictionParams {
