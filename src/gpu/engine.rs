@@ -883,7 +883,6 @@ fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) ->
         out.velocity = vec4(pose.velocity);
         out.direction = vec4(pose.direction);
         out.depth = pose.depth as f32;
-        out.speed = pose.velocity.length() as f32;
     }
     for (out, drive) in out.drives.iter_mut().zip(&input.drives) {
         *out = DriveStep {

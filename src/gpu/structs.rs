@@ -129,13 +129,9 @@ shared_structs! {
         velocity: [f32; 4],
         direction: [f32; 4],
         depth: f32,
-        speed: f32,
+        step: u32,
         load_factor: f32,
         rounding: f32,
-        step: u32,
-        _pad0: u32,
-        _pad1: u32,
-        _pad2: u32,
         drives: [DriveStep; 6],
     }
     /// shaders/shared/cell_edge.wgsl

@@ -283,10 +283,14 @@ fn without_effects_the_shaders_know_nothing_of_them() {
     let none = effect_set(|_| false);
     for features in scenes() {
         for (stage, text) in text_of(&none, &features) {
-            for word in ["contact", "friction", "cutting", "puncture", "needle", "tip", "stick", "indent", "plastic", "fibre", "visc"] {
+            for word in [
+                "contact", "friction", "cutting", "puncture", "needle", "tip", "stick", "indent", "plastic", "fibre",
+                "visc",
+            ] {
                 // The one struct of a step's input serves all scenes that have one; it alone may speak of a tool.
                 let mut lines = text.lines().filter(|l| l.contains(word));
-                let found = lines.find(|l| !(features.driven_faces | features.loaded_faces && step_input_lines().contains(*l)));
+                let found =
+                    lines.find(|l| !(features.driven_faces | features.loaded_faces && step_input_lines().contains(*l)));
                 assert!(found.is_none(), "{stage} {features:?}: {word:?} in {found:?}");
             }
         }
