@@ -3,8 +3,9 @@
 
     pip install gmsh==4.15.2 && scripts/make_forearm_mesh.py [file.msh]
 
-Unit mm. The arm lies along x, the needle enters at x = y = 0 straight down (-z); the skin has its highest point there, at
-z = 0. A muscle belly 60 mm long and 45 mm x 40 mm thick, narrower towards both ends and more so towards the wrist (+x):
+Unit mm. The arm lies along x, the needle enters at x = y = 0 straight down (-z); the skin has its highest point there,
+at z = 0. A muscle belly 60 mm long and 45 mm x 40 mm thick, narrower towards both ends and more so towards the wrist
+(+x):
 
     volumes   skin    outer 2 mm
               fat     next 4 mm
@@ -143,7 +144,8 @@ def report():
                 def norm(p):
                     return math.sqrt(sum(x * x for x in p))
                 six = abs(sum(x * y for x, y in zip(cross(sub(b, a), sub(c, a)), sub(d, a))))
-                largest = max(norm(cross(sub(q, p), sub(r, p))) for p, q, r in ((a, b, c), (a, b, d), (a, c, d), (b, c, d)))
+                faces = ((a, b, c), (a, b, d), (a, c, d), (b, c, d))
+                largest = max(norm(cross(sub(q, p), sub(r, p))) for p, q, r in faces)
                 longest = max(norm(sub(p, q)) for p, q in ((a, b), (a, c), (a, d), (b, c), (b, d), (c, d)))
                 altitudes.append(six / largest)
                 shapes.append(six / largest / longest)

@@ -114,7 +114,8 @@ fn vtk_attributes_around_the_region_are_stepped_over() {
         VECTORS flow float\n0 0 0 0 0 0 0 0 0 0 0 0 0 0 0\n\
         CELL_DATA 2\nFIELD FieldData 3\nweight 2 2 double\n1 2 3 4\nMETADATA\nINFORMATION 0\n\n\
         CellEntityIds 1 2 int\n1 2\nMaterial 1 2 double\n7 8\n";
-    let mut mesh = parse_text("a.vtk", text).unwrap().mesh;
+    let Imported { mut mesh, notices } = parse_text("a.vtk", text).unwrap();
+    assert_eq!(notices, ["Regions are taken from cell array `Material`; `CellEntityIds` is not used."]);
     mesh.regions.sort();
     assert_eq!(mesh.regions, ["region-7", "region-8"]);
 }

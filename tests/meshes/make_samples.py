@@ -4,7 +4,8 @@
     pip install gmsh==4.15.2 meshio==5.3.5 && tests/meshes/make_samples.py
 
 A cube of 20 mm in two layers ("lower", "upper"), coordinates in mm with few digits, so that every writer keeps them
-exactly. Writers: Gmsh and meshio where they know the variant, this script elsewhere (byte orders, appended data, parts).
+exactly. Writers: Gmsh and meshio where they know the variant, this script elsewhere (byte orders, appended data,
+parts).
 """
 
 import base64
@@ -125,7 +126,8 @@ def vtu(name, points, tets, groups, encoding, order="<", header="I", packed=Fals
         if packed:
             size = 256
             blocks = [zlib.compress(data[i : i + size]) for i in range(0, len(data), size)]
-            head = struct.pack(f"{order}{3 + len(blocks)}{header}", len(blocks), size, len(data) % size, *map(len, blocks))
+            numbers = [len(blocks), size, len(data) % size, *map(len, blocks)]
+            head = struct.pack(f"{order}{len(numbers)}{header}", *numbers)
             parts = [head, b"".join(blocks)]
         else:
             parts = [struct.pack(order + header, len(data)) + data]
