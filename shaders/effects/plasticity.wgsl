@@ -17,9 +17,10 @@ struct PlasticState {
 @group(0) @binding(7) var<uniform> plasticity: array<PlasticityParams, 16>;
 @group(3) @binding(9) var<storage, read_write> plastic_state: array<PlasticState>;
 
-// Flow begins where the overstress is worth this strain, and ends where it is worth a tenth: smaller increments would
-// vanish in the last digits of G and alpha.
-const FLOW_STRAIN: f32 = 2e-5;
+// Flow begins where the overstress is worth a thousandth of the strain at yield within these limits, and ends where it is
+// worth a tenth of that: smaller increments would vanish in the last digits of G and alpha.
+const SMALLEST_FLOW: f32 = 1e-6;
+const WORTHWHILE_FLOW: f32 = 2e-5;
 const LARGEST_FLOW: f32 = 0.05;
 const FLOW_ITERATIONS: u32 = 40u;
 
@@ -69,8 +70,9 @@ fn flow_plastically(material: Material, number: u32, cell: u32, H: mat3x3<f32>, 
     var mandel = mandel_stress(out.He, out.elastic.P);
     var overstress = mandel.q - (params.yield_stress + params.hardening * out.alpha);
     var slope = 3.0 * material.shear_modulus + params.hardening;
-    let tolerance = 0.1 * FLOW_STRAIN * slope;
-    var going = advance && overstress > FLOW_STRAIN * slope;
+    let threshold = clamp(1e-3 * params.yield_stress, SMALLEST_FLOW * slope, WORTHWHILE_FLOW * slope);
+    let tolerance = 0.1 * threshold;
+    var going = advance && overstress > threshold;
     let flows = going;
     for (var i = 0u; going && i < FLOW_ITERATIONS; i++) {
         let step = clamp(overstress / slope, -LARGEST_FLOW, LARGEST_FLOW);

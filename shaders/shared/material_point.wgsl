@@ -88,7 +88,7 @@ fn material_point(place: PointPlace, H: mat3x3<f32>) -> PointAnswer {
 #ifdef VISCOELASTIC
     // Relaxes what matrix and fibres hold together.
     history.relaxation_work = relax(place.material, place.cell, H, out.P, out.cof, out.dj);
-    out.P -= deformation_gradient(H) * viscous_tensor(viscous_sum(place.cell));
+    out.P -= deformation_gradient(H) * viscous_sum(place.cell);
 #endif
 #ifdef DAMAGE
     // Last: what has failed carries nothing of the sum.

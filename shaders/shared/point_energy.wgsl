@@ -7,7 +7,7 @@ fn free_energy(place: PointPlace, He: mat3x3<f32>, H: mat3x3<f32>, dj: f32) -> f
     energy += fibre_energy(place.material, H, dj);
 #endif
 #ifdef VISCOELASTIC
-    energy -= contract(viscous_sum(place.cell), green_lagrange(H));
+    energy -= double_dot(viscous_sum(place.cell), green_lagrange(H));
 #endif
     return energy;
 }

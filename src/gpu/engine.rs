@@ -539,7 +539,7 @@ const BUFFERS: [&str; 38] = [
     "plastic_state",
     "fibres",
     "prony",
-    "viscous_counts",
+    "viscous_layout",
     "viscous_state",
     "damage",
     "contact_totals",
@@ -654,8 +654,10 @@ fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads
             FibreParams { direction: vec4(p.direction), k1: p.k1 as f32, k2: p.k2 as f32, ..Zeroable::zeroed() }
         })),
         "prony" => bytes_of(&per_material(model, |m| prony_series(m, dt))),
-        "viscous_counts" => bytes_of(&[viscous_counts(model, dt)]),
-        "viscous_state" => zeros(cells * (model.prony_term_count() as u64 + 1), size_of::<ViscousStress>()),
+        "viscous_layout" => {
+            bytes_of(&[ViscousLayout { entries: model.prony_term_count() as u32 + 1, ..Zeroable::zeroed() }])
+        }
+        "viscous_state" => bytes_of(&viscous_state(model, dt, &vec![PointState::default(); cells as usize])),
         "damage" => bytes_of(&per_material(model, |m| {
             let p = m.damage.unwrap_or_default();
             DamageParams {
@@ -770,15 +772,30 @@ fn prony_series(m: &Constants, dt: f64) -> PronySeries {
     series
 }
 
-fn viscous_counts(model: &Model, dt: f64) -> ViscousCounts {
+/// Per cell the sum of the terms and the terms.
+fn viscous_state(model: &Model, dt: f64, points: &[PointState]) -> Vec<ViscousStress> {
+    let count = model.prony_term_count();
     let terms = model.materials.iter().filter_map(|m| m.viscoelastic.as_ref()).flat_map(|v| &v.terms);
     let shortest = terms.map(|t| t.interval(dt)).min().unwrap_or(1);
-    ViscousCounts {
-        term_count: model.prony_term_count() as u32,
-        // A term is due in the middle of its interval, which is a power of two.
-        interval_mask: (shortest / 2).max(1) - 1,
-        ..Zeroable::zeroed()
+    // A term is due in the middle of its interval, which is a power of two.
+    let interval_mask = (shortest / 2).max(1) - 1;
+    let entries = |q: DMat3| ViscousStress {
+        xx: q.x_axis.x as f32,
+        yy: q.y_axis.y as f32,
+        zz: q.z_axis.z as f32,
+        term_count: count as u32,
+        xy: q.y_axis.x as f32,
+        yz: q.z_axis.y as f32,
+        zx: q.x_axis.z as f32,
+        interval_mask,
+    };
+    let mut state = Vec::with_capacity(points.len() * (count + 1));
+    for point in points {
+        let q = |i: usize| point.viscous.get(i).copied().unwrap_or(DMat3::ZERO);
+        state.push(entries((0..count).map(q).fold(DMat3::ZERO, |sum, q| sum + q)));
+        state.extend((0..count).map(q).map(entries));
     }
+    state
 }
 
 fn puncture_params(model: &Model) -> PunctureParams {
@@ -854,17 +871,10 @@ fn contact_nodes(model: &Model, strips: &Strips) -> Vec<ContactNode> {
     nodes
 }
 
-/// The tensor of six entries.
+/// The tensor of an entry.
 fn symmetric(q: &ViscousStress) -> DMat3 {
-    let (n, s) = (q.normal.map(f64::from), q.shear.map(f64::from));
-    DMat3::from_cols(DVec3::new(n[0], s[0], s[2]), DVec3::new(s[0], n[1], s[1]), DVec3::new(s[2], s[1], n[2]))
-}
-
-fn six_entries(q: DMat3) -> ViscousStress {
-    ViscousStress {
-        normal: vec4(DVec3::new(q.x_axis.x, q.y_axis.y, q.z_axis.z)),
-        shear: vec4(DVec3::new(q.x_axis.y, q.y_axis.z, q.z_axis.x)),
-    }
+    let [xx, yy, zz, xy, yz, zx] = [q.xx, q.yy, q.zz, q.xy, q.yz, q.zx].map(f64::from);
+    DMat3::from_cols(DVec3::new(xx, xy, zx), DVec3::new(xy, yy, yz), DVec3::new(zx, yz, zz))
 }
 
 /// The input of step `number` in the layout of the shader.
@@ -1055,16 +1065,7 @@ impl Engine for GpuEngine {
             })
             .collect();
         write("plastic_state", bytemuck::cast_slice(&plastic));
-        let terms = self.model.prony_term_count();
-        let viscous: Vec<ViscousStress> = state
-            .points
-            .iter()
-            .flat_map(|p| {
-                let q = |i: usize| p.viscous.get(i).copied().unwrap_or(DMat3::ZERO);
-                let sum = (0..terms).fold(DMat3::ZERO, |sum, i| sum + q(i));
-                std::iter::once(sum).chain((0..terms).map(q)).map(six_entries).collect::<Vec<_>>()
-            })
-            .collect();
+        let viscous = viscous_state(&self.model, self.dt, &state.points);
         write("viscous_state", bytemuck::cast_slice(&viscous));
         let history: Vec<PointHistory> = state
             .points
@@ -1081,6 +1082,8 @@ impl Engine for GpuEngine {
 
     fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
         while self.collect_oldest(true)? {}
+        // The stage also brings histories to its step; they are put back afterwards.
+        let history = if self.model.has_history() { Some(self.read_state()?) } else { None };
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -1090,6 +1093,9 @@ impl Engine for GpuEngine {
         }
         self.gpu.queue.submit([encoder.finish()]);
         let bytes = self.read_buffers(&["corner_force"])?;
+        if let Some(state) = history {
+            self.write_state(&state)?;
+        }
         let slots: Vec<[f32; 4]> = read_all(&bytes[0]).collect();
         let strips = &self.strips;
         let [nx, ny, nz] = self.model.mesh.block().cells();

@@ -97,16 +97,22 @@ shared_structs! {
         terms: [PronyTerm; 8],
     }
     /// shaders/effects/viscoelastic.wgsl
-    struct ViscousCounts {
-        term_count: u32,
-        interval_mask: u32,
+    struct ViscousLayout {
+        entries: u32,
         _pad0: u32,
         _pad1: u32,
+        _pad2: u32,
     }
     /// shaders/effects/viscoelastic.wgsl
     struct ViscousStress {
-        normal: [f32; 4],
-        shear: [f32; 4],
+        xx: f32,
+        yy: f32,
+        zz: f32,
+        term_count: u32,
+        xy: f32,
+        yz: f32,
+        zx: f32,
+        interval_mask: u32,
     }
     /// shaders/effects/damage.wgsl
     struct DamageParams {

@@ -11,7 +11,7 @@ use stylet::gpu::{Gpu, GpuEngine};
 use stylet::material::ElasticLaw;
 use stylet::mesh::BlockMesh;
 use stylet::model::Model;
-use stylet::scene::{FaceCondition, Motion, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool};
+use stylet::scene::{Face, FaceCondition, FaceDrive, Motion, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool};
 use stylet::solver::cpu::CpuEngine;
 use stylet::solver::engine::{Engine, FramePlan, FrameSums, State, StepInput};
 
@@ -228,4 +228,85 @@ impl Random {
     pub fn tensor(&mut self) -> DMat3 {
         DMat3::from_cols(self.vector(), self.vector(), self.vector())
     }
+}
+
+/// A specimen pulled along z with free sides: planes of symmetry at x_min, y_min and z_min, z_max driven to the nominal
+/// strain `strain` in `duration` [s].
+pub fn pulled(size_mm: [f64; 3], cell_mm: f64, strain: f64, duration: f64) -> Scene {
+    let mut scene = block(size_mm, cell_mm);
+    // Between ends that slide, cells under 30 % compression buckle into hourglass modes with the default of 0.1.
+    scene.solver.hourglass_stiffness = 1.0;
+    scene.faces[Face::XMin as usize] = held(true, false, false);
+    scene.faces[Face::YMin as usize] = held(false, true, false);
+    scene.faces[Face::ZMin as usize] = held(false, false, true);
+    scene.faces[Face::ZMax as usize] = FaceCondition {
+        drive: Some(FaceDrive {
+            displacement: DVec3::Z * (strain * scene.tissue.size.z),
+            rotation: 0.0,
+            duration,
+        }),
+        ..held(false, false, true)
+    };
+    scene
+}
+
+/// One frame of a pulled specimen.
+#[derive(Debug, Clone, Default)]
+pub struct Sample {
+    pub time: f64,
+    /// Stretch along z and nominal stress on z_max [Pa].
+    pub stretch: f64,
+    pub nominal: f64,
+    /// Stretches along x and y.
+    pub lateral: [f64; 2],
+    /// Largest equivalent plastic strain and damage of all cells.
+    pub alpha: f64,
+    pub damage: f64,
+    pub sums: FrameSums,
+    /// Totals since t = 0 [J].
+    pub work: f64,
+    pub plastic: f64,
+    pub degradation: f64,
+    pub damping: f64,
+}
+
+/// Runs a pulled specimen for `duration` [s] in `frames` frames of at least `steps` steps that keep 0.8 of the stable step.
+pub fn pull(engine: &mut dyn Engine, model: &Model, dt: f64, frames: usize, steps: usize) -> Vec<Sample> {
+    let size = model.scene.tissue.size;
+    let corner = (0..model.mesh.node_count())
+        .find(|n| {
+            let x = model.mesh.rest_position(*n);
+            (x - DVec3::new(0.5 * size.x, 0.5 * size.y, 0.0)).length() < 1e-9
+        })
+        .expect("the corner at x_max, y_max, z_max");
+    let mut samples = vec![Sample { stretch: 1.0, lateral: [1.0; 2], ..Default::default() }];
+    let mut step = 0;
+    for _ in 0..frames {
+        let sums = advance(engine, model, dt, &mut step, steps);
+        let state = engine.read_state().unwrap();
+        let last = samples.last().unwrap();
+        let u = state.displacement[corner];
+        samples.push(Sample {
+            time: step as f64 * dt,
+            stretch: 1.0 + u.z / size.z,
+            nominal: sums.reactions[Face::ZMax as usize].z / (size.x * size.y),
+            lateral: [1.0 + u.x / size.x, 1.0 + u.y / size.y],
+            alpha: state.points.iter().map(|p| p.plastic.alpha).fold(0.0, f64::max),
+            damage: sums.largest_damage,
+            work: last.work + sums.load_work,
+            plastic: last.plastic + sums.plastic_dissipation,
+            degradation: last.degradation + sums.damage_dissipation,
+            damping: last.damping + sums.damping_dissipation,
+            sums,
+        });
+    }
+    samples
+}
+
+/// Values of `of` where `at` first reaches `x`, by linear interpolation.
+pub fn interpolated(samples: &[Sample], at: impl Fn(&Sample) -> f64, x: f64, of: impl Fn(&Sample) -> f64) -> f64 {
+    let pair = samples.windows(2).find(|w| (at(&w[0]) - x) * (at(&w[1]) - x) <= 0.0 && at(&w[0]) != at(&w[1]));
+    let pair = pair.unwrap_or_else(|| panic!("{x} is not reached: {} at the end", at(samples.last().unwrap())));
+    let t = (x - at(&pair[0])) / (at(&pair[1]) - at(&pair[0]));
+    of(&pair[0]) + t * (of(&pair[1]) - of(&pair[0]))
 }

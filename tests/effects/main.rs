@@ -3,10 +3,14 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod damage;
 mod element;
+mod fibres;
 mod friction;
 mod gravity;
 mod indentation;
 mod mass_scaling;
 mod mooney_rivlin;
+mod plasticity;
 mod puncture;
+mod viscoelastic;

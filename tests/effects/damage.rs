@@ -1,0 +1,133 @@
+//! Damage through the whole step: dissipation on any mesh, the softening bar, deletion, neutral parameters.
+
+use std::sync::Arc;
+
+use stylet::effects::{damage, plasticity};
+use stylet::material::ElasticLaw;
+use stylet::model::Model;
+use stylet::scene::{Region, RegionShape, Scene};
+
+use crate::common::*;
+
+/// Yield stress of the weak cell over that of the others: enough that starting the pull makes no other cell flow.
+const WEAK: f64 = 0.9;
+
+/// A bar of `count` cubic cells of edge `cell_mm` with a slightly weaker one in the middle.
+fn bar(count: usize, cell_mm: f64, strain: f64, yield_stress: f64, params: damage::Params) -> Scene {
+    let length = cell_mm * count as f64;
+    let mut scene = pulled([cell_mm, cell_mm, length], cell_mm, strain, 1.0);
+    scene.effects.plasticity = Some(plasticity::Params { yield_stress, hardening: 0.0 });
+    scene.effects.damage = Some(params);
+    scene.solver.mass_damping = 300.0;
+    let mut weak = scene.material.clone();
+    weak.name = "weak".into();
+    weak.plasticity = Some(plasticity::Params { yield_stress: WEAK * yield_stress, hardening: 0.0 });
+    let middle = (count / 2) as f64 * cell_mm * 1e-3;
+    scene.regions.push(Region {
+        name: "weak".into(),
+        shape: RegionShape::Layer { top: middle, bottom: middle + cell_mm * 1e-3 },
+        material: weak,
+    });
+    scene
+}
+
+fn run(model: &Arc<Model>, dt: f64, frames: usize, steps: usize) -> Vec<(&'static str, Vec<Sample>)> {
+    let mut engines = engines(model, dt, steps);
+    engines.iter_mut().map(|(name, e)| (*name, pull(e.as_mut(), model, dt, frames, steps))).collect()
+}
+
+#[test]
+fn the_dissipation_does_not_depend_on_the_mesh() {
+    let yield_stress = 200.0;
+    let params =
+        damage::Params { onset: 0.0, failure_displacement: 0.5e-3, largest: 0.95, deletion: false };
+    for count in [1usize, 5, 20] {
+        // A plastic strain of 0.475 stretches the weak cell to 1.61 mm; the rest gives a little elastically.
+        let pulled_mm = 0.75 + 0.011 * count as f64;
+        let model = model(bar(count, 1.0, pulled_mm / count as f64, yield_stress, params));
+        let (dt, steps) = (1.0e-5, 500);
+        for (name, samples) in run(&model, dt, 200, steps) {
+            let area = 1e-6;
+            // Plastic work between onset and d_max.
+            let end = 0.95 * params.failure_displacement / 1e-3;
+            let found = interpolated(&samples, |s| s.alpha, end, |s| s.plastic) / area;
+            let expected = params.dissipation_per_area(WEAK * yield_stress);
+            close(&format!("{name}, {count} cells: dissipation [J/m^2]"), found, expected, 1e-2);
+            let last = samples.last().unwrap();
+            assert!((last.damage - 0.95).abs() < 1e-5, "{name}: damage {}", last.damage);
+            let s = &last.sums;
+            let accounted =
+                s.elastic + s.hourglass + s.kinetic + last.plastic + last.degradation + last.damping;
+            at_most(&format!("{name}: imbalance"), (last.work - accounted).abs() / last.work, 1e-2);
+            assert_eq!(s.return_failures, 0);
+        }
+    }
+}
+
+#[test]
+fn the_softening_bar_of_the_reference() {
+    // The file is a small-strain bar; a thousandth of its strains and stresses comes close to that limit.
+    let scale = 1e-3;
+    let file = reference("07_damage_bar.json");
+    let yield_stress = number(&file["sigma_u_Pa"]) * scale;
+    let uf = number(&file["uf_m"]) * scale;
+    for case in file["plastic_displacement"].as_array().unwrap() {
+        let count = number(&case["N"]) as usize;
+        let cell_mm = 10.0 / count as f64;
+        let params = damage::Params { onset: 0.0, failure_displacement: uf, largest: 0.95, deletion: false };
+        let mut scene = bar(count, cell_mm, 0.0, yield_stress / WEAK, params);
+        // All cells but the weak one stay elastic; E 20 kPa as in the file, compressible for the digits of f32.
+        let (e, nu) = (number(&file["E_Pa"]), 0.3);
+        let law = ElasticLaw::from_moduli(e / 2.6, e / (3.0 * (1.0 - 2.0 * nu)), 0.7);
+        scene.material.law = law;
+        scene.regions[0].material.law = law;
+        let u: Vec<f64> = case["u_total_m"].as_array().unwrap().iter().map(|u| number(u) * scale).collect();
+        let force: Vec<f64> = case["force_N"].as_array().unwrap().iter().map(|f| number(f) * scale).collect();
+        if let Some(drive) = &mut scene.faces[stylet::scene::Face::ZMax as usize].drive {
+            drive.displacement.z = u[u.len() - 1];
+        }
+        let model = model(scene);
+        let dt = 0.6 * stylet::solver::stable_dt::wave_speed_bound(&model);
+        let steps = (1.0 / dt / 150.0).ceil() as usize;
+        for (name, samples) in run(&model, dt, 149, steps) {
+            let mut worst: f64 = 0.0;
+            for (u, force) in u.iter().zip(&force).skip(1) {
+                let nominal = number(&file["A_m2"]);
+                let found = interpolated(&samples, |s| (s.stretch - 1.0) * 0.01, *u * 0.999, |s| s.nominal) * nominal;
+                worst = worst.max((found - force).abs() / (yield_stress * nominal));
+            }
+            // Strains of 0.4 to 8 thousandths, and the mesh of the reference has no lateral contraction.
+            at_most(&format!("{name}, {count} cells: force over the strength"), worst, 1.2e-2);
+        }
+    }
+}
+
+#[test]
+fn a_deleted_cell_carries_nothing_and_keeps_its_mass() {
+    let params = damage::Params { onset: 0.0, failure_displacement: 0.2e-3, largest: 0.9, deletion: true };
+    let model = model(bar(3, 1.0, 0.15, 200.0, params));
+    let mass: f64 = model.node_mass.iter().sum();
+    close("mass", mass, 1060.0 * 3e-9, 1e-12);
+    for (name, samples) in run(&model, 1e-5, 200, 500) {
+        let last = samples.last().unwrap();
+        assert_eq!(last.sums.deleted_cells, 1, "{name}");
+        assert!(last.nominal.abs() < 2.0, "{name}: {} Pa", last.nominal);
+        let s = &last.sums;
+        let accounted = s.elastic + s.hourglass + s.kinetic + last.plastic + last.degradation + last.damping;
+        at_most(&format!("{name}: imbalance"), (last.work - accounted).abs() / last.work, 1e-2);
+        assert_eq!(s.inverted_cells, 0, "{name}");
+    }
+}
+
+#[test]
+fn damage_out_of_reach_changes_nothing() {
+    let dt = 1e-5;
+    let never = damage::Params { onset: 10.0, failure_displacement: 1e-3, largest: 0.95, deletion: false };
+    let with = model(bar(2, 1.0, 0.2, 500.0, never));
+    let mut scene = bar(2, 1.0, 0.2, 500.0, never);
+    scene.effects.damage = None;
+    let without = model(scene);
+    for ((name, a), (_, b)) in run(&with, dt, 10, 500).iter().zip(run(&without, dt, 10, 500)) {
+        close(name, a.last().unwrap().nominal, b.last().unwrap().nominal, if *name == "gpu" { 1e-6 } else { 1e-12 });
+    }
+}
