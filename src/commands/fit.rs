@@ -247,8 +247,11 @@ fn read_table(path: &Path, text: &str, curves: &mut Curves) -> Result<()> {
             Some(columns) => rows.push(read_row(&place, &record, columns, separator != b',')?),
         }
     }
-    for turn in [Turn::Stress, Turn::Deformation] {
-        turn_magnitudes(path, &mut rows, turn, &mut curves.notes);
+    let turned: Vec<&str> =
+        [Turn::Strain, Turn::Stress].into_iter().filter_map(|t| turn_magnitudes(&mut rows, t)).collect();
+    if !turned.is_empty() {
+        let what = turned.join(" and ");
+        curves.notes.push(format!("{}: {what} in compression were read as magnitudes", path.display()));
     }
     let cauchy = columns.as_ref().is_some_and(|c| c.stress.2);
     let pulled_while_short = rows.iter().filter(|r| !r.compression && r.x < r.mode.at_rest() && r.stress > 0.0).count();
@@ -455,24 +458,23 @@ impl Columns {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Turn {
     Stress,
-    Deformation,
+    Strain,
 }
 
-/// Compressive rows given as magnitudes get the sign of compression.
-fn turn_magnitudes(path: &Path, rows: &mut [Row], turn: Turn, notes: &mut Vec<String>) {
-    let sum: f64 =
-        rows.iter().filter(|r| r.compression).map(|r| if turn == Turn::Stress { r.stress } else { r.x - 1.0 }).sum();
+/// Compressive rows given as magnitudes get the sign of compression; tells what was turned.
+fn turn_magnitudes(rows: &mut [Row], turn: Turn) -> Option<&'static str> {
+    let compressed = || rows.iter().filter(|r| r.compression);
+    let sum: f64 = compressed().map(|r| if turn == Turn::Stress { r.stress } else { r.x - 1.0 }).sum();
     if sum <= 0.0 {
-        return;
+        return None;
     }
     for row in rows.iter_mut().filter(|r| r.compression) {
         match turn {
             Turn::Stress => row.stress = -row.stress,
-            Turn::Deformation => row.x = 2.0 - row.x,
+            Turn::Strain => row.x = 2.0 - row.x,
         }
     }
-    let what = if turn == Turn::Stress { "stresses" } else { "strains" };
-    notes.push(format!("{}: {what} in compression were read as magnitudes", path.display()));
+    Some(if turn == Turn::Stress { "stresses" } else { "strains" })
 }
 
 impl FitReport {
@@ -763,7 +765,8 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
 
 /// A number for a person: this many significant digits, no trailing zeros.
 fn digits(value: f64, count: usize) -> String {
-    let rounded: f64 = format!("{value:.*e}", count - 1).parse().unwrap_or(value);
+    // Adding zero turns -0 into 0.
+    let rounded = format!("{value:.*e}", count - 1).parse().unwrap_or(value) + 0.0;
     if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) { format!("{rounded:e}") } else { rounded.to_string() }
 }
 

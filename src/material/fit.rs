@@ -31,9 +31,10 @@ pub const LEAST_DEMIRAY_B: f64 = 1e-3;
 const OGDEN_STARTS: [f64; 10] = [-30.0, -12.0, -5.0, -2.0, -0.5, 0.5, 2.0, 5.0, 12.0, 30.0];
 const DEMIRAY_STARTS: [f64; 6] = [-1.0, 0.1, 1.0, 5.0, 20.0, 80.0];
 
-/// Laws with equally good fits: the one with fewer constants is preferred where its rms error is at most this many
-/// times larger. Half a per cent of an rms error tells nothing about a tissue.
+/// Laws are equally good, and the one with fewer constants is preferred, where the relative rms error is at most this
+/// many times larger than the least one, plus a remainder. Half a per cent of an error tells nothing about a tissue.
 const EQUALLY_GOOD: f64 = 1.005;
+const EXACT: f64 = 1e-6;
 
 /// How a sample is loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -145,10 +146,10 @@ pub fn fit_all(points: &[Point]) -> Vec<LawFit> {
 
 /// The stable fit to recommend: the smallest error, and of equally good laws the one with the fewest constants.
 pub fn best_stable(fits: &[LawFit]) -> Option<&LawFit> {
-    let rms = |fit: &LawFit| fit.stable.map_or(f64::INFINITY, |f| f.rms);
-    let least = fits.iter().map(rms).fold(f64::INFINITY, f64::min);
+    let error = |fit: &LawFit| fit.stable.map_or(f64::INFINITY, |f| f.relative);
+    let least = fits.iter().map(error).fold(f64::INFINITY, f64::min);
     fits.iter()
-        .filter(|fit| fit.stable.is_some() && rms(fit) <= EQUALLY_GOOD * least)
+        .filter(|fit| fit.stable.is_some() && error(fit) <= EQUALLY_GOOD * least + EXACT)
         .min_by_key(|fit| fit.stable.map_or(usize::MAX, |f| f.law.constants().len()))
 }
 

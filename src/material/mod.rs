@@ -228,7 +228,7 @@ impl ElasticLaw {
     /// the square of the gradient of I1bar and bounds the stiffening for every J >= 0.3. The first is no bound away
     /// from rest: it leaves out `10/9 w1 I1bar |cof F N|^2 / J^2`, which stands beside the `kappa |cof F N|^2` of the
     /// penalty. With stretches 0.4..2.5 and J 0.8..1.25, kappa and this estimate together reach at least 0.45 of the true
-    /// modulus (nu 0.45, all in c01) or 0.65 (all in c10), and 0.8 at nu 0.49; the sum over the corners of a cell that
+    /// modulus (nu 0.45, all in c01) or 0.65 (laws of I1bar), and 0.75 at nu 0.49; the sum over the corners of a cell that
     /// they enter exceeds the true stiffness by a factor of 3. Ogden's law has its own form, which is a bound.
     pub fn tangent_bound(&self, h: DMat3) -> f64 {
         if let Isochoric::Ogden(l) = &self.isochoric {

@@ -26,12 +26,12 @@ const DASH: (u32, u32) = (8, 5);
 const CURVE_POINTS: u32 = 400;
 
 // Colours that people with colour-blindness tell apart (Okabe and Ito 2008).
-const COLOURS: [(&str, RGBColor); 5] = [
-    ("neo_hookean", RGBColor(86, 180, 233)),
-    ("mooney_rivlin", RGBColor(213, 94, 0)),
-    ("yeoh", RGBColor(0, 158, 115)),
-    ("ogden", RGBColor(204, 121, 167)),
-    ("demiray", RGBColor(0, 114, 178)),
+const LAWS: [(&str, &str, RGBColor); 5] = [
+    ("neo_hookean", "neo-Hookean", RGBColor(86, 180, 233)),
+    ("mooney_rivlin", "Mooney-Rivlin", RGBColor(213, 94, 0)),
+    ("yeoh", "Yeoh", RGBColor(0, 158, 115)),
+    ("ogden", "Ogden", RGBColor(204, 121, 167)),
+    ("demiray", "Demiray", RGBColor(0, 114, 178)),
 ];
 const MEASURED: RGBColor = RGBColor(90, 90, 90);
 
@@ -78,22 +78,25 @@ pub fn fit_chart(title: &str, points: &[Point], fits: &[LawFit], best: Option<&s
     Ok(text.replacen(&drawn, &shown, 1))
 }
 
-/// Stable fits as solid lines; dashed beside them the best fits that are not stable. The best law comes last, on top.
+/// Stable fits as solid lines; dashed beside them the best fits that are not stable. In order of drawing.
 fn lines(fits: &[LawFit], best: Option<&str>) -> Vec<Line> {
     let mut lines = Vec::new();
     for fit in fits {
-        let colour = COLOURS.iter().find(|(key, _)| *key == fit.key).map_or(BLACK, |(_, colour)| *colour);
-        let label = |rms: f64, what: &str| format!("{}, {what}rms {:.3} kPa", fit.key.replace('_', "-"), rms * 1e-3);
+        let law = LAWS.iter().find(|(key, ..)| *key == fit.key);
+        let (name, colour) = law.map_or((fit.key, BLACK), |(_, name, colour)| (*name, *colour));
+        let label = |rms: f64, what: &str| format!("{name}, rms {:.3} kPa{what}", rms * 1e-3);
         if let Some(stable) = fit.stable {
-            let width = if best == Some(fit.key) { 4 * FINER } else { 2 * FINER };
-            lines.push(Line { label: label(stable.rms, ""), colour, width, dashed: false, law: stable.law });
+            let (width, what) = if best == Some(fit.key) { (3, " (best stable)") } else { (2, "") };
+            let label = label(stable.rms, what);
+            lines.push(Line { label, colour, width: width * FINER, dashed: false, law: stable.law });
         }
         if let Some(free) = fit.unconstrained.filter(|f| f.verdict != Verdict::Stable) {
-            let what = if free.verdict == Verdict::Unstable { "unstable, " } else { "limited, " };
+            let what = if free.verdict == Verdict::Unstable { " (unstable)" } else { " (limited)" };
             lines.push(Line { label: label(free.rms, what), colour, width: 2 * FINER, dashed: true, law: free.law });
         }
     }
-    lines.sort_by_key(|line| line.width);
+    // Solid above dashed, the best law on top; the legend goes the other way.
+    lines.sort_by_key(|line| (line.width, !line.dashed));
     lines
 }
 
@@ -101,7 +104,7 @@ fn lines(fits: &[LawFit], best: Option<&str>) -> Vec<Line> {
 fn legend_places(lines: &[Line], width: u32) -> (Vec<(u32, u32)>, u32) {
     let (mut x, mut row) = (LEFT, 0);
     let mut places = Vec::new();
-    let letters = std::iter::once("measured".len()).chain(lines.iter().map(|line| line.label.len()));
+    let letters = std::iter::once("measured".len()).chain(lines.iter().rev().map(|line| line.label.len()));
     for letters in letters {
         let entry = SAMPLE + 8 + letters as u32 * LETTER;
         if x > LEFT && x + entry > width {
@@ -128,13 +131,13 @@ fn draw_head<DB: DrawingBackend>(
         title.to_string()
     };
     head.draw_text(&title, &("sans-serif", fine(21)).into_font().color(&BLACK), place(LEFT, 14))?;
-    let labels = std::iter::once("measured").chain(lines.iter().map(|line| line.label.as_str()));
+    let labels = std::iter::once("measured").chain(lines.iter().rev().map(|line| line.label.as_str()));
     for (i, (label, (x, row))) in labels.zip(places).enumerate() {
         let y = TITLE + row * LEGEND_ROW + LEGEND_ROW / 2;
         let style = ("sans-serif", fine(15)).into_font().color(&BLACK).pos(Pos::new(HPos::Left, VPos::Center));
         head.draw_text(label, &style, place(x + SAMPLE + 8, y))?;
-        match i.checked_sub(1).map(|i| &lines[i]) {
-            None => head.draw(&Circle::new(place(x + SAMPLE - 8, y), fine(4), MEASURED.stroke_width(fine(1))))?,
+        match i.checked_sub(1).map(|i| &lines[lines.len() - 1 - i]) {
+            None => head.draw(&Circle::new(place(x + SAMPLE / 2, y), fine(4), MEASURED.stroke_width(fine(1))))?,
             Some(line) => {
                 let (dash, gap) = if line.dashed { DASH } else { (SAMPLE, 1) };
                 let mut start = *x;
@@ -198,7 +201,6 @@ fn draw_panel<DB: DrawingBackend>(
     let rule = BLACK.mix(0.6).stroke_width(fine(1));
     chart.draw_series(LineSeries::new([(x_min, 0.0), (x_max, 0.0)], rule))?;
     chart.draw_series(LineSeries::new([(mode.at_rest(), y_min), (mode.at_rest(), y_max)], rule))?;
-    chart.draw_series(measured.iter().map(|at| Circle::new(*at, fine(4), MEASURED.mix(0.8).stroke_width(fine(1)))))?;
     for line in lines {
         let at = |i: u32| {
             let x = x_min + (x_max - x_min) * f64::from(i) / f64::from(CURVE_POINTS);
@@ -214,6 +216,8 @@ fn draw_panel<DB: DrawingBackend>(
             }
         }
     }
+    // On top of the lines: a good fit would hide them.
+    chart.draw_series(measured.iter().map(|at| Circle::new(*at, fine(4), MEASURED.stroke_width(fine(1)))))?;
     Ok(())
 }
 

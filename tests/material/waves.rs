@@ -44,30 +44,26 @@ fn bulk_from_poisson(isochoric: Isochoric, nu: f64) -> f64 {
     2.0 * isochoric.shear_modulus() * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu))
 }
 
-/// Least and largest, over random states, of `bound / truth` for a law of this Poisson's ratio, where the truth is the
+/// Least, over random states and directions, of `bound / truth` for a law of this Poisson's ratio, where the truth is the
 /// stiffest wave and the bound what the stable step takes: kappa |cof F N|^2 and the tangent bound.
-fn bound_over_truth(isochoric: Isochoric, nu: f64) -> (f64, f64) {
+fn bound_over_truth(isochoric: Isochoric, nu: f64) -> f64 {
     let mut random = Random::new(7);
     let law = ElasticLaw { isochoric, bulk_modulus: bulk_from_poisson(isochoric, nu) };
     let directions = directions();
-    let (mut least, mut largest) = (f64::INFINITY, 0.0_f64);
+    let mut least = f64::INFINITY;
     for _ in 0..150 {
         let stretches = random.stretches((0.8, 1.25));
         let h = random.with_stretches(stretches) - DMat3::IDENTITY;
         let a = tangent(&|h| law.first_piola_kirchhoff(h), h);
         let cof = cofactor(DMat3::IDENTITY + h);
         let bound = law.tangent_bound(h);
-        // The stiffest direction of the whole and what the bound says there.
         let ratios = directions.iter().map(|n| {
             let truth = eigenvalues(acoustic_tensor(&a, *n)).1;
             (law.bulk_modulus * (cof * *n).length_squared() + bound) / truth
         });
-        for ratio in ratios {
-            least = least.min(ratio);
-            largest = largest.max(ratio);
-        }
+        least = ratios.fold(least, f64::min);
     }
-    (least, largest)
+    least
 }
 
 #[test]
@@ -78,12 +74,12 @@ fn the_stable_step_knows_the_stiffness_of_deformed_cells() {
         (mooney_rivlin(0.0, 3300.0), 0.45, 0.45),
         (mooney_rivlin(2300.0, 1000.0), 0.45, 0.55),
         (mooney_rivlin(2300.0, 1000.0), 0.49, 0.85),
-        (yeoh(2000.0, 900.0, 300.0), 0.45, 0.65),
-        (yeoh(2000.0, 900.0, 300.0), 0.49, 0.80),
+        (yeoh(2000.0, 900.0, 300.0), 0.45, 0.6),
+        (yeoh(2000.0, 900.0, 300.0), 0.49, 0.75),
         (demiray(5000.0, 0.5), 0.45, 0.65),
         (demiray(1170.0, 6.84), 0.49, 0.80),
     ] {
-        let (least, _) = bound_over_truth(isochoric, nu);
+        let least = bound_over_truth(isochoric, nu);
         println!("{isochoric:?}, nu {nu}: kappa and tangent bound over the stiffest wave: at least {least:.3}");
         assert!(least > floor, "{isochoric:?}, nu {nu}: {least}");
     }
@@ -156,11 +152,12 @@ fn the_stiffening_term_bounds_the_gradient_of_the_invariant() {
         let e = j.powf(-2.0 / 3.0) * i1 - 3.0;
         let slope = 8.0 / 3.0 * (2.0 * c20 * e) * (i1 / 3.0).max(1.0);
         let stiffening = law.tangent_bound(h) - slope;
+        // The bound adds the squares of all three, of which the largest is at least a third.
         // The gradient of I1bar by the stretches: 2 a (l_i - I1/(3 l_i)); the stiffest rank-one motion is along an axis.
         let gradient = stretches.map(|l| (2.0 * j.powf(-2.0 / 3.0) * (l - i1 / (3.0 * l))).powi(2));
         let truth = 2.0 * c20 * gradient.iter().cloned().fold(0.0, f64::max);
         assert!(stiffening >= truth * (1.0 - 1e-9), "{stretches:?}: {stiffening} below {truth}");
-        assert!(stiffening <= 2.0 * truth + 1e-6, "{stretches:?}: {stiffening} far above {truth}");
+        assert!(stiffening <= 3.0 * truth + 1e-6, "{stretches:?}: {stiffening} far above {truth}");
     }
 }
 
