@@ -138,7 +138,7 @@ fn check_options(options: &FitOptions) -> Result<()> {
         ));
     }
     if let Some(name) = &options.preset
-        && !(!name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '-' | '_')))
+        && (name.is_empty() || name.chars().any(|c| !c.is_ascii_alphanumeric() && !matches!(c, '-' | '_')))
     {
         return Err(Error::input(
             format!("`{name}` cannot be the name of a preset"),

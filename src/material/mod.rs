@@ -227,9 +227,10 @@ impl ElasticLaw {
     /// `4/3 2 (w1 + w2) max(1, I1/3) + 4 w11 a^2 I1 (I1 I2/(9 J^2) - 1)`, the same as in the kernel. The second term is
     /// the square of the gradient of I1bar and bounds the stiffening for every J >= 0.3. The first is no bound away
     /// from rest: it leaves out `10/9 w1 I1bar |cof F N|^2 / J^2`, which stands beside the `kappa |cof F N|^2` of the
-    /// penalty. With stretches 0.4..2.5 and J 0.8..1.25, kappa and this estimate together reach at least 0.45 of the true
-    /// modulus (nu 0.45, all in c01) or 0.65 (laws of I1bar), and 0.75 at nu 0.49; the sum over the corners of a cell that
-    /// they enter exceeds the true stiffness by a factor of 3. Ogden's law has its own form, which is a bound.
+    /// penalty. With stretches 0.4..2.5, J 0.8..1.25 and nu 0.45, kappa and this estimate together reach at least 0.48
+    /// (all in c01) or 0.6 (laws of I1bar) of the true modulus, and come closer to it with larger nu except where an
+    /// exponential w1 outgrows kappa; the sum over the corners of a cell that they enter exceeds the true stiffness by a
+    /// factor of 3. Ogden's law has its own form, which is a bound.
     pub fn tangent_bound(&self, h: DMat3) -> f64 {
         if let Isochoric::Ogden(l) = &self.isochoric {
             return l.tangent_bound(h);

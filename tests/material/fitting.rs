@@ -88,7 +88,8 @@ fn unstable_constants_are_found_and_replaced_by_stable_ones() {
         let found = of(&fits, "ogden");
         assert!(difference(&found.unconstrained.unwrap(), &law) < 1e-4);
         assert_eq!(found.unconstrained.unwrap().stable_within_data, inside);
-        assert_eq!(found.stable.unwrap().law.constants()[1], ("alpha", 1.0), "the edge of the stable exponents");
+        let stable = found.stable.unwrap();
+        assert!(stable.law.constants()[1].1.abs() >= 1.0 && stable.rms > 1.0, "{:?}", stable.law);
     }
 }
 
