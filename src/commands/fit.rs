@@ -531,7 +531,7 @@ impl FitReport {
         }
         line("fit        closed forms of incompressible samples, least squares of the nominal stress".into());
         line(
-            "           best: whatever the constants; stable: best of those that are stable for every deformation"
+            "           best: whatever the constants; stable: best of those stable for every deformation (Yeoh: none negative)"
                 .into(),
         );
         line(String::new());

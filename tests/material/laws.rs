@@ -162,7 +162,7 @@ fn small_strains_see_the_shear_modulus() {
 
 /// Nominal stress of the compressible law with free sides, by Newton steps on the side stretch; near incompressible.
 fn stress_with_free_sides(isochoric: Isochoric, mode: Mode, x: f64) -> f64 {
-    let law = ElasticLaw { isochoric, bulk_modulus: 1e7 * isochoric.shear_modulus() };
+    let law = ElasticLaw { isochoric, bulk_modulus: 1e8 * isochoric.shear_modulus() };
     let gradient = |side: f64| match mode {
         Mode::Uniaxial => DMat3::from_diagonal(DVec3::new(x, side, side)),
         Mode::Equibiaxial => DMat3::from_diagonal(DVec3::new(x, x, side)),
@@ -196,7 +196,7 @@ fn closed_forms_of_incompressible_samples_hold() {
             for x in xs {
                 let expected = nominal_stress(&isochoric, mode, x);
                 let found = stress_with_free_sides(isochoric, mode, x);
-                // The penalty gives way by stress over bulk modulus, 1e-5 at the largest stress of the exponential law, which
+                // The penalty gives way by stress over bulk modulus, 1e-6 at the largest stress of the exponential law, which
                 // answers tenfold.
                 let tolerance = 3e-4 * expected.abs().max(0.1 * isochoric.shear_modulus());
                 assert!(
