@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
+use stylet::commands::fit::{FitOptions, Volumetric};
 use stylet::commands::{self, bench::BenchOptions, run::RunOptions};
 use stylet::error::{Error, Result};
 use stylet::scene::Scene;
@@ -34,6 +35,8 @@ enum Command {
     Check(CheckArgs),
     /// Measure this machine against the performance goals
     Bench(BenchArgs),
+    /// Fit the elastic laws to measured curves of stress against stretch
+    Fit(FitArgs),
     /// List the GPU adapters
     Adapters,
     /// Print the JSON schema of scene files
@@ -90,6 +93,39 @@ struct BenchArgs {
     max_cells: usize,
 }
 
+#[derive(Args)]
+struct FitArgs {
+    /// CSV files; columns `stretch`, `strain`, `strain_percent` or `shear`, a stress with its unit such as
+    /// `nominal_stress_kpa` or `cauchy_stress_pa`, and optionally `mode` (tension, compression, uniaxial, equibiaxial,
+    /// planar, shear) and `weight`
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Poisson's ratio of the preset; the curves do not tell it
+    #[arg(long, default_value_t = 0.49, conflicts_with = "bulk_modulus_kpa")]
+    poisson_ratio: f64,
+    /// Bulk modulus of the preset instead of Poisson's ratio
+    #[arg(long)]
+    bulk_modulus_kpa: Option<f64>,
+    /// Density of the preset
+    #[arg(long, default_value_t = 1060.0)]
+    density_kg_m3: f64,
+    /// Print a preset of this name for a library of materials
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// Law of the preset [default: the best stable one]
+    #[arg(long, requires = "preset")]
+    law: Option<String>,
+    /// Folder for the chart fit.svg, the table fit.csv and the preset
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Replace the files that the folder holds
+    #[arg(long)]
+    force: bool,
+    /// Print JSON instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
 /// Prints to standard output; a closed pipe (`| head`) is no failure.
 fn print(text: &str) {
     let mut out = std::io::stdout().lock();
@@ -136,6 +172,23 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
             let options = BenchOptions { engine: args.engine, max_cells: args.max_cells };
             let report = commands::bench::bench(&options)?;
             print(&if args.json { report.json() } else { report.table() });
+            Ok(0)
+        }
+        Some(Command::Fit(args)) => {
+            let volumetric = match args.bulk_modulus_kpa {
+                Some(modulus) => Volumetric::BulkModulus(modulus * 1e3),
+                None => Volumetric::PoissonRatio(args.poisson_ratio),
+            };
+            let report = commands::fit::fit(&FitOptions {
+                files: args.files,
+                volumetric,
+                density: args.density_kg_m3,
+                law: args.law,
+                preset: args.preset,
+                out: args.out,
+                force: args.force,
+            })?;
+            print(&if args.json { report.json() } else { report.text() });
             Ok(0)
         }
         Some(Command::FirstStep { engine }) => {

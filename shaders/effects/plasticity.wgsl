@@ -77,21 +77,29 @@ fn flow_plastically(material: Material, number: u32, cell: u32, H: mat3x3<f32>, 
     for (var i = 0u; going && i < FLOW_ITERATIONS; i++) {
         let step = clamp(overstress / slope, -LARGEST_FLOW, LARGEST_FLOW);
         let M = exponential_minus_one(mandel.deviator * (-1.5 * step / mandel.q));
-        G += M + G * M;
+        var G_next = G + M + G * M;
         // det G = 1.
-        let excess = jacobian_minus_one(G) * 0.33333333;
-        G -= deformation_gradient(G) * excess;
-        out.alpha += step;
-        out.He = H + G + H * G;
-        out.elastic = isochoric_stress(material, out.He);
-        let next = mandel_stress(out.He, out.elastic.P);
-        let left = next.q - (params.yield_stress + params.hardening * out.alpha);
-        out.dissipation += 0.5 * (mandel.q + next.q) * step;
+        G_next -= deformation_gradient(G_next) * (jacobian_minus_one(G_next) * 0.33333333);
+        let He = H + G_next + H * G_next;
+        let elastic = isochoric_stress(material, He);
+        let next = mandel_stress(He, elastic.P);
+        // A step through zero stress would end on the far side of the yield surface: its stress counts as negative, the
+        // slope that follows shortens the step, and the step is taken again.
+        let reversed = double_dot(next.deviator, mandel.deviator) < 0.0;
+        let signed_q = select(next.q, -next.q, reversed);
+        let left = signed_q - (params.yield_stress + params.hardening * (out.alpha + step));
         let secant = (overstress - left) / step;
         slope = select(slope, secant, secant > 0.1 * slope);
-        mandel = next;
-        overstress = left;
-        going = abs(left) > tolerance;
+        if (!reversed) {
+            G = G_next;
+            out.alpha += step;
+            out.He = He;
+            out.elastic = elastic;
+            out.dissipation += 0.5 * (mandel.q + next.q) * step;
+            mandel = next;
+            overstress = left;
+            going = abs(left) > tolerance;
+        }
     }
     out.failure = select(0.0, 1.0, going);
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.

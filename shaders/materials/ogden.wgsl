@@ -4,22 +4,23 @@
 // Eigenvalue of C below which phi continues as a polynomial.
 const SMALLEST_EIGENVALUE: f32 = 0.01;
 
-// x^p for x >= low, its second-order Taylor polynomial at `low` below: value and derivative.
-fn continued_power(x: f32, p: f32, low: f32) -> vec2<f32> {
+// x^p for x >= low, its second-order Taylor polynomial at `low` below: value, first and second derivative.
+fn continued_power(x: f32, p: f32, low: f32) -> vec3<f32> {
     let at = max(x, low);
     let value = exp2(p * log2(at));
     let slope = p * value / at;
     let curvature = (p - 1.0) * slope / at;
     let d = min(x - low, 0.0);
-    return vec2<f32>(value + d * (slope + 0.5 * d * curvature), slope + d * curvature);
+    return vec3<f32>(value + d * (slope + 0.5 * d * curvature), slope + d * curvature, curvature);
 }
 
 struct OgdenState {
-    // a(J), a'(J).
-    a: vec2<f32>,
+    // a(J), a'(J), a''(J).
+    a: vec3<f32>,
+    // phi, phi', phi'' of the three eigenvalues, and these.
     phi: vec3<f32>,
     slope: vec3<f32>,
-    // Eigenvalues of C, not below the smallest.
+    curvature: vec3<f32>,
     eigenvalues: vec3<f32>,
     directions: mat3x3<f32>,
 }
@@ -35,7 +36,8 @@ fn ogden_state(c: vec4<f32>, H: mat3x3<f32>, J: f32) -> OgdenState {
         continued_power(J, c.y * -0.33333333, J_CONTINUATION),
         vec3<f32>(x.x, y.x, z.x),
         vec3<f32>(x.y, y.y, z.y),
-        max(1.0 + eigen.values, vec3<f32>(SMALLEST_EIGENVALUE)),
+        vec3<f32>(x.z, y.z, z.z),
+        1.0 + eigen.values,
         eigen.vectors,
     );
 }
@@ -51,11 +53,12 @@ fn ogden_stress(c: vec4<f32>, H: mat3x3<f32>) -> IsochoricStress {
     let factor = 2.0 * c.x / (c.y * c.y);
     let sum = s.phi.x + s.phi.y + s.phi.z;
     out.P = (F * (scaled * transpose(n)) * (2.0 * s.a.x) + out.cof * (s.a.y * sum)) * factor;
-    // Bound of the tangent modulus, Ogden::tangent_bound.
-    let size = abs(c.y);
-    let ratio = s.phi / s.eigenvalues;
-    let largest = max(1.0, s.a.x * max(max(ratio.x, ratio.y), max(ratio.z, 0.33333333 * sum)));
-    out.tangent = 1.3333334 * c.x * max((size + 1.0) / size * max(size, 1.0), 1.0) * largest;
+    // Bound of the tangent modulus: the largest second derivative by one principal stretch.
+    let c_i = s.eigenvalues;
+    let others = c_i.yzx * c_i.zxy;
+    let along = s.a.x * (2.0 * s.slope + 4.0 * c_i * s.curvature)
+        + 4.0 * s.a.y * (1.0 + out.dj) * s.slope + s.a.z * sum * others;
+    out.tangent = factor * max(max(along.x, along.y), max(along.z, 0.0));
     return out;
 }
 

@@ -128,9 +128,9 @@ fn invariant_stress(material: Material, H: mat3x3<f32>) -> IsochoricStress {
     );
     out.cof = cof;
     out.dj = dj;
-    let i1bar = f.a * i1;
+    let gradient_squared = f.a * f.a * i1 * (f.a * f.a * f.a * i1 * i2 * 0.11111111 - 1.0);
     out.tangent = 2.6666667 * (s.w1 + s.w2) * max(1.0, i1 * 0.33333333)
-        + 4.0 * max(s.w11, 0.0) * i1bar * max(i1bar * i2 * f.a * f.a * 0.11111111 - 1.0, 0.0);
+        + 4.0 * max(s.w11, 0.0) * max(gradient_squared, 0.0);
     return out;
 }
 #endif

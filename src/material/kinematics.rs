@@ -20,6 +20,11 @@ pub fn isochoric_factor(j: f64, p: f64) -> (f64, f64) {
     }
 }
 
+/// Second derivative of `isochoric_factor`.
+pub fn isochoric_factor_curvature(j: f64, p: f64) -> f64 {
+    p * (p - 1.0) * j.max(J_CONTINUATION).powf(p - 2.0)
+}
+
 /// `J - 1` from the displacement gradient H without cancellation: tr H + (tr^2 H - tr H^2)/2 + det H.
 pub fn jacobian_minus_one(h: DMat3) -> f64 {
     let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;

@@ -27,6 +27,6 @@ impl NeoHookean {
     }
 
     pub fn verdict(&self) -> Verdict {
-        if self.c10 > 0.0 { Verdict::Stable } else { Verdict::Unstable }
+        if self.c10 > 0.0 && self.c10.is_finite() { Verdict::Stable } else { Verdict::Unstable }
     }
 }

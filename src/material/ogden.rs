@@ -11,8 +11,8 @@
 
 use glam::DMat3;
 
-use super::kinematics::{cofactor, isochoric_factor, jacobian_minus_one, symmetric_eigen};
-use super::{LARGEST_STRETCH, Verdict};
+use super::Verdict;
+use super::kinematics::{cofactor, isochoric_factor, isochoric_factor_curvature, jacobian_minus_one, symmetric_eigen};
 
 /// Eigenvalue of C below which phi continues as a polynomial.
 pub const SMALLEST_EIGENVALUE: f64 = 0.01;
@@ -30,19 +30,19 @@ impl Ogden {
         self.mu
     }
 
-    /// phi and its derivative.
-    fn phi(&self, c: f64) -> (f64, f64) {
+    /// phi, its first and its second derivative.
+    fn phi(&self, c: f64) -> (f64, f64, f64) {
         let p = 0.5 * self.alpha;
         let c0 = SMALLEST_EIGENVALUE;
         if c >= c0 {
             let value = c.powf(p);
-            (value, p * value / c)
+            (value, p * value / c, p * (p - 1.0) * value / (c * c))
         } else {
             let f0 = c0.powf(p);
             let f1 = p * f0 / c0;
             let f2 = (p - 1.0) * f1 / c0;
             let d = c - c0;
-            (f0 + d * (f1 + 0.5 * d * f2), f1 + d * f2)
+            (f0 + d * (f1 + 0.5 * d * f2), f1 + d * f2, f2)
         }
     }
 
@@ -66,43 +66,52 @@ impl Ogden {
         (f * slope * (2.0 * a) + cofactor(f) * (da * sum)) * (2.0 * self.mu / self.alpha.powi(2))
     }
 
-    /// Bound of the isochoric tangent modulus [Pa]: second derivatives by the stretches and by J.
+    /// Bound of the isochoric tangent modulus [Pa]: the largest second derivative of W_iso by one principal stretch,
+    /// ```text
+    /// 2 mu/alpha^2 (a (2 phi'_i + 4 c_i phi''_i) + 4 a' J phi'_i + a'' c_j c_k sum phi)
+    /// ```
+    /// A scan over rank-one directions finds no stiffer one while J stays near 1. At rest it is 4/3 mu0.
     pub fn tangent_bound(&self, h: DMat3) -> f64 {
         let f = DMat3::IDENTITY + h;
         let (c, _) = symmetric_eigen(f.transpose() * f);
-        let (a, _) = isochoric_factor((1.0 + jacobian_minus_one(h)).max(0.3), -self.alpha / 3.0);
-        let size = self.alpha.abs();
-        let factor = (2.0 * (size + 1.0) / size).max(1.0);
-        let mut mean: f64 = 0.0;
-        let mut steepest: f64 = 1.0;
-        for c in c {
-            let phi = c.max(SMALLEST_EIGENVALUE).powf(0.5 * self.alpha);
-            mean += a * phi / 3.0;
-            steepest = steepest.max(a * phi / c.max(SMALLEST_EIGENVALUE));
-        }
-        4.0 / 3.0 * self.mu * (factor * 0.5 * size.max(1.0)).max(1.0) * steepest.max(mean)
+        let j = 1.0 + jacobian_minus_one(h);
+        let (a, da) = isochoric_factor(j, -self.alpha / 3.0);
+        let dda = isochoric_factor_curvature(j, -self.alpha / 3.0);
+        let phi = c.map(|c| self.phi(c));
+        let sum: f64 = phi.iter().map(|p| p.0).sum();
+        let along = |i: usize| {
+            let (_, first, second) = phi[i];
+            let others = c[(i + 1) % 3] * c[(i + 2) % 3];
+            a * (2.0 * first + 4.0 * c[i] * second) + 4.0 * da * j * first + dda * others * sum
+        };
+        let largest = along(0).max(along(1)).max(along(2)).max(0.0);
+        2.0 * self.mu / self.alpha.powi(2) * largest
     }
 
-    /// Nominal stress over 2 mu/alpha of an incompressible sample: uniaxial and equibiaxial.
-    fn reduced_stresses(&self, l: f64) -> [f64; 2] {
-        let a = self.alpha;
-        [l.powf(a - 1.0) - l.powf(-0.5 * a - 1.0), l.powf(a - 1.0) - l.powf(-2.0 * a - 1.0)].map(|p| p * a.signum())
-    }
-
-    /// Polyconvex for mu > 0 and |alpha| >= 1; else as far as the nominal stress grows with the stretch.
+    /// Elliptic for every deformation where mu > 0 and |alpha| >= 1; else while
+    /// ```text
+    /// tanh(|alpha| s/2) tanh(s/2) < |alpha|,   s = ln(l_max / l_min)
+    /// ```
+    /// That is `beta > -sqrt(alpha gamma)` for incompressible plane motions (Dowaikh and Ogden 1990), written out for
+    /// this law by this project. For one largest stretch l, s is largest in equibiaxial tension: s = 3 ln l.
     pub fn verdict(&self) -> Verdict {
         if !(self.mu > 0.0 && self.mu.is_finite() && self.alpha.is_finite() && self.alpha != 0.0) {
             return Verdict::Unstable;
         }
-        if self.alpha.abs() >= 1.0 {
+        let size = self.alpha.abs();
+        if size >= 1.0 {
             return Verdict::Stable;
         }
-        const STEP: f64 = 1e-3;
-        let grows = |l: f64| {
-            let (below, above) = (self.reduced_stresses(l - STEP), self.reduced_stresses(l + STEP));
-            above.iter().zip(below).all(|(a, b)| *a > b)
-        };
-        let limit = (1..).map(|i| 1.0 + f64::from(i) * STEP).take_while(|l| *l < LARGEST_STRETCH).find(|l| !grows(*l));
-        limit.map_or(Verdict::Stable, Verdict::StableBelow)
+        // The left side grows from 0 to 1 with s: bisection. s = 100 lies beyond the limit of every |alpha| < 1.
+        let (mut low, mut high) = (0.0, 100.0);
+        for _ in 0..80 {
+            let s: f64 = 0.5 * (low + high);
+            if (0.5 * size * s).tanh() * (0.5 * s).tanh() < size {
+                low = s;
+            } else {
+                high = s;
+            }
+        }
+        Verdict::StableBelow((low / 3.0).exp())
     }
 }

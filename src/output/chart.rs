@@ -13,7 +13,7 @@ use crate::{Error, Result};
 /// Size of the chart [px].
 const SIZE: (u32, u32) = (900, 600);
 /// plotters rounds to whole units of the drawing: it draws this many times larger, and the viewer scales down.
-const FINER: u32 = 8;
+pub(super) const FINER: u32 = 8;
 /// Height of the strip above the chart that holds title and legend [px].
 const HEAD: u32 = 84;
 
@@ -206,25 +206,25 @@ fn draw_head<DB: DrawingBackend>(
 }
 
 /// Pixels to units of the drawing.
-fn fine(pixels: u32) -> u32 {
+pub(super) fn fine(pixels: u32) -> u32 {
     pixels * FINER
 }
 
-fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub(super) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.filter(|v| v.is_finite()).fold(None, |range, v| match range {
         None => Some((v, v)),
         Some((low, high)) => Some((low.min(v), high.max(v))),
     })
 }
 
-fn widened(low: f64, high: f64, fraction: f64) -> (f64, f64) {
+pub(super) fn widened(low: f64, high: f64, fraction: f64) -> (f64, f64) {
     let span = if high > low { high - low } else { 1.0 };
     let below = if low < 0.0 { fraction * span } else { 0.0 };
     (low - below, low.max(high).max(low + span) + fraction * span)
 }
 
 /// A tick label with as many decimals as the span needs.
-fn tick(value: f64, span: f64) -> String {
+pub(super) fn tick(value: f64, span: f64) -> String {
     let decimals = (1.0 - span.log10()).ceil().clamp(0.0, 9.0) as usize;
     let text = format!("{value:.decimals$}");
     if text.trim_start_matches('-').bytes().all(|b| matches!(b, b'0' | b'.')) { "0".into() } else { text }

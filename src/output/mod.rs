@@ -6,6 +6,7 @@
 
 pub mod chart;
 pub mod curve;
+pub mod fit_chart;
 pub mod folder;
 pub mod progress;
 pub mod summary;
