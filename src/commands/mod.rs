@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod check;
+pub mod material;
 pub mod run;
 
 use crate::error::Result;
