@@ -165,11 +165,19 @@ impl<'m> Sample<'m> {
         for &axis in free {
             h.col_mut(axis)[axis] = old.col(axis)[axis];
         }
+        // The first guess keeps the volume; from far away the stress alone need not lead there.
+        let ratio = (1.0 + jacobian_minus_one(old)) / (1.0 + jacobian_minus_one(h));
+        if ratio > 0.0 && ratio.is_finite() {
+            for &axis in free {
+                let stretch = h.col(axis)[axis] + 1.0;
+                h.col_mut(axis)[axis] = stretch * ratio.powf(1.0 / free.len() as f64) - 1.0;
+            }
+        }
         // Rounding of the volumetric stress is 1e-16 of the modulus.
         let tolerance = 1e-13 * self.material.law.p_wave_modulus().abs();
-        let residual = |p: &DMat3| free.iter().map(|&a| p.col(a)[a].powi(2)).sum::<f64>().sqrt();
+        let residual = |h: DMat3, p: &DMat3| lateral(h, p, free).iter().map(|s| s * s).sum::<f64>().sqrt();
         let mut found = self.trial(h, dt, &start);
-        let mut rest = residual(&found.1);
+        let mut rest = residual(h, &found.1);
         for _ in 0..NEWTON_ITERATIONS {
             if rest <= tolerance {
                 break;
@@ -183,7 +191,7 @@ impl<'m> Sample<'m> {
                     next.col_mut(axis)[axis] = (1.0 + h.col(axis)[axis]) * (part * d).exp() - 1.0;
                 }
                 let trial = self.trial(next, dt, &start);
-                let r = residual(&trial.1);
+                let r = residual(next, &trial.1);
                 if r < rest {
                     better = Some((next, trial, r));
                     break;
@@ -223,14 +231,14 @@ impl<'m> Sample<'m> {
             let moved = |sign: f64| {
                 let mut h = h;
                 h.col_mut(axis)[axis] = (1.0 + h.col(axis)[axis]) * (sign * STEP).exp() - 1.0;
-                self.trial(h, dt, start).1
+                lateral(h, &self.trial(h, dt, start).1, free)
             };
             let (above, below) = (moved(1.0), moved(-1.0));
-            for (row, &a) in free.iter().enumerate() {
-                jacobian[row][column] = (above.col(a)[a] - below.col(a)[a]) / (2.0 * STEP);
+            for row in 0..free.len() {
+                jacobian[row][column] = (above[row] - below[row]) / (2.0 * STEP);
             }
         }
-        let r: Vec<f64> = free.iter().map(|&a| -stress.col(a)[a]).collect();
+        let r: Vec<f64> = lateral(h, stress, free).iter().map(|s| -s).collect();
         let [[a, b], [c, d]] = jacobian;
         let step = match r[..] {
             [r] => [r / a, 0.0],
@@ -244,6 +252,12 @@ impl<'m> Sample<'m> {
         let scale = (LARGEST_LOG_STEP / largest).min(1.0);
         largest.is_finite().then(|| step.map(|s| s * scale))
     }
+}
+
+/// Normal Cauchy stresses P_aa F_aa / J of the free axes [Pa]: unlike P_aa they grow steadily with the stretch.
+fn lateral(h: DMat3, stress: &DMat3, free: &[usize]) -> Vec<f64> {
+    let j = 1.0 + jacobian_minus_one(h);
+    free.iter().map(|&a| stress.col(a)[a] * (1.0 + h.col(a)[a]) / j).collect()
 }
 
 /// What is done to the sample.
@@ -347,10 +361,13 @@ pub fn run(material: &Material, mode: Mode, protocol: &Protocol) -> Result<Vec<R
     Ok(test.rows)
 }
 
-/// Largest nominal stress while loading for the first time, and the stretch (or shear) where it stands.
+/// The stretch (or shear) at which the nominal stress of the first loading is largest in magnitude, and that stress [Pa];
+/// `None` where it stands at the end of loading: nothing broke.
 pub fn peak(rows: &[Row]) -> Option<(f64, f64)> {
-    let loading = rows.iter().filter(|r| r.cycle == 0 && r.leg == Leg::Loading);
-    loading.max_by(|a, b| a.nominal.total_cmp(&b.nominal)).map(|r| (r.control, r.nominal))
+    let loading = || rows.iter().filter(|r| r.cycle == 0 && r.leg == Leg::Loading);
+    let peak = loading().max_by(|a, b| a.nominal.abs().total_cmp(&b.nominal.abs()))?;
+    let end = loading().next_back()?;
+    (end.nominal.abs() < 0.99 * peak.nominal.abs()).then_some((peak.control, peak.nominal))
 }
 
 struct Test<'m> {

@@ -660,7 +660,16 @@ fn head(args: &MaterialArgs, subject: &Subject) -> String {
     let kpa = |v: f64| four_digits(v / KPA);
     line("material", &format!("{}, law {}", subject.name, m.law.isochoric.key()));
     line(if m.law.verdict() == Verdict::Stable { "verdict" } else { "WARNING" }, &describe_verdict(&m.law));
-    line("shear", &format!("shear modulus at rest {} kPa", kpa(m.law.shear_modulus())));
+    line(
+        "moduli",
+        &format!(
+            "at rest: shear {} kPa, bulk {} kPa, Young {} kPa, Poisson {}",
+            kpa(m.law.shear_modulus()),
+            kpa(m.law.bulk_modulus),
+            kpa(m.law.youngs_modulus()),
+            four_digits(m.law.poisson_ratio())
+        ),
+    );
     line("effects", &effect_keys(m));
     if let Some(p) = &m.plasticity {
         line("", &format!("plasticity: yield {} kPa, hardening {} kPa", kpa(p.yield_stress), kpa(p.hardening)));
@@ -677,7 +686,7 @@ fn head(args: &MaterialArgs, subject: &Subject) -> String {
         line(
             "",
             &format!(
-                "damage: from plastic strain {}, u_f {} mm, d at most {}, cell {} mm",
+                "damage: from plastic strain {}, u_f {} mm, d_max {}, cell {} mm",
                 four_digits(d.onset),
                 four_digits(d.failure_displacement / MM),
                 d.largest,
@@ -768,7 +777,9 @@ fn table(text: &mut String, material: &Material, mode: Mode, rows: &[Row], fine:
     }
     text.push('\n');
     let mut last = None;
-    for row in rows {
+    // The way back of a sample without a memory would repeat the way out.
+    let repeats = |row: &Row| !material.has_history() && row.leg != Leg::Loading;
+    for row in rows.iter().filter(|row| !repeats(row)) {
         let leg = if last == Some((row.cycle, row.leg)) { "" } else { row.leg.key() };
         last = Some((row.cycle, row.leg));
         let _ = write!(text, "{leg:<LEG_WIDTH$}");
@@ -780,10 +791,10 @@ fn table(text: &mut String, material: &Material, mode: Mode, rows: &[Row], fine:
         }
         text.push('\n');
     }
-    let end = fine.iter().rfind(|r| r.cycle == 0 && r.leg == Leg::Loading);
-    if let (Some((control, stress)), Some(end)) = (material_test::peak(fine), end)
-        && end.nominal < 0.999 * stress
-    {
+    if rows.iter().any(repeats) {
+        *text += "unloading  the same: no effect with a memory is on\n";
+    }
+    if let Some((control, stress)) = material_test::peak(fine) {
         let quantity = if mode == Mode::Shear { "shear" } else { "stretch" };
         let _ = writeln!(text, "largest nominal stress {:.3} kPa at {quantity} {control:.3}", stress / KPA);
     }

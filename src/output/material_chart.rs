@@ -94,10 +94,7 @@ fn over_deformation(area: &DrawingArea<SVGBackend, Shift>, curves: &[(Mode, Vec<
             start = end;
         }
         if let Some((control, stress)) = peak(rows) {
-            let last = rows.iter().rfind(|r| r.cycle == 0 && r.leg == Leg::Loading);
-            if last.is_some_and(|r| r.nominal < 0.98 * stress) {
-                marks.push((*mode, (control - mode.rest(), stress * 1e-3), control));
-            }
+            marks.push((*mode, (control - mode.rest(), stress * 1e-3), control));
         }
     }
     let only = match curves {
