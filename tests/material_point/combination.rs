@@ -7,13 +7,15 @@ use stylet::material_test::Sample;
 use crate::*;
 
 fn everything(law: ElasticLaw, deletion: bool) -> Material {
+    // Short enough that the path deletes the cell.
+    let failure_displacement = if deletion { 2.0e-4 } else { 1.5e-3 };
     Material {
         law,
         density: 1060.0,
         plasticity: Some(plasticity::Params { yield_stress: 3000.0, hardening: 9000.0 }),
         fibres: Some(fibres::Params { direction: DVec3::new(2.0, 1.0, -1.0).normalize(), k1: 6.0e3, k2: 0.5 }),
         viscoelastic: Some(viscoelastic::Params::default()),
-        damage: Some(damage::Params { onset: 0.1, failure_displacement: 1.5e-3, largest: 0.95, deletion }),
+        damage: Some(damage::Params { onset: 0.1, failure_displacement, largest: 0.95, deletion }),
     }
 }
 
@@ -48,7 +50,6 @@ fn all_effects_together_keep_the_energy() {
         with(Isochoric::Ogden(Ogden { mu: 5000.0, alpha: 4.0 })),
         with(Isochoric::Demiray(Demiray { mu: 4000.0, b: 0.8 })),
     ];
-    let mut damaged = 0;
     for (i, law) in laws.into_iter().enumerate() {
         for deletion in [false, true] {
             let material = everything(law, deletion);
@@ -63,10 +64,9 @@ fn all_effects_together_keep_the_energy() {
             );
             assert!(balance.abs() < 1e-3, "{balance}");
             assert!(state.plastic.alpha > 0.1 && state.plastic_dissipation > 0.0);
-            damaged += usize::from(d > 0.1 && state.damage_dissipation > 0.0);
+            assert!(state.damage_dissipation > 0.0 && if deletion { d == 1.0 } else { (0.1..0.95).contains(&d) });
         }
     }
-    assert!(damaged >= 4, "{damaged}");
 }
 
 #[test]
