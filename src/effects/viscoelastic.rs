@@ -7,7 +7,8 @@
 //! `S_iso = F^-1 P_iso` of matrix and fibres is the instantaneous second Piola-Kirchhoff stress; at rest for long, the share
 //! `1 - sum g_i` of it is left. The form is the convolution of Simo 1987 (`h_i = g_i S - q_i`); the midpoint rule is
 //! of second order and needs no stress of the step before. A term is updated every n steps, a power of two with
-//! `n dt <= tau_i/500`: in f32 the increments of a slow term would vanish otherwise. `tau_i` are physical seconds: mass
+//! `n dt <= tau_i/500`: in f32 the increments of a slow term would vanish otherwise. The stress at t takes the newest q_i,
+//! which leads by half an update: tau_i/1000, or dt/2 where the step is longer than that. `tau_i` are physical seconds: mass
 //! scaling changes inertia, not time. Source: Simo 1987; [Taylor1970].
 //!
 //! Energy. With `E` the Green-Lagrange strain the viscous part of the work is `-q:E + sum E:dq` per volume; of this
