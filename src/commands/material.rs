@@ -207,10 +207,9 @@ pub fn material(args: &MaterialArgs) -> Result<String> {
         };
         curves.push((mode, material_test::run(&subject.material, mode, &protocol)?));
     }
-    if args.json || args.csv {
-        if verdict != Verdict::Stable {
-            eprintln!("warning: {}", describe_verdict(law));
-        }
+    // The table has the verdict in its head.
+    if (args.json || args.csv) && verdict != Verdict::Stable {
+        eprintln!("warning: {}", describe_verdict(law));
     }
     if let Some(path) = &args.svg {
         let text = material_chart(&format!("{}: {}", subject.name, effect_keys(&subject.material)), &curves)
@@ -328,10 +327,10 @@ fn subject(args: &MaterialArgs) -> Result<Subject> {
         }
     };
     let law = &mut subject.material.law;
-    if args.preset.is_some() || args.scene.is_some() {
-        if let Some(bulk) = bulk_modulus(args, law.shear_modulus())? {
-            law.bulk_modulus = bulk;
-        }
+    if (args.preset.is_some() || args.scene.is_some())
+        && let Some(bulk) = bulk_modulus(args, law.shear_modulus())?
+    {
+        law.bulk_modulus = bulk;
     }
     effects(args, &mut subject.material)?;
     Ok(subject)
