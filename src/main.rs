@@ -33,7 +33,7 @@ enum Command {
     /// Check a scene and tell what it means, without running it
     Check(CheckArgs),
     /// Stretch and shear a homogeneous sample of a material: stresses as a table, JSON, CSV or figure
-    Material(commands::material::MaterialArgs),
+    Material(Box<commands::material::MaterialArgs>),
     /// Measure this machine against the performance goals
     Bench(BenchArgs),
     /// List the GPU adapters
