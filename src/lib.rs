@@ -10,6 +10,7 @@ pub mod error;
 pub mod gpu;
 pub mod material;
 pub mod material_point;
+pub mod material_test;
 pub mod mesh;
 pub mod model;
 pub mod needle;

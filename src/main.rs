@@ -33,6 +33,8 @@ enum Command {
     Run(RunArgs),
     /// Check a scene and tell what it means, without running it
     Check(CheckArgs),
+    /// Stretch and shear a homogeneous sample of a material: stresses as a table, JSON, CSV or figure
+    Material(Box<commands::material::MaterialArgs>),
     /// Measure this machine against the performance goals
     Bench(BenchArgs),
     /// Fit the elastic laws to measured curves of stress against stretch
@@ -166,6 +168,10 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
         Some(Command::Check(args)) => {
             let scene = Scene::load(&args.scene.scene, &args.scene.overrides)?;
             print(&commands::check::check(scene, args.scene.engine)?);
+            Ok(0)
+        }
+        Some(Command::Material(args)) => {
+            print(commands::material::material(&args)?.trim_end());
             Ok(0)
         }
         Some(Command::Bench(args)) => {

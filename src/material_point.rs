@@ -112,6 +112,31 @@ impl Material {
 
     /// Brings the history to this step. Returns false where the return mapping failed.
     pub fn advance(&self, h: DMat3, volumetric_energy: f64, around: &Surroundings, state: &mut PointState) -> bool {
+        let decay = |term: &viscoelastic::Term| term.is_due(around.step, around.dt).then(|| term.decay(around.dt));
+        self.advance_terms(h, volumetric_energy, around, state, &decay)
+    }
+
+    /// The same with every Prony term advanced by `around.dt`, for steps of any size and changing size.
+    pub fn advance_every_term(
+        &self,
+        h: DMat3,
+        volumetric_energy: f64,
+        around: &Surroundings,
+        state: &mut PointState,
+    ) -> bool {
+        let decay = |term: &viscoelastic::Term| Some(-(-around.dt / term.time).exp_m1());
+        self.advance_terms(h, volumetric_energy, around, state, &decay)
+    }
+
+    /// `decay`: 1 - e^-x of a term that is due.
+    fn advance_terms(
+        &self,
+        h: DMat3,
+        volumetric_energy: f64,
+        around: &Surroundings,
+        state: &mut PointState,
+        decay: &dyn Fn(&viscoelastic::Term) -> Option<f64>,
+    ) -> bool {
         let before = self.degradation(state, around.length);
         let mut met = true;
         if let Some(params) = &self.plasticity {
@@ -121,14 +146,14 @@ impl Material {
         }
         let intact = around.remaining * (1.0 - self.degradation(state, around.length));
         if let Some(params) = &self.viscoelastic
-            && params.terms.iter().any(|t| t.is_due(around.step, around.dt))
+            && params.terms.iter().any(|t| decay(t).is_some())
         {
             let s = Self::second_piola_kirchhoff(h, self.isochoric_stress(h, state));
             let strain = (h + h.transpose() + h.transpose() * h) * 0.5;
             state.viscous.resize(params.terms.len(), DMat3::ZERO);
             for (term, q) in params.terms.iter().zip(&mut state.viscous) {
-                if term.is_due(around.step, around.dt) {
-                    let dq = (s * term.ratio - *q) * term.decay(around.dt);
+                if let Some(decay) = decay(term) {
+                    let dq = (s * term.ratio - *q) * decay;
                     *q += dq;
                     state.viscous_work += intact * double_dot(strain, dq);
                 }

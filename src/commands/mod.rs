@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod check;
 pub mod fit;
+pub mod material;
 pub mod run;
 
 use crate::error::Result;

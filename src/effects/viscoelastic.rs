@@ -6,10 +6,10 @@
 //! ```
 //! `S_iso = F^-1 P_iso` of matrix and fibres is the instantaneous second Piola-Kirchhoff stress; at rest for long, the share
 //! `1 - sum g_i` of it is left. The form is the convolution of Simo 1987 (`h_i = g_i S - q_i`); the midpoint rule is
-//! of second order for updates of several steps (an update in every step lags by half a step, an error of
-//! g dt/(2 tau)) and needs no stress of the step before. A term is updated every n steps, a power of two with
-//! `n dt <= tau_i/500`: in f32 the increments of a slow term would vanish otherwise. `tau_i` are physical seconds: mass
-//! scaling changes inertia, not time. Source: Simo 1987; [Taylor1970].
+//! of second order and needs no stress of the step before. A term is updated every n steps, a power of two with
+//! `n dt <= tau_i/500`: in f32 the increments of a slow term would vanish otherwise. The stress at t takes the newest q_i,
+//! which is off by half an update at most: tau_i/1000, or dt/2 where n = 1. `tau_i` are physical seconds: mass scaling
+//! changes inertia, not time. Source: Simo 1987; [Taylor1970].
 //!
 //! Energy. With `E` the Green-Lagrange strain the viscous part of the work is `-q:E + sum E:dq` per volume; of this
 //! `Xi = sum q_i:q_i/(4 mu0 g_i)` is stored and the rest, `sum E:dq - Xi`, dissipated.

@@ -11,31 +11,31 @@ use crate::observables::FrameRecord;
 use crate::{Error, Result};
 
 /// Size of the chart [px].
-const SIZE: (u32, u32) = (900, 600);
+pub(super) const SIZE: (u32, u32) = (900, 600);
 /// plotters rounds to whole units of the drawing: it draws this many times larger, and the viewer scales down.
 pub(super) const FINER: u32 = 8;
 /// Height of the strip above the chart that holds title and legend [px].
-const HEAD: u32 = 84;
+pub(super) const HEAD: u32 = 84;
 
 // Colours that people with colour-blindness tell apart (Okabe and Ito 2008), each with its own dash or width.
-const INWARD: RGBColor = RGBColor(0, 114, 178);
-const OUTWARD: RGBColor = RGBColor(213, 94, 0);
-const CUTTING: RGBColor = RGBColor(204, 121, 167);
-const SPREADING: RGBColor = RGBColor(0, 158, 115);
-const FRICTION: RGBColor = RGBColor(230, 159, 0);
+pub(super) const INWARD: RGBColor = RGBColor(0, 114, 178);
+pub(super) const OUTWARD: RGBColor = RGBColor(213, 94, 0);
+pub(super) const CUTTING: RGBColor = RGBColor(204, 121, 167);
+pub(super) const SPREADING: RGBColor = RGBColor(0, 158, 115);
+pub(super) const FRICTION: RGBColor = RGBColor(230, 159, 0);
 
 /// Travel below which a run counts as one without insertion and is drawn over time [m].
 const LEAST_TRAVEL: f64 = 1e-6;
 
 /// One line of the chart and of its legend.
-struct Curve {
-    label: &'static str,
-    colour: RGBColor,
+pub(super) struct Curve {
+    pub label: &'static str,
+    pub colour: RGBColor,
     /// [1/FINER px]
-    width: u32,
+    pub width: u32,
     /// Length of dash and gap [px]; `None`: a solid line.
-    dash: Option<(u32, u32)>,
-    points: Vec<(f64, f64)>,
+    pub dash: Option<(u32, u32)>,
+    pub points: Vec<(f64, f64)>,
 }
 
 /// Writes the chart, whole or not at all.
@@ -167,7 +167,7 @@ fn curves(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRe
 }
 
 /// Title and, below it, the legend in one row, outside the chart.
-fn draw_head<DB: DrawingBackend>(
+pub(super) fn draw_head<DB: DrawingBackend>(
     head: &DrawingArea<DB, plotters::coord::Shift>,
     title: &str,
     curves: &[Curve],

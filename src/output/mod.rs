@@ -8,6 +8,7 @@ pub mod chart;
 pub mod curve;
 pub mod fit_chart;
 pub mod folder;
+pub mod material_chart;
 pub mod progress;
 pub mod summary;
 pub mod tables;

@@ -4,7 +4,7 @@
 //! [`Scene::load`] reads, checks and converts. Nothing after this module knows about millimetres.
 
 mod convert;
-mod document;
+pub(crate) mod document;
 pub mod file;
 pub mod presets;
 

@@ -1,0 +1,800 @@
+//! `stylet material`: stresses of a homogeneous sample, for a preset, for constants, or for a material of a scene.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+use serde::Serialize;
+
+use crate::effects::viscoelastic::{LARGEST_TERM_COUNT, Term};
+use crate::effects::{damage, fibres, plasticity, viscoelastic};
+use crate::error::{Error, Result};
+use crate::material::{
+    Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict, four_digits,
+};
+use crate::material_point::Material;
+use crate::material_test::{self, Leg, Mode, Protocol, Row};
+use crate::output::{material_chart::material_chart, whole_file};
+use crate::scene::document::closest;
+use crate::scene::{Scene, presets};
+
+const KPA: f64 = 1e3;
+const MM: f64 = 1e-3;
+/// Density of tissue; it plays no part in a test without inertia [kg/m^3].
+const DENSITY: f64 = 1060.0;
+/// Rows of one leg from which peaks are read and figures are drawn.
+const FINE_POINTS: usize = 201;
+/// Columns of a narrow terminal.
+const COLUMNS: usize = 80;
+
+/// Which sample, which test, which output. The loading axis is x.
+#[derive(Args, Debug)]
+pub struct MaterialArgs {
+    /// Tissue preset, e.g. across-fibre; or give constants, or --scene
+    preset: Option<String>,
+    /// Elastic law of the constants [default: mooney_rivlin]
+    #[arg(long, value_enum, help_heading = "Constants")]
+    law: Option<LawName>,
+    /// neo_hookean, mooney_rivlin, yeoh
+    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
+    c10_kpa: Option<f64>,
+    /// mooney_rivlin
+    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
+    c01_kpa: Option<f64>,
+    /// yeoh
+    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
+    c20_kpa: Option<f64>,
+    /// yeoh
+    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
+    c30_kpa: Option<f64>,
+    /// ogden, demiray: shear modulus at rest
+    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
+    mu_kpa: Option<f64>,
+    /// ogden: exponent
+    #[arg(long, allow_negative_numbers = true, help_heading = "Constants")]
+    alpha: Option<f64>,
+    /// demiray: exponent
+    #[arg(long, allow_negative_numbers = true, help_heading = "Constants")]
+    b: Option<f64>,
+    /// Poisson's ratio at rest; fixes the bulk modulus
+    #[arg(long, value_name = "NU", conflicts_with = "bulk_modulus_kpa", help_heading = "Constants")]
+    poisson_ratio: Option<f64>,
+    /// Bulk modulus K = 2/D
+    #[arg(long, value_name = "KPA", help_heading = "Constants")]
+    bulk_modulus_kpa: Option<f64>,
+    /// Compute constants that are unstable at rest instead of refusing them
+    #[arg(long, help_heading = "Constants")]
+    allow_unstable: bool,
+    /// Take material and effects from a scene file
+    #[arg(long, value_name = "FILE", conflicts_with = "preset")]
+    scene: Option<PathBuf>,
+    /// The material of this region of the scene
+    #[arg(long, value_name = "NAME", requires = "scene")]
+    region: Option<String>,
+
+    /// Modes of loading
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "all", help_heading = "Test")]
+    mode: Vec<ModeName>,
+    /// Stretch to go to, below 1 a compression [default: 1.5]. In a test of shear alone the amount of shear
+    /// [default: 0.5]; beside other modes the shear goes to this stretch minus 1
+    #[arg(long, value_name = "STRETCH", allow_negative_numbers = true, help_heading = "Test")]
+    to: Option<f64>,
+    /// Stretch (or shear) to begin and end at [default: rest]
+    #[arg(long, value_name = "STRETCH", allow_negative_numbers = true, help_heading = "Test")]
+    from: Option<f64>,
+    /// Rows of loading, of holding and of unloading
+    #[arg(long, value_name = "N", default_value_t = 11, help_heading = "Test")]
+    points: usize,
+    /// Rate of the stretch [1/s]; matters with viscoelastic
+    #[arg(long, value_name = "RATE", default_value_t = 0.01, help_heading = "Test")]
+    rate: f64,
+    /// Time held after loading [s]
+    #[arg(long, value_name = "S", default_value_t = 0.0, help_heading = "Test")]
+    hold: f64,
+    /// Times that the test is repeated on the same sample
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Test")]
+    cycles: usize,
+    /// End after loading and holding
+    #[arg(long, help_heading = "Test")]
+    no_unload: bool,
+
+    /// Effects beside the elastic law, with the program's default parameters (with --scene: those of the scene)
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", help_heading = "Effects")]
+    effects: Option<Vec<EffectName>>,
+    /// plasticity: yield stress
+    #[arg(long, value_name = "KPA", help_heading = "Effects")]
+    yield_kpa: Option<f64>,
+    /// plasticity: hardening modulus
+    #[arg(long, value_name = "KPA", help_heading = "Effects")]
+    hardening_kpa: Option<f64>,
+    /// fibres: stiffness
+    #[arg(long, value_name = "KPA", help_heading = "Effects")]
+    k1_kpa: Option<f64>,
+    /// fibres: exponent
+    #[arg(long, help_heading = "Effects")]
+    k2: Option<f64>,
+    /// fibres: x, y, z, or the angle from the loading axis x towards y [deg]
+    #[arg(long, value_name = "AXIS", allow_negative_numbers = true, help_heading = "Effects")]
+    fibre: Option<String>,
+    /// viscoelastic: terms as share:seconds, e.g. 0.25:0.5,0.15:5
+    #[arg(long, value_name = "G:TAU,..", help_heading = "Effects")]
+    prony: Option<String>,
+    /// damage: plastic strain at which it begins
+    #[arg(long, value_name = "ALPHA", help_heading = "Effects")]
+    damage_onset: Option<f64>,
+    /// damage: plastic displacement at which nothing would be left
+    #[arg(long, value_name = "MM", help_heading = "Effects")]
+    failure_displacement_mm: Option<f64>,
+    /// damage: edge of the cell
+    #[arg(long, value_name = "MM", default_value_t = 1.0, help_heading = "Effects")]
+    cell_mm: f64,
+
+    /// Print JSON: an array of rows in SI units
+    #[arg(long, conflicts_with = "csv", help_heading = "Output")]
+    json: bool,
+    /// Print CSV in SI units
+    #[arg(long, help_heading = "Output")]
+    csv: bool,
+    /// Draw all modes into this file
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    svg: Option<PathBuf>,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+#[value(rename_all = "snake_case")]
+enum LawName {
+    NeoHookean,
+    MooneyRivlin,
+    Yeoh,
+    Ogden,
+    Demiray,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+enum ModeName {
+    Uniaxial,
+    Equibiaxial,
+    Planar,
+    Shear,
+    All,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+enum EffectName {
+    Plasticity,
+    Fibres,
+    Viscoelastic,
+    Damage,
+}
+
+/// A material with its name, as the head of the table tells it.
+struct Subject {
+    name: String,
+    material: Material,
+}
+
+/// Runs the test and renders it. What concerns the user beside the rows goes to standard error, so that JSON and CSV
+/// stay clean.
+pub fn material(args: &MaterialArgs) -> Result<String> {
+    let subject = subject(args)?;
+    let law = &subject.material.law;
+    let verdict = law.verdict();
+    if verdict == Verdict::Unstable && !args.allow_unstable {
+        return Err(Error::input(
+            format!("REFUSED material: {}", describe_verdict(law)),
+            "constants with a positive shear and bulk modulus, a preset such as lv2022-refit, or --allow-unstable to \
+             look at the curves of these",
+        ));
+    }
+    let modes = modes(args);
+    let points = args.points.clamp(2, 100_000);
+    check_protocol(args)?;
+    // The fine rows hold the wanted ones.
+    let every = FINE_POINTS.div_ceil(points - 1).max(1);
+    let mut curves = Vec::new();
+    for mode in modes.iter().copied() {
+        let (from, to) = range(args, mode, modes.len() == 1)?;
+        let protocol = Protocol {
+            from,
+            to,
+            points: (points - 1) * every + 1,
+            rate: args.rate,
+            hold: args.hold,
+            cycles: args.cycles,
+            unload: !args.no_unload,
+            cell_length: args.cell_mm * MM,
+        };
+        curves.push((mode, material_test::run(&subject.material, mode, &protocol)?));
+    }
+    // The table has the verdict in its head.
+    if (args.json || args.csv) && verdict != Verdict::Stable {
+        eprintln!("warning: {}", describe_verdict(law));
+    }
+    if let Some(path) = &args.svg {
+        let text = material_chart(&format!("{}: {}", subject.name, effect_keys(&subject.material)), &curves)
+            .map_err(|reason| Error::file(path, std::io::Error::other(format!("chart: {reason}"))))?;
+        whole_file::write(path, text.as_bytes())?;
+    }
+    let rows: Vec<(Mode, Vec<Row>)> = curves.iter().map(|(mode, rows)| (*mode, thinned(rows, every))).collect();
+    if args.json {
+        let records: Vec<Record> = rows.iter().flat_map(|(mode, rows)| rows.iter().map(|r| record(*mode, r))).collect();
+        return serde_json::to_string_pretty(&records).map_err(|e| Error::input(e.to_string(), "report this defect"));
+    }
+    if args.csv {
+        return Ok(csv(&rows));
+    }
+    let mut text = head(args, &subject);
+    for ((mode, rows), (_, fine)) in rows.iter().zip(&curves) {
+        table(&mut text, &subject.material, *mode, rows, fine);
+    }
+    Ok(text)
+}
+
+/// Every `every`-th row of each leg, its end included.
+fn thinned(rows: &[Row], every: usize) -> Vec<Row> {
+    let mut last = None;
+    let mut count = 0;
+    let mut kept = Vec::new();
+    for row in rows {
+        if last != Some((row.cycle, row.leg)) {
+            last = Some((row.cycle, row.leg));
+            // Loading begins with a row, the other legs after one.
+            count = if row.leg == Leg::Loading { 0 } else { 1 };
+        }
+        if count % every == 0 {
+            kept.push(*row);
+        }
+        count += 1;
+    }
+    kept
+}
+
+fn modes(args: &MaterialArgs) -> Vec<Mode> {
+    let wanted = |mode: Mode| {
+        args.mode.iter().any(|name| match name {
+            ModeName::All => true,
+            ModeName::Uniaxial => mode == Mode::Uniaxial,
+            ModeName::Equibiaxial => mode == Mode::Equibiaxial,
+            ModeName::Planar => mode == Mode::Planar,
+            ModeName::Shear => mode == Mode::Shear,
+        })
+    };
+    Mode::ALL.into_iter().filter(|mode| wanted(*mode)).collect()
+}
+
+/// Begin and end of a leg.
+fn range(args: &MaterialArgs, mode: Mode, alone: bool) -> Result<(f64, f64)> {
+    let shift = if mode == Mode::Shear && !alone { 1.0 } else { 0.0 };
+    let default = if mode == Mode::Shear { 0.5 } else { 1.5 };
+    let from = args.from.map_or(mode.rest(), |v| v - shift);
+    let to = args.to.map_or(default, |v| v - shift);
+    let (quantity, low, high) = if mode == Mode::Shear { ("shear", -10.0, 10.0) } else { ("stretch", 0.05, 10.0) };
+    for (option, value) in [("--from", from), ("--to", to)] {
+        if !(low..=high).contains(&value) {
+            return Err(Error::input(
+                format!("{option}: a {quantity} of {value} is outside {low} to {high}"),
+                format!("a {quantity} from {low} to {high}; a stretch of 1.5 is 50 % longer, 0.7 is 30 % shorter"),
+            ));
+        }
+    }
+    if from == to {
+        return Err(Error::input(
+            format!("{} test: --from and --to are both {from}", mode.key()),
+            "two different values",
+        ));
+    }
+    Ok((from, to))
+}
+
+fn check_protocol(args: &MaterialArgs) -> Result<()> {
+    for (option, value, low, high) in [
+        ("--rate", args.rate, 1e-9, 1e6),
+        ("--hold", args.hold, 0.0, 1e9),
+        ("--cycles", args.cycles as f64, 1.0, 100.0),
+        ("--points", args.points as f64, 2.0, 10_000.0),
+        ("--cell-mm", args.cell_mm, 1e-6, 1e3),
+    ] {
+        number(option, value, low, high)?;
+    }
+    Ok(())
+}
+
+/// The value where it lies in the range.
+fn number(option: &str, value: f64, low: f64, high: f64) -> Result<f64> {
+    if (low..=high).contains(&value) {
+        Ok(value)
+    } else {
+        Err(Error::input(format!("{option} is {value}"), format!("a number from {low} to {high}")))
+    }
+}
+
+fn subject(args: &MaterialArgs) -> Result<Subject> {
+    let given = given_constants(args);
+    if let (Some((option, _)), true) = (given.first(), args.preset.is_some() || args.scene.is_some()) {
+        let other = if args.scene.is_some() { "a scene" } else { "a preset" };
+        return Err(Error::input(
+            format!("{option} beside {other}: one of them decides the law"),
+            format!("remove {option} or {other}"),
+        ));
+    }
+    let mut subject = match (&args.preset, &args.scene) {
+        (Some(name), _) => from_preset(name)?,
+        (None, Some(path)) => from_scene(args, path)?,
+        (None, None) => {
+            let law = from_constants(args, &given)?;
+            Subject { name: format!("{} (constants)", law.isochoric.key()), material: elastic(law) }
+        }
+    };
+    let law = &mut subject.material.law;
+    if (args.preset.is_some() || args.scene.is_some())
+        && let Some(bulk) = bulk_modulus(args, law.shear_modulus())?
+    {
+        law.bulk_modulus = bulk;
+    }
+    effects(args, &mut subject.material)?;
+    Ok(subject)
+}
+
+fn elastic(law: ElasticLaw) -> Material {
+    Material { law, density: DENSITY, plasticity: None, fibres: None, viscoelastic: None, damage: None }
+}
+
+fn from_preset(name: &str) -> Result<Subject> {
+    let Some(preset) = presets::tissue(name) else {
+        let names: Vec<&str> = presets::tissues().iter().map(|p| p.name.as_str()).collect();
+        let near = closest(name, names.iter().copied()).map(|n| format!("did you mean `{n}`? ")).unwrap_or_default();
+        return Err(Error::input(
+            format!("there is no tissue preset `{name}`"),
+            format!("{near}Presets: {}", names.join(", ")),
+        ));
+    };
+    Ok(Subject { name: preset.name.clone(), material: Material { density: preset.density, ..elastic(preset.law) } })
+}
+
+fn from_scene(args: &MaterialArgs, path: &std::path::Path) -> Result<Subject> {
+    let scene = Scene::load(path, &[])?;
+    let (name, tissue) = match &args.region {
+        None => (scene.material.name.clone(), &scene.material),
+        Some(wanted) => match scene.regions.iter().find(|r| r.name == *wanted) {
+            Some(region) => (format!("{} ({wanted})", region.material.name), &region.material),
+            None => {
+                let names: Vec<&str> = scene.regions.iter().map(|r| r.name.as_str()).collect();
+                let near = closest(wanted, names.iter().copied()).map(|n| format!("did you mean `{n}`? "));
+                let list = if names.is_empty() { "none".into() } else { names.join(", ") };
+                return Err(Error::input(
+                    format!("the scene {} has no region `{wanted}`", path.display()),
+                    format!("{}Its regions: {list}", near.unwrap_or_default()),
+                ));
+            }
+        },
+    };
+    let on = &scene.effects;
+    let material = Material {
+        law: tissue.law,
+        density: tissue.density,
+        plasticity: on.plasticity.map(|p| tissue.plasticity.unwrap_or(p)),
+        fibres: on.fibres.map(|p| tissue.fibres.unwrap_or(p)),
+        viscoelastic: on.viscoelastic.clone().map(|p| tissue.viscoelastic.clone().unwrap_or(p)),
+        damage: on.damage.map(|p| tissue.damage.unwrap_or(p)),
+    };
+    Ok(Subject { name, material })
+}
+
+/// The constants on the command line with their options.
+fn given_constants(args: &MaterialArgs) -> Vec<(&'static str, f64)> {
+    let all = [
+        ("--c10-kpa", args.c10_kpa),
+        ("--c01-kpa", args.c01_kpa),
+        ("--c20-kpa", args.c20_kpa),
+        ("--c30-kpa", args.c30_kpa),
+        ("--mu-kpa", args.mu_kpa),
+        ("--alpha", args.alpha),
+        ("--b", args.b),
+    ];
+    all.into_iter().filter_map(|(option, value)| value.map(|v| (option, v))).collect()
+}
+
+fn from_constants(args: &MaterialArgs, given: &[(&'static str, f64)]) -> Result<ElasticLaw> {
+    if given.is_empty() {
+        let names: Vec<&str> = presets::tissues().iter().map(|p| p.name.as_str()).collect();
+        return Err(Error::input(
+            "no material is named",
+            format!(
+                "a preset ({}), --scene FILE, or constants, e.g. --c10-kpa 2.3 --c01-kpa 1 --bulk-modulus-kpa 500",
+                names.join(", ")
+            ),
+        ));
+    }
+    let law = args.law.unwrap_or(LawName::MooneyRivlin);
+    let (key, needed, optional): (_, &[&str], &[&str]) = match law {
+        LawName::NeoHookean => ("neo_hookean", &["--c10-kpa"], &[]),
+        LawName::MooneyRivlin => ("mooney_rivlin", &["--c10-kpa", "--c01-kpa"], &[]),
+        LawName::Yeoh => ("yeoh", &["--c10-kpa"], &["--c20-kpa", "--c30-kpa"]),
+        LawName::Ogden => ("ogden", &["--mu-kpa", "--alpha"], &[]),
+        LawName::Demiray => ("demiray", &["--mu-kpa", "--b"], &[]),
+    };
+    let list = needed.iter().chain(optional).copied().collect::<Vec<_>>().join(", ");
+    for (option, value) in given {
+        if !needed.contains(option) && !optional.contains(option) {
+            return Err(Error::input(
+                format!("{option} is no constant of the law {key}"),
+                format!("its constants: {list}; or choose another --law"),
+            ));
+        }
+        number(option, *value, -1e6, 1e6)?;
+    }
+    let value = |option: &str| given.iter().find(|(o, _)| *o == option).map_or(0.0, |(_, v)| *v);
+    if let Some(missing) = needed.iter().find(|n| !given.iter().any(|(o, _)| o == *n)) {
+        return Err(Error::input(format!("the law {key} needs {missing}"), format!("its constants: {list}")));
+    }
+    let pa = |option: &str| value(option) * KPA;
+    let isochoric = match law {
+        LawName::NeoHookean => Isochoric::NeoHookean(NeoHookean { c10: pa("--c10-kpa") }),
+        LawName::MooneyRivlin => Isochoric::MooneyRivlin(MooneyRivlin { c10: pa("--c10-kpa"), c01: pa("--c01-kpa") }),
+        LawName::Yeoh => Isochoric::Yeoh(Yeoh { c10: pa("--c10-kpa"), c20: pa("--c20-kpa"), c30: pa("--c30-kpa") }),
+        LawName::Ogden => Isochoric::Ogden(Ogden { mu: pa("--mu-kpa"), alpha: value("--alpha") }),
+        LawName::Demiray => Isochoric::Demiray(Demiray { mu: pa("--mu-kpa"), b: value("--b") }),
+    };
+    match bulk_modulus(args, isochoric.shear_modulus())? {
+        Some(bulk_modulus) => Ok(ElasticLaw { isochoric, bulk_modulus }),
+        None => Err(Error::input(
+            "the law needs its volumetric part",
+            "add --poisson-ratio, e.g. 0.45, or --bulk-modulus-kpa, e.g. 500",
+        )),
+    }
+}
+
+/// Bulk modulus of the command line [Pa].
+fn bulk_modulus(args: &MaterialArgs, shear: f64) -> Result<Option<f64>> {
+    if let Some(nu) = args.poisson_ratio {
+        if !(0.0..0.5).contains(&nu) {
+            return Err(Error::input(
+                format!("--poisson-ratio is {nu}"),
+                "a number from 0 to below 0.5, e.g. 0.45; 0.5 would be incompressible",
+            ));
+        }
+        return Ok(Some(presets::bulk_modulus_from_poisson(shear, nu)));
+    }
+    let bulk = args.bulk_modulus_kpa.map(|k| number("--bulk-modulus-kpa", k, 1e-6, 1e9)).transpose()?;
+    Ok(bulk.map(|k| k * KPA))
+}
+
+/// Switches the effects and overrides their parameters.
+fn effects(args: &MaterialArgs, material: &mut Material) -> Result<()> {
+    if let Some(list) = &args.effects {
+        // Parameters of a scene stay; what it does not have comes with its default.
+        let on = |name: EffectName| list.contains(&name);
+        material.plasticity = on(EffectName::Plasticity).then(|| material.plasticity.unwrap_or_default());
+        material.fibres = on(EffectName::Fibres).then(|| material.fibres.unwrap_or_default());
+        material.viscoelastic = on(EffectName::Viscoelastic).then(|| material.viscoelastic.clone().unwrap_or_default());
+        material.damage = on(EffectName::Damage).then(|| material.damage.unwrap_or_default());
+    }
+    let without = |option: &str, effect: &str| {
+        Error::input(
+            format!("{option} has no meaning without the effect `{effect}`"),
+            format!("add it to the list, e.g. --effects {effect}, or remove {option}"),
+        )
+    };
+    for (option, value, range) in
+        [("--yield-kpa", args.yield_kpa, (1e-6, 1e6)), ("--hardening-kpa", args.hardening_kpa, (0.0, 1e6))]
+    {
+        let Some(value) = value else { continue };
+        let params = material.plasticity.as_mut().ok_or_else(|| without(option, "plasticity"))?;
+        let pa = number(option, value, range.0, range.1)? * KPA;
+        *if option == "--yield-kpa" { &mut params.yield_stress } else { &mut params.hardening } = pa;
+    }
+    for (option, value, range, unit) in
+        [("--k1-kpa", args.k1_kpa, (0.0, 1e6), KPA), ("--k2", args.k2, (1e-9, 1e3), 1.0)]
+    {
+        let Some(value) = value else { continue };
+        let params = material.fibres.as_mut().ok_or_else(|| without(option, "fibres"))?;
+        let value = number(option, value, range.0, range.1)? * unit;
+        *if option == "--k2" { &mut params.k2 } else { &mut params.k1 } = value;
+    }
+    if let Some(text) = &args.fibre {
+        let params = material.fibres.as_mut().ok_or_else(|| without("--fibre", "fibres"))?;
+        params.direction = fibre_direction(text)?;
+    }
+    if let Some(text) = &args.prony {
+        let params = material.viscoelastic.as_mut().ok_or_else(|| without("--prony", "viscoelastic"))?;
+        params.terms = prony_terms(text)?;
+    }
+    if let Some(onset) = args.damage_onset {
+        let params = material.damage.as_mut().ok_or_else(|| without("--damage-onset", "damage"))?;
+        params.onset = number("--damage-onset", onset, 0.0, 100.0)?;
+    }
+    if let Some(length) = args.failure_displacement_mm {
+        let params = material.damage.as_mut().ok_or_else(|| without("--failure-displacement-mm", "damage"))?;
+        params.failure_displacement = number("--failure-displacement-mm", length, 1e-9, 1e6)? * MM;
+    }
+    if material.damage.is_some() && material.plasticity.is_none() {
+        return Err(Error::input(
+            "the effect `damage` needs `plasticity`: plastic displacement drives it",
+            "--effects plasticity,damage",
+        ));
+    }
+    Ok(())
+}
+
+fn fibre_direction(text: &str) -> Result<DVec3> {
+    match text {
+        "x" => Ok(DVec3::X),
+        "y" => Ok(DVec3::Y),
+        "z" => Ok(DVec3::Z),
+        _ => match text.parse::<f64>() {
+            Ok(angle) if angle.is_finite() => {
+                let (sine, cosine) = angle.to_radians().sin_cos();
+                Ok(DVec3::new(cosine, sine, 0.0))
+            }
+            _ => Err(Error::input(
+                format!("--fibre: `{text}` is neither an axis nor an angle"),
+                "x, y, z, or degrees from the loading axis x towards y, e.g. --fibre 30",
+            )),
+        },
+    }
+}
+
+fn prony_terms(text: &str) -> Result<Vec<Term>> {
+    let way_out = "terms as share:seconds with a comma between them, e.g. --prony 0.25:0.5,0.15:5";
+    let term = |term: &str| {
+        let (ratio, time) = term.split_once(':')?;
+        let (ratio, time) = (ratio.trim().parse::<f64>().ok()?, time.trim().parse::<f64>().ok()?);
+        ((0.0..1.0).contains(&ratio) && time > 0.0 && time.is_finite()).then_some(Term { ratio, time })
+    };
+    let mut terms = Vec::new();
+    for part in text.split(',') {
+        match term(part) {
+            Some(term) => terms.push(term),
+            None => {
+                let message = format!("--prony: `{part}` is no share from 0 to below 1 with a positive time");
+                return Err(Error::input(message, way_out));
+            }
+        }
+    }
+    let total: f64 = terms.iter().map(|t| t.ratio).sum();
+    if total >= 1.0 || terms.len() > LARGEST_TERM_COUNT {
+        let message = format!(
+            "--prony: {} terms with the total share {total}; at most {LARGEST_TERM_COUNT} terms and a total below 1",
+            terms.len()
+        );
+        return Err(Error::input(message, way_out));
+    }
+    Ok(terms)
+}
+
+/// Keys of the effects that are on, or `elastic`.
+fn effect_keys(material: &Material) -> String {
+    let mut keys = Vec::new();
+    keys.extend(material.plasticity.map(|_| plasticity::EFFECT.key));
+    keys.extend(material.fibres.map(|_| fibres::EFFECT.key));
+    keys.extend(material.viscoelastic.as_ref().map(|_| viscoelastic::EFFECT.key));
+    keys.extend(material.damage.map(|_| damage::EFFECT.key));
+    if keys.is_empty() { "elastic".into() } else { keys.join(", ") }
+}
+
+/// One row in SI units; the first keys are a promise to programs that read it.
+#[derive(Serialize)]
+struct Record {
+    mode: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stretch: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shear: Option<f64>,
+    nominal_stress_pa: f64,
+    cauchy_stress_pa: f64,
+    cycle: usize,
+    leg: &'static str,
+    time_s: f64,
+    lateral_stretch: [f64; 2],
+    j: f64,
+    plastic_strain: f64,
+    damage: f64,
+    work_j_m3: f64,
+    stored_j_m3: f64,
+    dissipated_j_m3: f64,
+}
+
+fn record(mode: Mode, row: &Row) -> Record {
+    let is_shear = mode == Mode::Shear;
+    Record {
+        mode: mode.key(),
+        stretch: (!is_shear).then_some(row.control),
+        shear: is_shear.then_some(row.control),
+        nominal_stress_pa: row.nominal,
+        cauchy_stress_pa: row.cauchy,
+        cycle: row.cycle + 1,
+        leg: row.leg.key(),
+        time_s: row.time,
+        lateral_stretch: row.lateral,
+        j: row.jacobian,
+        plastic_strain: row.plastic_strain,
+        damage: row.damage,
+        work_j_m3: row.work,
+        stored_j_m3: row.stored,
+        dissipated_j_m3: row.dissipated,
+    }
+}
+
+/// The rows as CSV; one of the columns `stretch` and `shear` is empty.
+fn csv(curves: &[(Mode, Vec<Row>)]) -> String {
+    let mut text = String::from(
+        "mode,stretch,shear,nominal_stress_pa,cauchy_stress_pa,cycle,leg,time_s,lateral_stretch_2,lateral_stretch_3,\
+         j,plastic_strain,damage,work_j_m3,stored_j_m3,dissipated_j_m3\n",
+    );
+    let cell = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+    for (mode, rows) in curves {
+        for r in rows.iter().map(|row| record(*mode, row)) {
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                text,
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                r.mode,
+                cell(r.stretch),
+                cell(r.shear),
+                r.nominal_stress_pa,
+                r.cauchy_stress_pa,
+                r.cycle,
+                r.leg,
+                r.time_s,
+                r.lateral_stretch[0],
+                r.lateral_stretch[1],
+                r.j,
+                r.plastic_strain,
+                r.damage,
+                r.work_j_m3,
+                r.stored_j_m3,
+                r.dissipated_j_m3
+            );
+        }
+    }
+    text
+}
+
+/// Material, verdict, effects and test, one labelled line each.
+fn head(args: &MaterialArgs, subject: &Subject) -> String {
+    let m = &subject.material;
+    let mut text = String::new();
+    let mut line = |label: &str, value: &str| wrapped(&mut text, label, value);
+    let kpa = |v: f64| four_digits(v / KPA);
+    line("material", &format!("{}, law {}", subject.name, m.law.isochoric.key()));
+    line(if m.law.verdict() == Verdict::Stable { "verdict" } else { "WARNING" }, &describe_verdict(&m.law));
+    line(
+        "moduli",
+        &format!(
+            "at rest: shear {} kPa, bulk {} kPa, Young {} kPa, Poisson {}",
+            kpa(m.law.shear_modulus()),
+            kpa(m.law.bulk_modulus),
+            kpa(m.law.youngs_modulus()),
+            four_digits(m.law.poisson_ratio())
+        ),
+    );
+    line("effects", &effect_keys(m));
+    if let Some(p) = &m.plasticity {
+        line("", &format!("plasticity: yield {} kPa, hardening {} kPa", kpa(p.yield_stress), kpa(p.hardening)));
+    }
+    if let Some(f) = &m.fibres {
+        let [x, y, z] = f.direction.to_array().map(|c| four_digits(if c.abs() < 1e-12 { 0.0 } else { c }));
+        line("", &format!("fibres: direction ({x}, {y}, {z}), k1 {} kPa, k2 {}", kpa(f.k1), four_digits(f.k2)));
+    }
+    if let Some(v) = &m.viscoelastic {
+        let term = |t: &Term| format!("{} in {} s", four_digits(t.ratio), four_digits(t.time));
+        line("", &format!("viscoelastic: {}", v.terms.iter().map(term).collect::<Vec<_>>().join(", ")));
+    }
+    if let Some(d) = &m.damage {
+        line(
+            "",
+            &format!(
+                "damage: from plastic strain {}, u_f {} mm, d_max {}, cell {} mm",
+                four_digits(d.onset),
+                four_digits(d.failure_displacement / MM),
+                d.largest,
+                args.cell_mm
+            ),
+        );
+    }
+    line("test", &format!("loading axis x, rate {} 1/s; stresses in kPa", args.rate));
+    text
+}
+
+/// A labelled line, broken at words.
+fn wrapped(text: &mut String, label: &str, value: &str) {
+    const INDENT: usize = 10;
+    let mut line = format!("{label:<INDENT$}");
+    let mut is_empty = true;
+    for word in value.split(' ') {
+        if !is_empty && line.chars().count() + 1 + word.chars().count() > COLUMNS {
+            *text += line.trim_end();
+            *text += "\n";
+            line = " ".repeat(INDENT);
+            is_empty = true;
+        }
+        if !is_empty {
+            line += " ";
+        }
+        line += word;
+        is_empty = false;
+    }
+    *text += line.trim_end();
+    *text += "\n";
+}
+
+/// A column: header, width, decimals, value. Columns that do not fit go first where `spare`.
+struct Column {
+    header: &'static str,
+    width: usize,
+    decimals: usize,
+    value: fn(&Row) -> f64,
+    spare: bool,
+}
+
+/// Columns of a table, as many as a narrow terminal holds.
+fn columns(material: &Material, mode: Mode) -> Vec<Column> {
+    let column = |header, width, decimals, value, spare| Column { header, width, decimals, value, spare };
+    let mut columns = Vec::new();
+    if material.viscoelastic.is_some() {
+        columns.push(column("t [s]", 9, 2, |r| r.time, false));
+    }
+    columns.push(column(if mode == Mode::Shear { "shear" } else { "stretch" }, 9, 4, |r| r.control, false));
+    columns.push(column("nominal", 10, 3, |r| r.nominal / KPA, false));
+    columns.push(column("Cauchy", 10, 3, |r| r.cauchy / KPA, false));
+    match mode {
+        Mode::Shear => {}
+        Mode::Uniaxial if material.fibres.is_some() => {
+            columns.push(column("l2", 8, 4, |r| r.lateral[0], true));
+            columns.push(column("l3", 8, 4, |r| r.lateral[1], true));
+        }
+        _ => columns.push(column("lateral", 9, 4, |r| r.lateral[1], true)),
+    }
+    if mode != Mode::Shear {
+        columns.push(column("J", 8, 4, |r| r.jacobian, true));
+    }
+    if material.plasticity.is_some() {
+        columns.push(column("plastic", 9, 4, |r| r.plastic_strain, false));
+    }
+    if material.damage.is_some() {
+        columns.push(column("d", 7, 3, |r| r.damage, false));
+    }
+    while columns.iter().map(|c| c.width).sum::<usize>() + LEG_WIDTH > COLUMNS {
+        match columns.iter().rposition(|c| c.spare) {
+            Some(index) => columns.remove(index),
+            None => break,
+        };
+    }
+    columns
+}
+
+/// Width of the first column.
+const LEG_WIDTH: usize = 11;
+
+fn table(text: &mut String, material: &Material, mode: Mode, rows: &[Row], fine: &[Row]) {
+    let columns = columns(material, mode);
+    // Writing to a String cannot fail.
+    let _ = write!(text, "\n{:<LEG_WIDTH$}", mode.key());
+    for c in &columns {
+        let _ = write!(text, "{:>width$}", c.header, width = c.width);
+    }
+    text.push('\n');
+    let mut last = None;
+    // The way back of a sample without a memory would repeat the way out.
+    let repeats = |row: &Row| !material.has_history() && row.leg != Leg::Loading;
+    for row in rows.iter().filter(|row| !repeats(row)) {
+        let leg = if last == Some((row.cycle, row.leg)) { "" } else { row.leg.key() };
+        last = Some((row.cycle, row.leg));
+        let _ = write!(text, "{leg:<LEG_WIDTH$}");
+        for c in &columns {
+            // Rounding noise must not print as -0.000.
+            let value = (c.value)(row);
+            let value = if value.abs() < 0.5 * 0.1f64.powi(c.decimals as i32) { 0.0 } else { value };
+            let _ = write!(text, "{value:>width$.decimals$}", width = c.width, decimals = c.decimals);
+        }
+        text.push('\n');
+    }
+    if rows.iter().any(repeats) {
+        *text += "unloading  the same: no effect with a memory is on\n";
+    }
+    if let Some((control, stress)) = material_test::peak(fine) {
+        let quantity = if mode == Mode::Shear { "shear" } else { "stretch" };
+        let _ = writeln!(text, "largest nominal stress {:.3} kPa at {quantity} {control:.3}", stress / KPA);
+    }
+}
