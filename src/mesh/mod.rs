@@ -1,6 +1,7 @@
 //! Meshes: the structured, graded hexahedral block and unstructured tetrahedra.
 
 pub mod block;
+pub mod import;
 pub mod tets;
 
 use std::sync::Arc;

@@ -45,6 +45,17 @@ impl TetMesh {
         1.0 / self.gradients(tet).iter().map(|g| g.length()).fold(0.0, f64::max)
     }
 
+    /// Longest edge of a tetrahedron [m].
+    pub fn longest_edge(&self, tet: usize) -> f64 {
+        let [a, b, c, d] = self.corners(tet);
+        [b - a, c - a, d - a, c - b, d - b, d - c].iter().map(|e| e.length()).fold(0.0, f64::max)
+    }
+
+    /// Rest volume of a region [m^3].
+    pub fn region_volume(&self, region: usize) -> f64 {
+        (0..self.tets.len()).filter(|&t| self.tags[t] as usize == region).map(|t| self.volume(t)).sum()
+    }
+
     /// Lowest and highest corner of the bounding box [m].
     pub fn bounds(&self) -> (DVec3, DVec3) {
         self.positions.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))

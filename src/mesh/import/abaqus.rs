@@ -1,0 +1,540 @@
+//! Abaqus input files (`.inp`): nodes, C3D4 elements and sets of a single part.
+//!
+//! Source: Abaqus Keywords Reference, *NODE, *ELEMENT, *ELSET, *NSET. Keywords and labels do not mind upper and lower
+//! case; the spelling first met is kept for names. Only what defines the mesh is read, the model data are stepped over.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use glam::DVec3;
+
+use super::raw::{ElementClass, RawMesh, RawNode, RawTet, Words};
+use super::source::{Source, excerpt};
+use crate::{Error, Result};
+
+const WORDS: Words = Words {
+    node: "node",
+    element: "element",
+    first_order: "mesh the part with linear elements (C3D4) and write the input file again",
+};
+
+/// Region of elements that are in no set.
+const NO_SET: &str = "region-0";
+
+/// Reads the bytes of an `.inp` file.
+pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
+    let mut file = AbaqusFile {
+        source: Source::new(name, bytes),
+        raw: RawMesh::new(name, WORDS),
+        node_index: HashMap::new(),
+        elements: Vec::new(),
+        element_index: HashMap::new(),
+        other_elements: HashSet::new(),
+        element_sets: Sets::default(),
+        node_sets: Sets::default(),
+        parts: 0,
+        instances: 0,
+    };
+    file.keywords()?;
+    file.add_elements()?;
+    file.raw.refuse_other_volumes()?;
+    file.add_regions()?;
+    file.add_node_sets()?;
+    Ok(file.raw)
+}
+
+struct AbaqusFile<'a> {
+    source: Source<'a>,
+    raw: RawMesh,
+    node_index: HashMap<u64, u32>,
+    elements: Vec<Element>,
+    /// Index into `elements` by id.
+    element_index: HashMap<u64, usize>,
+    /// Ids of elements that are left out; sets may name them.
+    other_elements: HashSet<u64>,
+    element_sets: Sets,
+    node_sets: Sets,
+    parts: u32,
+    instances: u32,
+}
+
+struct Element {
+    id: u64,
+    nodes: [u64; 4],
+    at: usize,
+}
+
+/// Sets in the order in which they are listed last, by their name in capitals.
+#[derive(Default)]
+struct Sets {
+    sets: BTreeMap<String, Set>,
+    listed: usize,
+}
+
+struct Set {
+    /// The name as it was first spelt.
+    name: String,
+    /// Rank of the last keyword that names the set.
+    listed: usize,
+    members: Vec<Member>,
+}
+
+struct Member {
+    at: usize,
+    what: Members,
+}
+
+enum Members {
+    Id(u64),
+    Range { first: u64, last: u64, step: u64 },
+    Set(String),
+}
+
+impl Sets {
+    /// The set of this name, now listed last.
+    fn open(&mut self, name: &str) -> &mut Set {
+        self.listed += 1;
+        let key = name.to_uppercase();
+        let set =
+            self.sets.entry(key).or_insert_with(|| Set { name: name.to_string(), listed: 0, members: Vec::new() });
+        set.listed = self.listed;
+        set
+    }
+
+    /// Ids of a set, with those of the sets that it names.
+    fn resolve(&self, source: &Source, key: &str, known: &BTreeSet<u64>, what: &str) -> Result<BTreeSet<u64>> {
+        let mut ids = BTreeSet::new();
+        let mut open = vec![key.to_string()];
+        let mut seen: HashSet<String> = open.iter().cloned().collect();
+        while let Some(key) = open.pop() {
+            let set = &self.sets[&key];
+            for member in &set.members {
+                let missing = |id: u64| {
+                    let message = format!("set {} names {what} {id}, which is not in the file", set.name);
+                    source.fail(member.at, message, "correct the set or write the input file again")
+                };
+                match &member.what {
+                    Members::Id(id) if known.contains(id) => {
+                        ids.insert(*id);
+                    }
+                    Members::Id(id) => return Err(missing(*id)),
+                    Members::Range { first, last, step } => {
+                        // The first id that is missing ends the loop, so that a range can be no longer than the file.
+                        for id in (*first..=*last).step_by(usize::try_from(*step).unwrap_or(usize::MAX)) {
+                            if !known.contains(&id) {
+                                return Err(missing(id));
+                            }
+                            ids.insert(id);
+                        }
+                    }
+                    Members::Set(other) => {
+                        if !self.sets.contains_key(other) {
+                            let message = format!("set {} names set {other}, which is not in the file", set.name);
+                            return Err(source.fail(
+                                member.at,
+                                message,
+                                "correct the set or write the input file again",
+                            ));
+                        }
+                        if seen.insert(other.clone()) {
+                            open.push(other.clone());
+                        }
+                    }
+                }
+            }
+        }
+        Ok(ids)
+    }
+}
+
+/// A keyword line with its parameters, names in capitals.
+struct Keyword {
+    at: usize,
+    name: String,
+    parameters: Vec<(String, String)>,
+}
+
+impl Keyword {
+    fn parameter(&self, name: &str) -> Option<&str> {
+        self.parameters.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+    }
+}
+
+impl AbaqusFile<'_> {
+    /// The next line that is no comment and not empty, without moving on.
+    fn peek_line(&mut self) -> Option<(usize, String)> {
+        loop {
+            let at = self.source.at();
+            let line = self.source.line()?.trim_ascii();
+            if !line.is_empty() && !line.starts_with(b"**") {
+                let text = String::from_utf8_lossy(line).into_owned();
+                self.source.seek(at);
+                return Some((at, text));
+            }
+        }
+    }
+
+    fn next_line(&mut self) -> Option<(usize, String)> {
+        let line = self.peek_line()?;
+        self.source.line();
+        Some(line)
+    }
+
+    /// The next data line; `None` before a keyword and at the end.
+    fn next_data(&mut self) -> Option<(usize, String)> {
+        match self.peek_line() {
+            Some((_, line)) if !line.starts_with('*') => self.next_line(),
+            _ => None,
+        }
+    }
+
+    /// Fields of the next data line and of those that continue it behind a comma at the end.
+    fn next_record(&mut self) -> Option<(usize, Vec<String>)> {
+        let (at, mut line) = self.next_data()?;
+        while line.ends_with(',') {
+            match self.next_data() {
+                Some((_, more)) => line += &more,
+                None => break,
+            }
+        }
+        Some((at, fields(&line)))
+    }
+
+    /// A keyword line; it goes on behind a comma at its end.
+    fn keyword(&mut self, at: usize, first: String) -> Result<Keyword> {
+        let mut text = first;
+        while text.ends_with(',') {
+            match self.next_data() {
+                Some((_, more)) => text += &more,
+                None => return Err(self.source.broken(at, "the keyword line ends in a comma, but nothing follows")),
+            }
+        }
+        let mut parts = split_quoted(&text[1..]).into_iter();
+        let name = parts.next().unwrap_or_default().to_uppercase().split_whitespace().collect::<Vec<_>>().join(" ");
+        let parameters = parts
+            .filter(|part| !part.is_empty())
+            .map(|part| {
+                let (key, value) = part.split_once('=').unwrap_or((&part, ""));
+                (key.trim().to_uppercase(), value.trim().trim_matches('"').trim().to_string())
+            })
+            .collect();
+        Ok(Keyword { at, name, parameters })
+    }
+
+    fn keywords(&mut self) -> Result<()> {
+        while let Some((at, line)) = self.next_line() {
+            if !line.starts_with('*') {
+                // Data of a keyword that does not concern the mesh.
+                continue;
+            }
+            let keyword = self.keyword(at, line)?;
+            match keyword.name.as_str() {
+                "NODE" => self.nodes(&keyword)?,
+                "ELEMENT" => self.elements(&keyword)?,
+                "ELSET" => self.set(&keyword, SetKind::Elements)?,
+                "NSET" => self.set(&keyword, SetKind::Nodes)?,
+                "INCLUDE" => {
+                    return Err(self.source.fail(
+                        at,
+                        format!(
+                            "*INCLUDE, INPUT={}: other files are not read",
+                            keyword.parameter("INPUT").unwrap_or("?")
+                        ),
+                        "put the text of that file in place of this line",
+                    ));
+                }
+                "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" => {
+                    return Err(self.source.fail(
+                        at,
+                        format!("*{} makes or moves nodes or elements by rule, which is not done here", keyword.name),
+                        "write the input file with every node and element listed",
+                    ));
+                }
+                "PART" => {
+                    self.parts += 1;
+                    self.refuse_second(at, self.parts, "part")?;
+                }
+                "INSTANCE" => {
+                    self.instances += 1;
+                    self.refuse_second(at, self.instances, "instance")?;
+                    self.refuse_placement()?;
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn refuse_second(&self, at: usize, count: u32, what: &str) -> Result<()> {
+        if count < 2 {
+            return Ok(());
+        }
+        Err(self.source.fail(
+            at,
+            format!("a second {what}: only a file with a single {what} is read"),
+            "merge the parts into one orphan mesh and write the input file again",
+        ))
+    }
+
+    /// An instance may stand only where its part was made.
+    fn refuse_placement(&mut self) -> Result<()> {
+        while let Some((at, fields)) = self.next_record() {
+            for (number, field) in fields.iter().enumerate() {
+                // The first line shifts; the second one turns about an axis by an angle.
+                if self.float(at, field, "the placement of an instance")? != 0.0 && (fields.len() < 7 || number == 6) {
+                    return Err(self.source.fail(
+                        at,
+                        "the instance is shifted or turned against its part, which is not done here",
+                        "write the mesh of the assembly as one part",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn float(&self, at: usize, text: &str, what: &str) -> Result<f64> {
+        // Fortran writes double precision with a D.
+        let plain = text.replace(['d', 'D'], "e");
+        match plain.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            Ok(value) => Err(self.source.broken(at, format!("{what}: {value} is not finite"))),
+            Err(_) => Err(self.source.broken(at, format!("{what}: `{}` is not a number", excerpt(text.as_bytes())))),
+        }
+    }
+
+    fn id(&self, at: usize, text: &str, what: &str) -> Result<u64> {
+        text.parse().map_err(|_| {
+            self.source.broken(at, format!("{what}: `{}` is not a whole number without sign", excerpt(text.as_bytes())))
+        })
+    }
+
+    fn nodes(&mut self, keyword: &Keyword) -> Result<()> {
+        if keyword.parameter("SYSTEM").is_some_and(|s| !s.eq_ignore_ascii_case("R")) {
+            return Err(self.source.fail(
+                keyword.at,
+                "*NODE with cylindrical or spherical coordinates is not read",
+                "write the nodes in rectangular coordinates",
+            ));
+        }
+        self.refuse_parameter(keyword, "INPUT")?;
+        let mut ids = Vec::new();
+        while let Some((at, line)) = self.next_data() {
+            let fields = fields(&line);
+            let id = self.id(at, &fields[0], "the id of a node")?;
+            if fields.len() < 4 {
+                let message = format!("node {id} has {} coordinates instead of 3", fields.len() - 1);
+                return Err(self.source.broken(at, message));
+            }
+            let mut position = [0.0; 3];
+            for (x, field) in position.iter_mut().zip(&fields[1..4]) {
+                *x = self.float(at, field, &format!("a coordinate of node {id}"))?;
+            }
+            let index =
+                u32::try_from(self.raw.nodes.len()).map_err(|_| self.source.broken(at, "more than 2^32 nodes"))?;
+            if self.node_index.insert(id, index).is_some() {
+                return Err(self.source.broken(at, format!("node {id} stands in the file twice")));
+            }
+            self.raw.nodes.push(RawNode { id, position: DVec3::from_array(position) });
+            ids.push(Member { at, what: Members::Id(id) });
+        }
+        if let Some(name) = keyword.parameter("NSET") {
+            self.node_sets.open(name).members.extend(ids);
+        }
+        Ok(())
+    }
+
+    fn refuse_parameter(&self, keyword: &Keyword, parameter: &str) -> Result<()> {
+        match keyword.parameter(parameter) {
+            None => Ok(()),
+            Some(file) => Err(self.source.fail(
+                keyword.at,
+                format!("*{}, {parameter}={file}: other files are not read", keyword.name),
+                "put the lines of that file below this keyword",
+            )),
+        }
+    }
+
+    fn elements(&mut self, keyword: &Keyword) -> Result<()> {
+        self.refuse_parameter(keyword, "INPUT")?;
+        let Some(kind) = keyword.parameter("TYPE").map(str::to_uppercase) else {
+            return Err(self.source.broken(keyword.at, "*ELEMENT tells no TYPE"));
+        };
+        let class = element_class(&kind);
+        let mut ids = Vec::new();
+        while let Some((at, fields)) = self.next_record() {
+            let id = self.id(at, &fields[0], "the id of an element")?;
+            ids.push(Member { at, what: Members::Id(id) });
+            if let Some(class) = class {
+                self.raw.count_other(class, &format!("elements of type {kind}"), 1);
+                self.other_elements.insert(id);
+                continue;
+            }
+            let count = fields.len() - 1;
+            if count != 4 {
+                return Err(self
+                    .source
+                    .broken(at, format!("element {id} of type {kind} has {count} nodes instead of 4")));
+            }
+            let mut nodes = [0; 4];
+            for (node, field) in nodes.iter_mut().zip(&fields[1..]) {
+                *node = self.id(at, field, &format!("a node of element {id}"))?;
+            }
+            if self.element_index.insert(id, self.elements.len()).is_some() {
+                return Err(self.source.broken(at, format!("element {id} stands in the file twice")));
+            }
+            self.elements.push(Element { id, nodes, at });
+        }
+        if let Some(name) = keyword.parameter("ELSET") {
+            self.element_sets.open(name).members.extend(ids);
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, keyword: &Keyword, kind: SetKind) -> Result<()> {
+        let parameter = match kind {
+            SetKind::Elements => "ELSET",
+            SetKind::Nodes => "NSET",
+        };
+        let Some(name) = keyword.parameter(parameter).filter(|n| !n.is_empty()) else {
+            return Err(self.source.broken(keyword.at, format!("*{parameter} tells no name ({parameter}=...)")));
+        };
+        if kind == SetKind::Nodes && keyword.parameter("ELSET").is_some() {
+            return Err(self.source.fail(
+                keyword.at,
+                "a node set made of the nodes of an element set is not read",
+                "list the nodes of the set",
+            ));
+        }
+        let generate = keyword.parameter("GENERATE").is_some();
+        let mut members = Vec::new();
+        while let Some((at, line)) = self.next_data() {
+            let fields = fields(&line);
+            if generate {
+                let what = "a generated set (first, last, step)";
+                if !(2..=3).contains(&fields.len()) {
+                    return Err(self.source.broken(at, format!("{what} needs 2 or 3 numbers, not {}", fields.len())));
+                }
+                let (first, last) = (self.id(at, &fields[0], what)?, self.id(at, &fields[1], what)?);
+                let step = fields.get(2).map_or(Ok(1), |f| self.id(at, f, what))?;
+                if step == 0 || last < first {
+                    return Err(self
+                        .source
+                        .broken(at, format!("{what}: {first}, {last}, {step} never ends or is empty")));
+                }
+                members.push(Member { at, what: Members::Range { first, last, step } });
+                continue;
+            }
+            for field in fields.iter().filter(|f| !f.is_empty()) {
+                // Behind the name of an instance stands what it names.
+                let label = field.rsplit('.').next().unwrap_or(field).trim_matches('"');
+                let what = match label.parse() {
+                    Ok(id) => Members::Id(id),
+                    Err(_) => Members::Set(label.to_uppercase()),
+                };
+                members.push(Member { at, what });
+            }
+        }
+        let sets = if kind == SetKind::Elements { &mut self.element_sets } else { &mut self.node_sets };
+        sets.open(name).members.extend(members);
+        Ok(())
+    }
+
+    fn add_elements(&mut self) -> Result<()> {
+        for element in &self.elements {
+            let mut nodes = [0; 4];
+            for (index, node) in nodes.iter_mut().zip(element.nodes) {
+                *index = *self.node_index.get(&node).ok_or_else(|| missing_node(&self.source, element, node))?;
+            }
+            self.raw.tets.push(RawTet { id: element.id, nodes, region: u32::MAX });
+        }
+        Ok(())
+    }
+
+    fn add_regions(&mut self) -> Result<()> {
+        let mut known: BTreeSet<u64> = self.elements.iter().map(|e| e.id).collect();
+        known.extend(&self.other_elements);
+        let mut order: Vec<(&String, &Set)> = self.element_sets.sets.iter().collect();
+        order.sort_by_key(|(_, set)| set.listed);
+        let mut shared = 0;
+        let mut in_several = vec![false; self.elements.len()];
+        for (key, set) in order {
+            let region = self.raw.region(&set.name);
+            for id in self.element_sets.resolve(&self.source, key, &known, "element")? {
+                let Some(&index) = self.element_index.get(&id) else { continue };
+                let tet = &mut self.raw.tets[index];
+                if tet.region != u32::MAX && !std::mem::replace(&mut in_several[index], true) {
+                    shared += 1;
+                }
+                tet.region = region;
+            }
+        }
+        if shared > 0 {
+            self.raw
+                .notices
+                .push(format!("{shared} elements are in several sets; the set listed last is their region."));
+        }
+        let without = self.raw.tets.iter().filter(|t| t.region == u32::MAX).count();
+        if without > 0 {
+            let region = self.raw.region(NO_SET);
+            self.raw.tets.iter_mut().filter(|t| t.region == u32::MAX).for_each(|t| t.region = region);
+            self.raw.notices.push(format!("{without} elements are in no element set; their region is `{NO_SET}`."));
+        }
+        Ok(())
+    }
+
+    fn add_node_sets(&mut self) -> Result<()> {
+        let known: BTreeSet<u64> = self.raw.nodes.iter().map(|n| n.id).collect();
+        for (key, set) in &self.node_sets.sets {
+            let ids = self.node_sets.resolve(&self.source, key, &known, "node")?;
+            let nodes = ids.iter().map(|id| self.node_index[id]).collect();
+            self.raw.node_sets.insert(set.name.clone(), nodes);
+        }
+        Ok(())
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum SetKind {
+    Elements,
+    Nodes,
+}
+
+fn missing_node(source: &Source, element: &Element, node: u64) -> Error {
+    source.broken(element.at, format!("element {} names node {node}, which is not in the file", element.id))
+}
+
+/// What an element type means; `None` for the four-node tetrahedron in all its formulations (C3D4, C3D4H, ...).
+fn element_class(kind: &str) -> Option<ElementClass> {
+    let suffix_of = |base: &str| kind.strip_prefix(base).is_some_and(|s| !s.starts_with(|c: char| c.is_ascii_digit()));
+    if suffix_of("C3D4") {
+        return None;
+    }
+    let volume = ["C3D", "DC3D", "AC3D", "SC", "CSS", "COH3D", "CIN3D", "EC3D", "Q3D"];
+    Some(if suffix_of("C3D10") {
+        ElementClass::HighOrderTet
+    } else if volume.iter().any(|v| kind.strip_prefix(v).is_some_and(|s| s.starts_with(|c: char| c.is_ascii_digit()))) {
+        ElementClass::Volume
+    } else {
+        ElementClass::Lower
+    })
+}
+
+/// Fields of a data line, trimmed; a comma at the end adds none.
+fn fields(line: &str) -> Vec<String> {
+    let line = line.trim().strip_suffix(',').unwrap_or(line.trim());
+    line.split(',').map(|f| f.trim().to_string()).collect()
+}
+
+/// Splits at commas outside quotes, trimmed.
+fn split_quoted(text: &str) -> Vec<String> {
+    let mut parts = vec![String::new()];
+    let mut quoted = false;
+    for c in text.chars() {
+        quoted ^= c == '"';
+        match parts.last_mut() {
+            Some(part) if quoted || c != ',' => part.push(c),
+            _ => parts.push(String::new()),
+        }
+    }
+    parts.iter().map(|p| p.trim().to_string()).collect()
+}
