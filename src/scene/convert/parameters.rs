@@ -258,7 +258,6 @@ impl Check<'_> {
             Some(i) if file.region[i].damage.is_some() => format!("region.{i}.damage"),
             Some(i) if material.damage.is_some() => format!("region.{i}.material.preset"),
             _ if file.damage.is_some() => "damage".into(),
-            None if material.damage.is_some() => "material.preset".into(),
             _ => format!("effects.{}", file.effects.iter().position(|key| key == "damage").unwrap_or(0)),
         };
         let table = index.and_then(|i| file.region[i].damage.as_ref()).or(file.damage.as_ref());
