@@ -48,6 +48,9 @@ pub struct PathSegment {
     pub cutting: Cutting,
 }
 
+/// Most materials of one scene; the last index is that of the last region.
+pub const LARGEST_MATERIAL_COUNT: usize = 16;
+
 /// Most stretches of one path.
 pub const LARGEST_SEGMENT_COUNT: usize = 16;
 

@@ -32,7 +32,7 @@ fn column(free: usize) -> Scene {
 
 /// Mean of one displacement component on the plane k.
 fn plane(model: &Model, u: &[DVec3], k: usize, axis: usize) -> f64 {
-    let [nx, ny, _] = model.mesh.nodes();
+    let [nx, ny, _] = model.mesh.block().nodes();
     u[k * nx * ny..(k + 1) * nx * ny].iter().map(|u| u[axis]).sum::<f64>() / (nx * ny) as f64
 }
 
@@ -59,7 +59,7 @@ fn frequency(
     for _ in 0..count {
         advance(engine, model, dt, &mut step, every);
         let state = engine.read_state().unwrap();
-        let lines = &model.mesh.lines[2];
+        let lines = &model.mesh.block().lines[2];
         let now: f64 = (0..=CELLS)
             .map(|k| {
                 let weight = if k == CELLS { 0.5 } else { 1.0 };
@@ -136,7 +136,7 @@ fn a_front_travels_with_the_wave_speed() {
                 readings += 1;
             }
         }
-        let way = model.mesh.lines[2][planes[0]] - model.mesh.lines[2][planes[1]];
+        let way = model.mesh.block().lines[2][planes[0]] - model.mesh.block().lines[2][planes[1]];
         let found = way / (arrival[1].unwrap() - arrival[0].unwrap());
         // The front is a step or two wide on a way of twenty cells.
         close(&format!("{name}, front speed"), found, number(&file["c_p_m_s"]), 0.01);
@@ -181,8 +181,8 @@ fn compressed_cube(hourglass: (f64, f64)) -> Vec<(&'static str, f64)> {
         at_most(&format!("{name}, energy gap"), ((work - damped - sums.elastic - sums.hourglass) / work).abs(), 0.01);
         println!("{name}: hourglass energy {:.2} % of elastic", 100.0 * sums.hourglass / sums.elastic);
         let forces = engine.internal_forces().unwrap();
-        let top = model.mesh.nodes()[2] - 1;
-        let on_top = forces.iter().enumerate().filter(|(n, _)| model.mesh.node_coordinates(*n)[2] == top);
+        let top = model.mesh.block().nodes()[2] - 1;
+        let on_top = forces.iter().enumerate().filter(|(n, _)| model.mesh.block().node_coordinates(*n)[2] == top);
         found.push((name, -on_top.map(|(_, f)| f.z).sum::<f64>()));
     }
     found
@@ -271,7 +271,7 @@ fn a_slow_boundary_is_followed_exactly() {
         Some(FaceDrive { displacement: DVec3::new(0.37e-4, 0.0, -1e-4), rotation: 0.01, duration: 1.0, cycles: 0 });
     let model = model(scene);
     let dt = 1e-5;
-    let top = model.mesh.nodes()[2] - 1;
+    let top = model.mesh.block().nodes()[2] - 1;
     for (name, mut engine) in engines(&model, dt, 1000) {
         let (mut step, mut worst, mut relative): (u64, f64, f64) = (0, 0.0, 0.0);
         for _ in 0..10 {
@@ -280,7 +280,7 @@ fn a_slow_boundary_is_followed_exactly() {
             let state = engine.read_state().unwrap();
             let part = step as f64 * dt;
             let angle = 0.01 * part;
-            for node in (0..model.mesh.node_count()).filter(|n| model.mesh.node_coordinates(*n)[2] == top) {
+            for node in (0..model.mesh.node_count()).filter(|n| model.mesh.block().node_coordinates(*n)[2] == top) {
                 let x = model.mesh.rest_position(node);
                 let turned =
                     DVec3::new(x.x * angle.cos() - x.y * angle.sin(), x.x * angle.sin() + x.y * angle.cos(), x.z);
@@ -306,7 +306,7 @@ fn a_twisted_cube_is_the_same_on_both_engines() {
     let model = model(scene);
     let dt = 0.6 * wave_speed_bound(&model);
     let mut answers = Vec::new();
-    let top = model.mesh.nodes()[2] - 1;
+    let top = model.mesh.block().nodes()[2] - 1;
     for (name, mut engine) in engines(&model, dt, 400) {
         let (mut step, mut work) = (0, 0.0);
         let mut sums = FrameSums::default();
@@ -315,7 +315,7 @@ fn a_twisted_cube_is_the_same_on_both_engines() {
             work += sums.load_work;
         }
         let state = engine.read_state().unwrap();
-        for node in (0..model.mesh.node_count()).filter(|n| model.mesh.node_coordinates(*n)[2] == top) {
+        for node in (0..model.mesh.node_count()).filter(|n| model.mesh.block().node_coordinates(*n)[2] == top) {
             let x = model.mesh.rest_position(node);
             let (sin, cos) = 1.2f64.sin_cos();
             let expected = DVec3::new(x.x * cos - x.y * sin - x.x, x.x * sin + x.y * cos - x.y, 0.0);
@@ -325,7 +325,7 @@ fn a_twisted_cube_is_the_same_on_both_engines() {
         let torque: f64 = forces
             .iter()
             .enumerate()
-            .filter(|(n, _)| model.mesh.node_coordinates(*n)[2] == top)
+            .filter(|(n, _)| model.mesh.block().node_coordinates(*n)[2] == top)
             .map(|(n, f)| (model.mesh.rest_position(n) + state.displacement[n]).cross(*f).z)
             .sum();
         println!("{name}: torque {torque:.6e} N m, work {work:.6e} J, elastic {:.6e} J", sums.elastic);

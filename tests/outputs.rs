@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec2, DVec3};
 use stylet::effects::EffectSet;
 use stylet::material::ElasticLaw;
-use stylet::mesh::BlockMesh;
+use stylet::mesh::{BlockMesh, Mesh};
 use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord};
 use stylet::output::folder::{ENERGY_TABLE, FORCE_CHART, FORCE_TABLE, SUMMARY};
 use stylet::output::tables::{ENERGY_COLUMNS, FORCE_COLUMNS};
@@ -102,10 +102,10 @@ fn graded(low: f64, high: f64, cell: f64, fine: f64) -> Vec<f64> {
     lines
 }
 
-fn mesh(cell: f64) -> BlockMesh {
-    BlockMesh {
+fn mesh(cell: f64) -> Mesh {
+    Mesh::Block(BlockMesh {
         lines: [graded(-10e-3, 10e-3, cell, 3e-3), graded(-10e-3, 10e-3, cell, 3e-3), graded(-16e-3, 0.0, cell, 9e-3)],
-    }
+    })
 }
 
 fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
@@ -151,7 +151,7 @@ fn needle() -> Option<Tool> {
 }
 
 /// A dimple at the entry, tissue pushed aside by the shaft, stress falling with the distance from the tool.
-fn snapshot(scene: &Scene, mesh: &BlockMesh, depth: f64) -> FieldSnapshot {
+fn snapshot(scene: &Scene, mesh: &Mesh, depth: f64) -> FieldSnapshot {
     let direction = scene.motion.direction;
     let tip = scene.motion.entry + depth * direction;
     // Vector from the axis, coordinate along it, distance from the tip.
@@ -195,6 +195,9 @@ fn snapshot(scene: &Scene, mesh: &BlockMesh, depth: f64) -> FieldSnapshot {
         }),
         jacobian: per_cell(&|_| 0.99),
         pressure: per_cell(&|x| 100.0 * x.z),
+        plastic_strain: Vec::new(),
+        damage: Vec::new(),
+        material: Vec::new(),
         stiffness: per_cell(&|x| {
             let (aside, along, _) = place(x);
             if aside.length() < 0.7e-3 && along < depth { 0.02 } else { 1.0 }

@@ -1,8 +1,6 @@
 // Puncture: state and pure functions of the tip law and of the opened path. Equations: src/effects/puncture.rs.
 struct PunctureParams {
-    // Thresholds of the tip force [N] and the length over which one falls to the other [m].
-    puncture_force: f32,
-    cutting_force: f32,
+    // Length over which the threshold of the tip force falls behind the entry of a material [m].
     transition_length: f32,
     // Stiffness of all tip springs together [N/m].
     tip_stiffness: f32,
@@ -18,6 +16,10 @@ struct PunctureParams {
     // Nodes farther than this from the tip coordinate along the path are on no cell that holds an anchor [m].
     anchor_reach: f32,
     path_cell_count: u32,
+    _pad0: u32,
+    _pad1: u32,
+    // Stretches of the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], unused.
+    segments: array<vec4<f32>, 16>,
 }
 
 // Material line parallel to the path: where it enters the surface [m], w: unused.
@@ -50,24 +52,32 @@ struct PathCell {
     fraction: f32,
     axial_start: f32,
     axial_end: f32,
+    // Energy that softening took in this frame [J].
+    dissipation: f32,
+    // Index of its material.
+    material: u32,
+    _pad0: u32,
+    _pad1: u32,
 }
 
 @group(0) @binding(3) var<uniform> puncture: PunctureParams;
 @group(1) @binding(5) var<storage, read> tip_anchors: array<TipAnchor>;
-@group(1) @binding(6) var<storage, read> path_cells: array<PathCell>;
+@group(3) @binding(3) var<storage, read_write> path_cells: array<PathCell>;
 // Remaining stiffness per cell, 1 = intact.
 @group(3) @binding(0) var<storage, read_write> cell_stiffness: array<f32>;
 @group(3) @binding(1) var<storage, read_write> tip_state: TipState;
 @group(3) @binding(2) var<storage, read_write> tip_anchor_loads: array<TipAnchorLoad>;
-// Energy that softening took in this frame, per path cell [J].
-@group(3) @binding(3) var<storage, read_write> softening_dissipation: array<f32>;
 
 const ANCHOR_COUNT: u32 = 19u;
 
 // Threshold of the tip force at material coordinate a [N].
 fn tip_threshold(a: f32) -> f32 {
-    let entry = max(0.0, 1.0 - a / puncture.transition_length);
-    return puncture.cutting_force + (puncture.puncture_force - puncture.cutting_force) * entry;
+    var segment = puncture.segments[0];
+    for (var i = 1u; i < 16u; i++) {
+        segment = select(segment, puncture.segments[i], puncture.segments[i].x <= a);
+    }
+    let entry = max(0.0, 1.0 - (a - segment.x) / puncture.transition_length);
+    return segment.z + (segment.y - segment.z) * entry;
 }
 
 // Needle radius at distance s behind the tip and its slope.

@@ -1,9 +1,12 @@
 // Energies and Jacobians of one cell from its eight corner displacements, corner index = x bit + 2 y bit + 4 z bit.
 // Equations: src/solver/cpu.rs, Elements::measure.
 struct CellEnergy {
-    // Elastic and hourglass energy of the intact cell [J].
+    // Stored energy and hourglass energy [J], the part of the first that Prony terms hold.
     elastic: f32,
     hourglass: f32,
+    held: f32,
+    // Part of the stiffness that is left.
+    intact: f32,
     // J at the centre and the smallest J at a corner.
     jacobian: f32,
     corner_jacobian: f32,
@@ -14,7 +17,8 @@ fn corner_node(cell: vec3<u32>, corner: u32) -> u32 {
     return (at.z * params.nodes_y + at.y) * params.nodes_x + at.x;
 }
 
-fn cell_energy(cell: vec3<u32>, u: ptr<function, array<vec3<f32>, 8>>) -> CellEnergy {
+// `number`: its material; `kept`: part of the stiffness that the cell keeps for other reasons than its material's.
+fn cell_energy(cell: vec3<u32>, number: u32, kept: f32, u: ptr<function, array<vec3<f32>, 8>>) -> CellEnergy {
     let edge_x = cell_edges[cell.x];
     let edge_y = cell_edges[params.cells_x + cell.y];
     let edge_z = cell_edges[params.cells_x + params.cells_y + cell.z];
@@ -52,9 +56,14 @@ fn cell_energy(cell: vec3<u32>, u: ptr<function, array<vec3<f32>, 8>>) -> CellEn
     let size = edge_x.cube_root * edge_y.cube_root * edge_z.cube_root;
     let q2 = dot(q[0], q[0]) + dot(q[1], q[1]) + dot(q[2], q[2]) + dot(q[3], q[3]);
     var e: CellEnergy;
-    e.elastic = volume * energy_density(H);
-    e.hourglass = 0.5 * params.hourglass * size * q2 * (1.0 + 0.5 * params.quartic * q2 / (size * size));
-    e.jacobian = 1.0 + jacobian_minus_one(H);
+    let index = (cell.z * params.cells_y + cell.y) * params.cells_x + cell.x;
+    let point = point_energy(PointPlace(index, number, size, kept, 0.0, 0.0), H);
+    e.elastic = volume * point.stored;
+    e.held = volume * point.held;
+    e.hourglass = 0.5 * materials[number].hourglass * size * q2 * (1.0 + 0.5 * params.quartic * q2 / (size * size));
+    e.hourglass *= point.intact;
+    e.intact = point.intact;
+    e.jacobian = 1.0 + point.dj;
     e.corner_jacobian = smallest;
     return e;
 }

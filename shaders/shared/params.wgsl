@@ -22,14 +22,7 @@ struct Params {
     fixed_y_max: u32,
     fixed_z_min: u32,
     fixed_z_max: u32,
-    // Mooney-Rivlin constants and bulk modulus [Pa].
-    c10: f32,
-    c01: f32,
-    bulk_modulus: f32,
-    // 4/3 mu0 [Pa], for the stiffness bound.
-    shear_bound: f32,
-    // kappa 3.11 mu0 [Pa] and the quartic factor c.
-    hourglass: f32,
+    // Quartic hourglass factor c.
     quartic: f32,
     // Time step [s].
     dt: f32,
@@ -38,7 +31,6 @@ struct Params {
     // Largest nodal speed that is let through [m/s].
     speed_limit: f32,
     _pad0: u32,
-    _pad1: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;

@@ -13,9 +13,10 @@ struct StepInput {
     tip: vec4<f32>,
     velocity: vec4<f32>,
     direction: vec4<f32>,
-    // Depth of the tip from the entry point along the direction [m], magnitude of the velocity [m/s].
+    // Depth of the tip from the entry point along the direction [m].
     depth: f32,
-    speed: f32,
+    // Number of the step since t = 0.
+    step: u32,
     // Factor of the ramped loads, 0..1.
     load_factor: f32,
     // Offset of this step for rounding prescribed motion to the fixed point, 0..1, equidistributed over the steps.

@@ -8,7 +8,7 @@
 #import shared/thread_index
 #import shared/displacement
 #import shared/cell_edge
-#import shared/mooney_rivlin
+#import shared/material_point
 #import shared/corner_force
 #ifdef PUNCTURE
 #import effects/puncture
@@ -75,7 +75,6 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
             vec3<f32>(upper_y + lower_y) * (DISPLACEMENT_UNIT * edge_y.quarter_inverse),
             vec3<f32>(rise) * (DISPLACEMENT_UNIT * edge_z.quarter_inverse),
         );
-        var stress = first_piola_kirchhoff(H);
         let volume = edge_x.length * edge_y.length * edge_z.length;
         let size = edge_x.cube_root * edge_y.cube_root * edge_z.cube_root;
 
@@ -86,29 +85,34 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let q_xy = vec3<f32>(upper_xy + lower_xy) * eighth;
         let q_xyz = vec3<f32>(upper_xy - lower_xy) * eighth;
         let q2 = (dot(q_yz, q_yz) + dot(q_zx, q_zx) + dot(q_xy, q_xy) + dot(q_xyz, q_xyz)) / (size * size);
-        var hourglass = params.hourglass * size * (1.0 + params.quartic * q2) * 0.125;
+        let cell = (k * params.cells_y + j) * params.cells_x + i;
+        let number = material_of(cell);
+        let modulus = materials[number].hourglass;
 
-        // Stiffness bound: V (K |cof B|max sum|cof B| + 4/3 mu0 max(1, I1/3) |B| sum|B|) + hourglass.
-        let cx = stress.cof[0] * edge_x.quarter_inverse;
-        let cy = stress.cof[1] * edge_y.quarter_inverse;
-        let cz = stress.cof[2] * edge_z.quarter_inverse;
+        var kept = 1.0;
+#ifdef PUNCTURE
+        // The path softens the whole answer of a cell, whatever the material does.
+        kept = cell_stiffness[cell];
+#endif
+        let hourglass_energy = 0.5 * modulus * q2 * (1.0 + 0.5 * params.quartic * q2);
+        let point = material_point(PointPlace(cell, number, size, kept, hourglass_energy, 0.0), H);
+        let hourglass = point.intact * modulus * size * (1.0 + params.quartic * q2) * 0.125;
+
+        // Stiffness bound: V (K |cof B|max sum|cof B| + tangent |B| sum|B|) + hourglass.
+        let cx = point.cof[0] * edge_x.quarter_inverse;
+        let cy = point.cof[1] * edge_y.quarter_inverse;
+        let cz = point.cof[2] * edge_z.quarter_inverse;
         let cof_b = dot(cx, cx) + dot(cy, cy) + dot(cz, cz)
             + 2.0 * (abs(dot(cx, cy)) + abs(dot(cy, cz)) + abs(dot(cz, cx)));
         let b = vec3<f32>(edge_x.quarter_inverse, edge_y.quarter_inverse, edge_z.quarter_inverse);
-        var bound = 8.0 * volume
-            * (params.bulk_modulus * cof_b + params.shear_bound * max(1.0, stress.i1 * 0.33333333) * dot(b, b))
-            + params.hourglass * size * (1.0 + 3.0 * params.quartic * q2) * 0.125;
-        var factor = volume;
-#ifdef PUNCTURE
-        // The path softens the whole elastic answer of a cell, so it comes after the law and before the forces.
-        let remaining = cell_stiffness[(k * params.cells_y + j) * params.cells_x + i];
-        factor *= remaining;
-        hourglass *= remaining;
-        bound *= remaining;
-#endif
-        let a_x = stress.P[0] * (factor * edge_x.quarter_inverse);
-        let a_y = stress.P[1] * (factor * edge_y.quarter_inverse);
-        let a_z = stress.P[2] * (factor * edge_z.quarter_inverse);
+        let bound = point.intact * (8.0 * volume
+            * (materials[number].bulk_modulus * cof_b + point.tangent * dot(b, b))
+            + modulus * size * (1.0 + 3.0 * params.quartic * q2) * 0.125);
+        let factor = point.intact * volume;
+        let pressure = materials[number].bulk_modulus * point.dj;
+        let a_x = (point.P[0] + point.cof[0] * pressure) * (factor * edge_x.quarter_inverse);
+        let a_y = (point.P[1] + point.cof[1] * pressure) * (factor * edge_y.quarter_inverse);
+        let a_z = (point.P[2] + point.cof[2] * pressure) * (factor * edge_z.quarter_inverse);
         store_plane(
             slot,
             left_z - a_z,

@@ -4,7 +4,7 @@
 #import shared/params
 #import shared/thread_index
 #import shared/displacement
-#import shared/corner_force
+#import shared/gathered_force
 #ifdef STEP_INPUT
 #import shared/step_input
 #endif
@@ -43,19 +43,7 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let j = quotient(node - k * layer, params.nodes_x);
     let i = node - k * layer - j * params.nodes_x;
 
-    // One strip, or two where the node lies on the plane between them.
-    let above = quotient(k, params.strip_layers);
-    let last = min(above, params.strip_count - 1u);
-    let first = select(last, above - 1u, k > 0u && above * params.strip_layers == k);
-    let stride = params.padded_columns;
-    let row = params.cells_x + 2u;
-    let column = padded_column(i, j);
-    var sum = vec4<f32>(0.0);
-    for (var strip = first; strip <= last; strip++) {
-        let slot = corner_slot(strip, k - strip * params.strip_layers, 0u, column);
-        sum += corner_force[slot] + corner_force[slot + stride - 1u]
-            + corner_force[slot + 2u * stride - row] + corner_force[slot + 3u * stride - row - 1u];
-    }
+    let sum = gathered_force(i, j, k);
     var force = sum.xyz;
     let scaled_mass = node_mass[node];
     var mass = scaled_mass;

@@ -3,7 +3,7 @@
 #import shared/thread_index
 #import shared/displacement
 #import shared/cell_edge
-#import shared/mooney_rivlin
+#import shared/material_point
 #import shared/cell_energy
 #import shared/cell_sums
 #ifdef PUNCTURE
@@ -11,6 +11,18 @@
 #endif
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
+
+#ifdef HISTORY
+// Adds what the cell reported in this frame and clears it. The work of relaxation is kept: it belongs to the state.
+fn book_history(sums: ptr<function, CellSums>, cell: u32, volume: f32, held: f32) {
+    let history = point_history[cell];
+    (*sums).flow += volume * history.flow;
+    (*sums).degradation += volume * history.degradation;
+    (*sums).relaxation += volume * history.relaxation_work - held;
+    (*sums).failures += history.failures;
+    point_history[cell] = PointHistory(0.0, 0.0, history.relaxation_work, 0.0);
+}
+#endif
 
 @compute @workgroup_size(64)
 fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -23,6 +35,7 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     var sums: CellSums;
     sums.min_jacobian = 1e30;
     sums.min_corner_jacobian = 1e30;
+    sums.least_intact = 1.0;
     for (var index = thread; index < count; index += params.measure_threads) {
         let k = quotient(index, layer);
         let j = quotient(index - k * layer, params.cells_x);
@@ -38,16 +51,29 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
             apart = max(apart, abs(u[corner]));
         }
         sums.overstretched_cells += select(0u, 1u, max(apart.x, max(apart.y, apart.z)) > LARGEST_DIFFERENCE);
-        var energy = cell_energy(cell, &u);
+        var kept = 1.0;
 #ifdef PUNCTURE
-        energy.elastic *= cell_stiffness[index];
-        energy.hourglass *= cell_stiffness[index];
+        kept = cell_stiffness[index];
 #endif
+        let energy = cell_energy(cell, material_of(index), kept, &u);
         sums.elastic += energy.elastic;
         sums.hourglass += energy.hourglass;
-        sums.min_jacobian = min(sums.min_jacobian, energy.jacobian);
-        sums.min_corner_jacobian = min(sums.min_corner_jacobian, energy.corner_jacobian);
-        if (!(energy.jacobian > 0.0 && energy.corner_jacobian > 0.0)) {
+#ifdef HISTORY
+        let edges = vec3<f32>(
+            cell_edges[cell.x].length,
+            cell_edges[params.cells_x + cell.y].length,
+            cell_edges[params.cells_x + params.cells_y + cell.z].length,
+        );
+        book_history(&sums, index, edges.x * edges.y * edges.z, energy.held);
+#endif
+        sums.least_intact = min(sums.least_intact, energy.intact / kept);
+        // What has been deleted may be turned inside out.
+        let present = energy.intact > 0.0;
+        sums.deleted_cells += select(1u, 0u, present);
+        sums.min_jacobian = select(sums.min_jacobian, min(sums.min_jacobian, energy.jacobian), present);
+        let smallest = min(sums.min_corner_jacobian, energy.corner_jacobian);
+        sums.min_corner_jacobian = select(sums.min_corner_jacobian, smallest, present);
+        if (present && !(energy.jacobian > 0.0 && energy.corner_jacobian > 0.0)) {
             sums.inverted_cells += 1u;
             sums.inverted_cell = index;
         }

@@ -34,8 +34,8 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
         tip_result = tip_state;
         tip_state.dissipation = 0.0;
         for (var index = 0u; index < puncture.path_cell_count; index++) {
-            tip_result.softening += softening_dissipation[index];
-            softening_dissipation[index] = 0.0;
+            tip_result.softening += path_cells[index].dissipation;
+            path_cells[index].dissipation = 0.0;
         }
     }
 #endif

@@ -4,7 +4,7 @@
 #import shared/thread_index
 #import shared/displacement
 #import shared/cell_edge
-#import shared/mooney_rivlin
+#import shared/material_point
 #import shared/cell_energy
 #import effects/puncture
 
@@ -34,8 +34,8 @@ fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
             u[corner] = vec3<f32>(node_displacement[node].xyz) * DISPLACEMENT_UNIT
                 - node_velocity[node].xyz * (0.5 * params.dt);
         }
-        let energy = cell_energy(cell, &u);
-        softening_dissipation[index] += (old - remaining) * (energy.elastic + energy.hourglass);
+        let energy = cell_energy(cell, path.material, 1.0, &u);
+        path_cells[index].dissipation += (old - remaining) * (energy.elastic + energy.hourglass);
         cell_stiffness[path.cell] = remaining;
     }
 }

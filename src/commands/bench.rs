@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use crate::effects::{EffectSet, friction, mass_scaling, puncture};
 use crate::error::Result;
+use crate::gpu::engine::{Features, stages};
 use crate::gpu::{Gpu, GpuEngine};
 use crate::material::ElasticLaw;
 use crate::mesh::BlockMesh;
@@ -172,7 +173,7 @@ impl Subject {
             Some(gpu) => Box::new(GpuEngine::new(model.clone(), gpu.clone(), dt, max_steps)?),
             None => Box::new(CpuEngine::new(model.clone(), dt)),
         };
-        let stages = crate::gpu::engine::stages(&model.effects).iter().filter(|s| !s.once_per_frame()).count();
+        let stages = stages(&model.effects, &Features::of(&model)).iter().filter(|s| !s.once_per_frame()).count();
         Ok(Subject { model, engine, dt, step: 0, frame: 0, recording: 0.0, stages })
     }
 

@@ -9,11 +9,21 @@ use crate::error::{Error, Result};
 
 /// Every shader file by its path under `shaders/`, without extension.
 pub const SOURCES: &[(&str, &str)] = &[
+    ("effects/damage", include_str!("../../shaders/effects/damage.wgsl")),
+    ("effects/fibres", include_str!("../../shaders/effects/fibres.wgsl")),
     ("effects/friction", include_str!("../../shaders/effects/friction.wgsl")),
     ("effects/gravity", include_str!("../../shaders/effects/gravity.wgsl")),
     ("effects/indentation", include_str!("../../shaders/effects/indentation.wgsl")),
     ("effects/mass_scaling", include_str!("../../shaders/effects/mass_scaling.wgsl")),
+    ("effects/plasticity", include_str!("../../shaders/effects/plasticity.wgsl")),
     ("effects/puncture", include_str!("../../shaders/effects/puncture.wgsl")),
+    ("effects/viscoelastic", include_str!("../../shaders/effects/viscoelastic.wgsl")),
+    ("materials/demiray", include_str!("../../shaders/materials/demiray.wgsl")),
+    ("materials/mooney_rivlin", include_str!("../../shaders/materials/mooney_rivlin.wgsl")),
+    ("materials/neo_hookean", include_str!("../../shaders/materials/neo_hookean.wgsl")),
+    ("materials/ogden", include_str!("../../shaders/materials/ogden.wgsl")),
+    ("materials/yeoh", include_str!("../../shaders/materials/yeoh.wgsl")),
+    ("shared/capped_exponential", include_str!("../../shaders/shared/capped_exponential.wgsl")),
     ("shared/cell_edge", include_str!("../../shaders/shared/cell_edge.wgsl")),
     ("shared/cell_energy", include_str!("../../shaders/shared/cell_energy.wgsl")),
     ("shared/cell_sums", include_str!("../../shaders/shared/cell_sums.wgsl")),
@@ -21,13 +31,19 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/corner_force", include_str!("../../shaders/shared/corner_force.wgsl")),
     ("shared/displacement", include_str!("../../shaders/shared/displacement.wgsl")),
     ("shared/driven_faces", include_str!("../../shaders/shared/driven_faces.wgsl")),
+    ("shared/elastic", include_str!("../../shaders/shared/elastic.wgsl")),
+    ("shared/gathered_force", include_str!("../../shaders/shared/gathered_force.wgsl")),
     ("shared/grid_lines", include_str!("../../shaders/shared/grid_lines.wgsl")),
-    ("shared/mooney_rivlin", include_str!("../../shaders/shared/mooney_rivlin.wgsl")),
+    ("shared/kinematics", include_str!("../../shaders/shared/kinematics.wgsl")),
+    ("shared/material_point", include_str!("../../shaders/shared/material_point.wgsl")),
     ("shared/node_load", include_str!("../../shaders/shared/node_load.wgsl")),
     ("shared/node_sums", include_str!("../../shaders/shared/node_sums.wgsl")),
     ("shared/node_work", include_str!("../../shaders/shared/node_work.wgsl")),
     ("shared/params", include_str!("../../shaders/shared/params.wgsl")),
+    ("shared/point_energy", include_str!("../../shaders/shared/point_energy.wgsl")),
+    ("shared/point_history", include_str!("../../shaders/shared/point_history.wgsl")),
     ("shared/step_input", include_str!("../../shaders/shared/step_input.wgsl")),
+    ("shared/symmetric_eigen", include_str!("../../shaders/shared/symmetric_eigen.wgsl")),
     ("shared/thread_index", include_str!("../../shaders/shared/thread_index.wgsl")),
     ("stages/advance_tip", include_str!("../../shaders/stages/advance_tip.wgsl")),
     ("stages/element_forces", include_str!("../../shaders/stages/element_forces.wgsl")),
@@ -35,13 +51,29 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("stages/integrate_nodes", include_str!("../../shaders/stages/integrate_nodes.wgsl")),
     ("stages/measure_cells", include_str!("../../shaders/stages/measure_cells.wgsl")),
     ("stages/measure_contact", include_str!("../../shaders/stages/measure_contact.wgsl")),
+    ("stages/measure_faces", include_str!("../../shaders/stages/measure_faces.wgsl")),
     ("stages/measure_nodes", include_str!("../../shaders/stages/measure_nodes.wgsl")),
     ("stages/needle_contact", include_str!("../../shaders/stages/needle_contact.wgsl")),
     ("stages/soften_path", include_str!("../../shaders/stages/soften_path.wgsl")),
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 4] = ["STEP_INPUT", "LOADED_FACES", "DRIVEN_FACES", "NODE_WORK"];
+pub const SCENE_DEFINES: [&str; 14] = [
+    "STEP_INPUT",
+    "LOADED_FACES",
+    "DRIVEN_FACES",
+    "NODE_WORK",
+    "REGIONS",
+    "TETRAHEDRA",
+    "HISTORY",
+    "NEO_HOOKEAN",
+    "MOONEY_RIVLIN",
+    "YEOH",
+    "OGDEN",
+    "DEMIRAY",
+    "INVARIANT_LAWS",
+    "SEVERAL_LAWS",
+];
 
 /// A composed shader.
 #[derive(Debug, Clone)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use bytemuck::Zeroable;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::device::Gpu;
@@ -13,8 +13,11 @@ use super::kernel::{Kernel, Reflected, STEP_INPUT, reflect};
 use super::structs::*;
 use crate::effects::EffectSet;
 use crate::error::{Error, Result};
-use crate::model::{ANCHOR_COUNT, Model};
+use crate::material::Isochoric;
+use crate::material_point::{Material as Constants, PointState};
+use crate::model::{ANCHOR_COUNT, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model};
 use crate::scene::Tool;
+use crate::solver::elements::HOURGLASS_MODULUS;
 use crate::solver::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State};
 use crate::solver::step::Stage;
 
@@ -27,30 +30,77 @@ const RING: usize = 3;
 /// How long the mapping of a finished submission may take.
 const MAPPING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
 
+/// Partial sums per face of `measure_faces`.
+const FACE_PARTS: usize = 64;
+
 /// Partial sums of `measure_contact`.
 const CONTACT_PARTS: usize = 64;
 
-/// What decides which code a shader contains: the effects, and features of the scene that are no effects.
-pub fn defines(effects: &EffectSet, loaded_faces: bool, driven_faces: bool) -> BTreeSet<&'static str> {
+/// What decides which code a shader contains, beside the effects.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Features {
+    pub loaded_faces: bool,
+    pub driven_faces: bool,
+    /// Several materials.
+    pub regions: bool,
+    /// Tetrahedra instead of the block.
+    pub tetrahedra: bool,
+    /// Keys of the elastic laws that occur.
+    pub laws: BTreeSet<&'static str>,
+}
+
+impl Features {
+    pub fn of(model: &Model) -> Self {
+        Features {
+            loaded_faces: !model.node_load.is_empty(),
+            driven_faces: model.has_driven_faces(),
+            regions: !model.cell_material.is_empty(),
+            tetrahedra: model.mesh.as_tets().is_some(),
+            laws: model.materials.iter().map(|m| m.law.isochoric.key()).collect(),
+        }
+    }
+}
+
+/// Elastic laws with the names that their files are chosen by; the place is `Material.law` of the shaders.
+pub const LAWS: [(&str, &str); 5] = [
+    ("neo_hookean", "NEO_HOOKEAN"),
+    ("mooney_rivlin", "MOONEY_RIVLIN"),
+    ("yeoh", "YEOH"),
+    ("ogden", "OGDEN"),
+    ("demiray", "DEMIRAY"),
+];
+
+/// Names that are defined for the shaders.
+pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
     let mut defines: BTreeSet<&'static str> = effects.active().map(|e| e.define).collect();
-    if loaded_faces {
-        defines.insert("LOADED_FACES");
+    let mut define = |name: &'static str, wanted: bool| {
+        if wanted {
+            defines.insert(name);
+        }
+    };
+    let (loaded, driven) = (features.loaded_faces, features.driven_faces);
+    define("LOADED_FACES", loaded);
+    define("DRIVEN_FACES", driven);
+    define("STEP_INPUT", loaded || driven);
+    define("NODE_WORK", loaded || driven);
+    define("REGIONS", features.regions);
+    define("TETRAHEDRA", features.tetrahedra);
+    define("HISTORY", effects.plasticity.is_some() || effects.viscoelastic.is_some() || effects.damage.is_some());
+    for (key, name) in LAWS {
+        define(name, features.laws.contains(key));
     }
-    if driven_faces {
-        defines.insert("DRIVEN_FACES");
-    }
-    if loaded_faces || driven_faces {
-        defines.extend(["STEP_INPUT", "NODE_WORK"]);
-    }
+    define("INVARIANT_LAWS", features.laws.iter().any(|key| *key != "ogden"));
+    define("SEVERAL_LAWS", features.laws.len() > 1);
     defines
 }
 
 /// The stages that a set of effects needs, in the order of the step.
-pub fn stages(effects: &EffectSet) -> Vec<Stage> {
+pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     let wanted = |stage: &Stage| match stage {
         Stage::AdvanceTip | Stage::SoftenPath | Stage::NeedleContact => effects.puncture.is_some(),
         Stage::IndenterContact => effects.indentation.is_some(),
         Stage::MeasureContact => effects.puncture.is_some() || effects.indentation.is_some(),
+        Stage::MeasureFaces => features.driven_faces,
         _ => true,
     };
     Stage::ALL.into_iter().filter(wanted).collect()
@@ -135,9 +185,10 @@ impl GpuEngine {
         // Software adapters pay per buffer access: long strips share most planes. Hardware wants many threads.
         let layers = if gpu.is_software() { 8 } else { 4 };
         let strips = Strips::new(model.mesh.block().cells(), layers);
-        let defines = defines(&model.effects, !model.node_load.is_empty(), model.has_driven_faces());
+        let features = Features::of(&model);
+        let defines = defines(&model.effects, &features);
         // Composing, validating and compiling go side by side: they are most of the time to the first step.
-        let reflected = stages(&model.effects)
+        let reflected = stages(&model.effects, &features)
             .into_par_iter()
             .map(|stage| reflect(stage, &defines))
             .collect::<Result<Vec<Reflected>>>()?;
@@ -168,7 +219,7 @@ impl GpuEngine {
             })
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
-        let results: Vec<ResultRange> = ["cell_sums", "node_sums", "contact_totals", "tip_result"]
+        let results: Vec<ResultRange> = ["cell_sums", "node_sums", "contact_totals", "face_sums", "tip_result"]
             .into_iter()
             .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
             .map(|(name, size)| {
@@ -305,6 +356,12 @@ impl GpuEngine {
                         sums.min_corner_j = sums.min_corner_j.min(f64::from(s.min_corner_jacobian));
                         sums.inverted_cells += s.inverted_cells;
                         sums.not_finite |= s.overstretched_cells > 0;
+                        sums.plastic_dissipation += f64::from(s.flow);
+                        sums.damage_dissipation += f64::from(s.degradation);
+                        sums.viscous_dissipation += f64::from(s.relaxation);
+                        sums.largest_damage = sums.largest_damage.max(1.0 - f64::from(s.least_intact));
+                        sums.deleted_cells += s.deleted_cells;
+                        sums.return_failures += s.failures as u32;
                         if s.inverted_cells > 0 {
                             sums.inverted_cell.get_or_insert(s.inverted_cell);
                         }
@@ -320,6 +377,12 @@ impl GpuEngine {
                         sums.raised_mass += s.raised_mass;
                         sums.clamped_nodes += s.clamped_nodes;
                         sums.not_finite |= s.out_of_range > 0;
+                    }
+                }
+                "face_sums" => {
+                    for (index, s) in read_all::<[f32; 4]>(bytes).enumerate() {
+                        let force = DVec3::new(s[0].into(), s[1].into(), s[2].into());
+                        sums.reactions[index / FACE_PARTS] += force;
                     }
                 }
                 "contact_totals" => {
@@ -437,11 +500,12 @@ fn threads(stage: Stage, model: &Model, strips: &Strips, measure_threads: u32) -
         Stage::IntegrateNodes => model.mesh.node_count() as u32,
         Stage::MeasureCells | Stage::MeasureNodes => measure_threads,
         Stage::MeasureContact => CONTACT_PARTS as u32,
+        Stage::MeasureFaces => 6 * FACE_PARTS as u32,
     }
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 28] = [
+const BUFFERS: [&str; 38] = [
     "params",
     STEP_INPUT,
     "gravity",
@@ -465,9 +529,19 @@ const BUFFERS: [&str; 28] = [
     "cell_stiffness",
     "tip_state",
     "tip_anchor_loads",
-    "softening_dissipation",
     "contact_memory",
     "contact_sums",
+    "face_sums",
+    "materials",
+    "cell_material",
+    "point_history",
+    "plasticity",
+    "plastic_state",
+    "fibres",
+    "prony",
+    "viscous_counts",
+    "viscous_state",
+    "damage",
     "contact_totals",
     "tip_result",
 ];
@@ -489,6 +563,7 @@ fn vec4(v: DVec3) -> [f32; 4] {
 fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads: u32, max_steps: usize) -> Contents {
     let nodes = model.mesh.node_count() as u64;
     let contacts = model.contact_nodes.len().max(1) as u64;
+    let cells = model.mesh.cell_count() as u64;
     let zeros = |count: u64, size: usize| Contents::Zeros(count * size as u64);
     match name {
         "params" => bytes_of(&[params(model, strips, dt, measure_threads)]),
@@ -543,6 +618,8 @@ fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads
                     fraction: c.fraction as f32,
                     axial_start: c.axial_start as f32,
                     axial_end: c.axial_end as f32,
+                    material: model.material_index(c.cell as usize) as u32,
+                    ..PathCell::zeroed()
                 })
                 .collect();
             cells.resize(cells.len().max(1), PathCell::zeroed());
@@ -557,9 +634,37 @@ fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads
         "cell_stiffness" => bytes_of(&vec![1.0f32; model.mesh.cell_count()]),
         "tip_state" | "tip_result" => zeros(1, size_of::<TipState>()),
         "tip_anchor_loads" => zeros(ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
-        "softening_dissipation" => zeros(model.puncture.as_ref().map_or(1, |p| p.cells.len().max(1) as u64), 4),
         "contact_memory" => zeros(contacts, size_of::<ContactMemory>()),
         "contact_sums" => zeros(contacts, size_of::<ContactSums>()),
+        "face_sums" => zeros(6 * FACE_PARTS as u64, 16),
+        "materials" => bytes_of(&per_material(model, |m| material(model, m))),
+        "cell_material" => bytes_of(&model.cell_material.iter().map(|m| u32::from(*m)).collect::<Vec<_>>()),
+        "point_history" => zeros(cells, size_of::<PointHistory>()),
+        "plasticity" => bytes_of(&per_material(model, |m| {
+            let p = m.plasticity.unwrap_or_default();
+            PlasticityParams {
+                yield_stress: p.yield_stress as f32,
+                hardening: p.hardening as f32,
+                ..Zeroable::zeroed()
+            }
+        })),
+        "plastic_state" => zeros(cells, size_of::<PlasticState>()),
+        "fibres" => bytes_of(&per_material(model, |m| {
+            let p = m.fibres.unwrap_or_default();
+            FibreParams { direction: vec4(p.direction), k1: p.k1 as f32, k2: p.k2 as f32, ..Zeroable::zeroed() }
+        })),
+        "prony" => bytes_of(&per_material(model, |m| prony_series(m, dt))),
+        "viscous_counts" => bytes_of(&[viscous_counts(model, dt)]),
+        "viscous_state" => zeros(cells * (model.prony_term_count() as u64 + 1), size_of::<ViscousStress>()),
+        "damage" => bytes_of(&per_material(model, |m| {
+            let p = m.damage.unwrap_or_default();
+            DamageParams {
+                onset: p.onset as f32,
+                inverse_displacement: (1.0 / p.failure_displacement) as f32,
+                largest: p.largest as f32,
+                deletion: if p.deletion { 1.0 } else { 0.0 },
+            }
+        })),
         _ => zeros(CONTACT_PARTS as u64, size_of::<ContactSums>()),
     }
 }
@@ -597,7 +702,6 @@ fn create_buffer(gpu: &Gpu, name: &str, contents: &Contents, uniform: bool) -> R
 
 fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Params {
     let [cx, cy, cz] = model.mesh.block().cells().map(|c| c as u32);
-    let law = model.scene.material.law;
     let solver = &model.scene.solver;
     let fixed: Vec<u32> = model.faces().iter().map(|f| (0..3).map(|a| u32::from(f.fixed[a]) << a).sum()).collect();
     Params {
@@ -618,18 +722,62 @@ fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Para
         fixed_y_max: fixed[3],
         fixed_z_min: fixed[4],
         fixed_z_max: fixed[5],
-        c10: law.isochoric.constants()[0].1 as f32 * 1e3,
-        c01: law.isochoric.constants()[1].1 as f32 * 1e3,
-        bulk_modulus: law.bulk_modulus as f32,
-        shear_bound: (4.0 / 3.0 * law.shear_modulus()) as f32,
-        hourglass: (solver.hourglass_stiffness * crate::solver::elements::HOURGLASS_MODULUS * law.shear_modulus())
-            as f32,
         quartic: solver.hourglass_quartic as f32,
         dt: dt as f32,
         mass_damping: solver.mass_damping as f32,
         speed_limit: model.speed_limit(dt) as f32,
         _pad0: 0,
-        _pad1: 0,
+    }
+}
+
+/// One entry per material of a scene; the rest of the 16 repeats the first.
+fn per_material<T: Copy>(model: &Model, entry: impl Fn(&Constants) -> T) -> Vec<T> {
+    let mut entries: Vec<T> = model.materials.iter().map(&entry).collect();
+    entries.resize(LARGEST_MATERIAL_COUNT, entries[0]);
+    entries
+}
+
+fn material(model: &Model, m: &Constants) -> Material {
+    let law = &m.law;
+    let constants = match law.isochoric {
+        Isochoric::NeoHookean(l) => [l.c10, 0.0, 0.0],
+        Isochoric::MooneyRivlin(l) => [l.c10, l.c01, 0.0],
+        Isochoric::Yeoh(l) => [l.c10, l.c20, l.c30],
+        Isochoric::Ogden(l) => [l.mu, l.alpha, 0.0],
+        Isochoric::Demiray(l) => [l.mu, l.b, 0.0],
+    };
+    let number = LAWS.iter().position(|(key, _)| *key == law.isochoric.key());
+    Material {
+        constants: vec4(DVec3::from(constants)),
+        bulk_modulus: law.bulk_modulus as f32,
+        shear_modulus: law.shear_modulus() as f32,
+        hourglass: (model.scene.solver.hourglass_stiffness * HOURGLASS_MODULUS * law.shear_modulus()) as f32,
+        law: number.expect("the table of laws holds every law") as u32,
+    }
+}
+
+fn prony_series(m: &Constants, dt: f64) -> PronySeries {
+    let mut series = PronySeries::zeroed();
+    let terms = m.viscoelastic.as_ref().map_or(&[][..], |v| &v.terms);
+    for (out, term) in series.terms.iter_mut().zip(terms) {
+        *out = PronyTerm {
+            ratio: term.ratio as f32,
+            decay: term.decay(dt) as f32,
+            compliance: (1.0 / (4.0 * m.law.shear_modulus() * term.ratio.max(1e-12))) as f32,
+            interval_mask: term.interval(dt) - 1,
+        };
+    }
+    series
+}
+
+fn viscous_counts(model: &Model, dt: f64) -> ViscousCounts {
+    let terms = model.materials.iter().filter_map(|m| m.viscoelastic.as_ref()).flat_map(|v| &v.terms);
+    let shortest = terms.map(|t| t.interval(dt)).min().unwrap_or(1);
+    ViscousCounts {
+        term_count: model.prony_term_count() as u32,
+        // A term is due in the middle of its interval, which is a power of two.
+        interval_mask: (shortest / 2).max(1) - 1,
+        ..Zeroable::zeroed()
     }
 }
 
@@ -637,11 +785,16 @@ fn puncture_params(model: &Model) -> PunctureParams {
     model.puncture.as_ref().map_or(PunctureParams::zeroed(), |plan| {
         let p = plan.params;
         // s0 depends on z alone, and an anchor acts on the two node planes around it.
+        let mut segments = [[0.0; 4]; LARGEST_SEGMENT_COUNT];
+        let last = plan.segments.len() - 1;
+        for (i, out) in segments.iter_mut().enumerate() {
+            let s = plan.segments[i.min(last)];
+            let c = s.cutting;
+            *out = [s.start as f32, c.puncture_force as f32, c.cutting_force as f32, 0.0];
+        }
         let tallest = model.mesh.block().lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
         PunctureParams {
-            puncture_force: p.puncture_force as f32,
-            cutting_force: p.cutting_force as f32,
             transition_length: p.transition_length as f32,
             tip_stiffness: p.tip_stiffness as f32,
             residual_stiffness: p.residual_stiffness as f32,
@@ -652,6 +805,8 @@ fn puncture_params(model: &Model) -> PunctureParams {
             tip_length: plan.needle.tip_length as f32,
             anchor_reach: anchor_reach as f32,
             path_cell_count: plan.cells.len() as u32,
+            segments,
+            ..Zeroable::zeroed()
         }
     })
 }
@@ -699,12 +854,26 @@ fn contact_nodes(model: &Model, strips: &Strips) -> Vec<ContactNode> {
     nodes
 }
 
+/// The tensor of six entries.
+fn symmetric(q: &ViscousStress) -> DMat3 {
+    let (n, s) = (q.normal.map(f64::from), q.shear.map(f64::from));
+    DMat3::from_cols(DVec3::new(n[0], s[0], s[2]), DVec3::new(s[0], n[1], s[1]), DVec3::new(s[2], s[1], n[2]))
+}
+
+fn six_entries(q: DMat3) -> ViscousStress {
+    ViscousStress {
+        normal: vec4(DVec3::new(q.x_axis.x, q.y_axis.y, q.z_axis.z)),
+        shear: vec4(DVec3::new(q.x_axis.y, q.y_axis.z, q.z_axis.x)),
+    }
+}
+
 /// The input of step `number` in the layout of the shader.
 fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) -> StepInput {
     // Multiples of the golden ratio: any run of steps sees all offsets alike, so rounding errors cancel.
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let mut out = StepInput {
         load_factor: input.load_factor as f32,
+        step: input.step as u32,
         // Below 1 in f32 too, so that a face at rest stays at rest.
         rounding: ((number as f64 * GOLDEN).fract() as f32).min(0.999_999),
         ..StepInput::zeroed()
@@ -714,7 +883,6 @@ fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) ->
         out.velocity = vec4(pose.velocity);
         out.direction = vec4(pose.direction);
         out.depth = pose.depth as f32;
-        out.speed = pose.velocity.length() as f32;
     }
     for (out, drive) in out.drives.iter_mut().zip(&input.drives) {
         *out = DriveStep {
@@ -784,38 +952,60 @@ impl Engine for GpuEngine {
     }
 
     fn read_state(&mut self) -> Result<State> {
-        let mut names = vec!["node_displacement", "node_velocity"];
-        let puncture = self.buffers.contains_key("cell_stiffness");
-        let contact = self.buffers.contains_key("contact_memory");
-        if puncture {
-            names.extend(["cell_stiffness", "tip_state"]);
-        }
-        if contact {
-            names.push("contact_memory");
-        }
+        const OPTIONAL: [&str; 6] =
+            ["cell_stiffness", "tip_state", "contact_memory", "plastic_state", "viscous_state", "point_history"];
+        let names: Vec<&'static str> = ["node_displacement", "node_velocity"]
+            .into_iter()
+            .chain(OPTIONAL.into_iter().filter(|name| self.buffers.contains_key(name)))
+            .collect();
         let bytes = self.read_buffers(&names)?;
-        let mut state = State {
-            displacement: read_all::<[i32; 4]>(&bytes[0])
-                .map(|u| DVec3::new(u[0].into(), u[1].into(), u[2].into()) * DISPLACEMENT_UNIT)
-                .collect(),
-            velocity: read_all::<[f32; 4]>(&bytes[1])
-                .map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into()))
-                .collect(),
-            ..Default::default()
-        };
-        if puncture {
-            state.stiffness = read_all::<f32>(&bytes[2]).map(f64::from).collect();
-            state.tip_coordinate = read_all::<TipState>(&bytes[3]).next().map_or(0.0, |t| t.coordinate.into());
+        let mut state = State::default();
+        if self.model.has_history() {
+            state.points = vec![PointState::default(); self.model.mesh.cell_count()];
         }
-        if contact {
-            state.contact = read_all::<ContactMemory>(&bytes[names.len() - 1])
-                .map(|m| ContactState {
-                    stick: DVec3::new(m.stick[0].into(), m.stick[1].into(), m.stick[2].into()),
-                    overlap: m.overlap.into(),
-                    axial_on: m.axial_on.into(),
-                    touching: m.touching != 0.0,
-                })
-                .collect();
+        let vector = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
+        for (name, bytes) in names.iter().zip(&bytes) {
+            match *name {
+                "node_displacement" => {
+                    state.displacement = read_all::<[i32; 4]>(bytes)
+                        .map(|u| DVec3::new(u[0].into(), u[1].into(), u[2].into()) * DISPLACEMENT_UNIT)
+                        .collect();
+                }
+                "node_velocity" => state.velocity = read_all::<[f32; 4]>(bytes).map(vector).collect(),
+                "cell_stiffness" => state.stiffness = read_all::<f32>(bytes).map(f64::from).collect(),
+                "tip_state" => {
+                    state.tip_coordinate = read_all::<TipState>(bytes).next().map_or(0.0, |t| t.coordinate.into());
+                }
+                "contact_memory" => {
+                    state.contact = read_all::<ContactMemory>(bytes)
+                        .map(|m| ContactState {
+                            stick: vector(m.stick),
+                            overlap: m.overlap.into(),
+                            axial_on: m.axial_on.into(),
+                            touching: m.touching != 0.0,
+                        })
+                        .collect();
+                }
+                "plastic_state" => {
+                    for (point, p) in state.points.iter_mut().zip(read_all::<PlasticState>(bytes)) {
+                        point.plastic.inverse_flow = DMat3::from_cols(vector(p.x), vector(p.y), vector(p.z));
+                        point.plastic.alpha = p.x[3].into();
+                    }
+                }
+                "viscous_state" => {
+                    let all: Vec<ViscousStress> = read_all(bytes).collect();
+                    for (point, cell) in state.points.iter_mut().zip(all.chunks(self.model.prony_term_count() + 1)) {
+                        point.viscous = cell[1..].iter().map(symmetric).collect();
+                    }
+                }
+                _ => {
+                    for (point, h) in state.points.iter_mut().zip(read_all::<PointHistory>(bytes)) {
+                        point.plastic_dissipation = h.flow.into();
+                        point.damage_dissipation = h.degradation.into();
+                        point.viscous_work = h.relaxation_work.into();
+                    }
+                }
+            }
         }
         Ok(state)
     }
@@ -851,6 +1041,37 @@ impl Engine for GpuEngine {
             })
             .collect();
         write("contact_memory", bytemuck::cast_slice(&memory));
+        let column = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
+        let plastic: Vec<PlasticState> = state
+            .points
+            .iter()
+            .map(|p| {
+                let g = p.plastic.inverse_flow;
+                PlasticState {
+                    x: column(g.x_axis, p.plastic.alpha),
+                    y: column(g.y_axis, 0.0),
+                    z: column(g.z_axis, 0.0),
+                }
+            })
+            .collect();
+        write("plastic_state", bytemuck::cast_slice(&plastic));
+        let terms = self.model.prony_term_count();
+        let viscous: Vec<ViscousStress> = state
+            .points
+            .iter()
+            .flat_map(|p| {
+                let q = |i: usize| p.viscous.get(i).copied().unwrap_or(DMat3::ZERO);
+                let sum = (0..terms).fold(DMat3::ZERO, |sum, i| sum + q(i));
+                std::iter::once(sum).chain((0..terms).map(q)).map(six_entries).collect::<Vec<_>>()
+            })
+            .collect();
+        write("viscous_state", bytemuck::cast_slice(&viscous));
+        let history: Vec<PointHistory> = state
+            .points
+            .iter()
+            .map(|p| PointHistory { relaxation_work: p.viscous_work as f32, ..Zeroable::zeroed() })
+            .collect();
+        write("point_history", bytemuck::cast_slice(&history));
         if let Some(gravity) = self.model.effects.gravity {
             let moment: DVec3 = state.displacement.iter().zip(&self.model.node_mass).map(|(u, m)| *u * *m).sum();
             self.gravity_work = moment.dot(gravity.acceleration) / self.model.mass_scaling();

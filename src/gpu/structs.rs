@@ -43,17 +43,77 @@ shared_structs! {
         fixed_y_max: u32,
         fixed_z_min: u32,
         fixed_z_max: u32,
-        c10: f32,
-        c01: f32,
-        bulk_modulus: f32,
-        shear_bound: f32,
-        hourglass: f32,
         quartic: f32,
         dt: f32,
         mass_damping: f32,
         speed_limit: f32,
         _pad0: u32,
+    }
+    /// shaders/shared/elastic.wgsl
+    struct Material {
+        constants: [f32; 4],
+        bulk_modulus: f32,
+        shear_modulus: f32,
+        hourglass: f32,
+        law: u32,
+    }
+    /// shaders/shared/point_history.wgsl
+    struct PointHistory {
+        flow: f32,
+        degradation: f32,
+        relaxation_work: f32,
+        failures: f32,
+    }
+    /// shaders/effects/plasticity.wgsl
+    struct PlasticityParams {
+        yield_stress: f32,
+        hardening: f32,
+        _pad0: f32,
+        _pad1: f32,
+    }
+    /// shaders/effects/plasticity.wgsl
+    struct PlasticState {
+        x: [f32; 4],
+        y: [f32; 4],
+        z: [f32; 4],
+    }
+    /// shaders/effects/fibres.wgsl
+    struct FibreParams {
+        direction: [f32; 4],
+        k1: f32,
+        k2: f32,
+        _pad0: f32,
+        _pad1: f32,
+    }
+    /// shaders/effects/viscoelastic.wgsl
+    struct PronyTerm {
+        ratio: f32,
+        decay: f32,
+        compliance: f32,
+        interval_mask: u32,
+    }
+    /// shaders/effects/viscoelastic.wgsl
+    struct PronySeries {
+        terms: [PronyTerm; 8],
+    }
+    /// shaders/effects/viscoelastic.wgsl
+    struct ViscousCounts {
+        term_count: u32,
+        interval_mask: u32,
+        _pad0: u32,
         _pad1: u32,
+    }
+    /// shaders/effects/viscoelastic.wgsl
+    struct ViscousStress {
+        normal: [f32; 4],
+        shear: [f32; 4],
+    }
+    /// shaders/effects/damage.wgsl
+    struct DamageParams {
+        onset: f32,
+        inverse_displacement: f32,
+        largest: f32,
+        deletion: f32,
     }
     /// shaders/shared/step_input.wgsl
     struct DriveStep {
@@ -69,7 +129,7 @@ shared_structs! {
         velocity: [f32; 4],
         direction: [f32; 4],
         depth: f32,
-        speed: f32,
+        step: u32,
         load_factor: f32,
         rounding: f32,
         drives: [DriveStep; 6],
@@ -87,8 +147,6 @@ shared_structs! {
     }
     /// shaders/effects/puncture.wgsl
     struct PunctureParams {
-        puncture_force: f32,
-        cutting_force: f32,
         transition_length: f32,
         tip_stiffness: f32,
         residual_stiffness: f32,
@@ -99,6 +157,9 @@ shared_structs! {
         tip_length: f32,
         anchor_reach: f32,
         path_cell_count: u32,
+        _pad0: u32,
+        _pad1: u32,
+        segments: [[f32; 4]; 16],
     }
     /// shaders/effects/puncture.wgsl
     struct TipAnchor {
@@ -126,6 +187,10 @@ shared_structs! {
         fraction: f32,
         axial_start: f32,
         axial_end: f32,
+        dissipation: f32,
+        material: u32,
+        _pad0: u32,
+        _pad1: u32,
     }
     /// shaders/effects/friction.wgsl
     struct FrictionParams {
@@ -188,7 +253,15 @@ shared_structs! {
         inverted_cells: u32,
         inverted_cell: u32,
         overstretched_cells: u32,
-        _pad: u32,
+        deleted_cells: u32,
+        flow: f32,
+        degradation: f32,
+        relaxation: f32,
+        least_intact: f32,
+        failures: f32,
+        _pad0: u32,
+        _pad1: u32,
+        _pad2: u32,
     }
     /// shaders/shared/node_sums.wgsl
     struct NodeSums {

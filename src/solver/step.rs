@@ -21,11 +21,13 @@ pub enum Stage {
     MeasureNodes,
     /// Sums over the contact nodes (once per frame).
     MeasureContact,
+    /// Reactions of the six faces (once per frame).
+    MeasureFaces,
 }
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 9] = [
+    pub const ALL: [Stage; 10] = [
         Stage::AdvanceTip,
         Stage::SoftenPath,
         Stage::ElementForces,
@@ -35,6 +37,7 @@ impl Stage {
         Stage::MeasureCells,
         Stage::MeasureNodes,
         Stage::MeasureContact,
+        Stage::MeasureFaces,
     ];
 
     /// File stem and label.
@@ -49,11 +52,12 @@ impl Stage {
             Stage::MeasureCells => "measure_cells",
             Stage::MeasureNodes => "measure_nodes",
             Stage::MeasureContact => "measure_contact",
+            Stage::MeasureFaces => "measure_faces",
         }
     }
 
     /// True for the stages that run once per frame, after its last step.
     pub fn once_per_frame(self) -> bool {
-        matches!(self, Stage::MeasureCells | Stage::MeasureNodes | Stage::MeasureContact)
+        matches!(self, Stage::MeasureCells | Stage::MeasureNodes | Stage::MeasureContact | Stage::MeasureFaces)
     }
 }

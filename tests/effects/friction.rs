@@ -38,7 +38,7 @@ fn block_under_punch(acceleration: DVec3, mu: f64, damping: f64) -> Arc<Model> {
 fn start(engine: &mut dyn Engine, model: &Model, g: f64, v0: f64) {
     let mut state = engine.read_state().unwrap();
     let height = model.scene.tissue.size.z;
-    let [nx, ny, nz] = model.mesh.nodes();
+    let [nx, ny, nz] = model.mesh.block().nodes();
     let column = |n: usize| (0..nz).map(|k| model.node_mass[n % (nx * ny) + k * nx * ny]).sum::<f64>();
     for (node, u) in state.displacement.iter_mut().enumerate() {
         let above_base = model.mesh.rest_position(node).z + height;

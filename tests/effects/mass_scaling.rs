@@ -60,8 +60,8 @@ fn static_reaction(engine: &mut dyn Engine, model: &Model, dt: f64, steps: usize
     }
     assert!(sums.kinetic < 1e-6 * sums.elastic, "not at rest: {:e} of {:e}", sums.kinetic, sums.elastic);
     let forces = engine.internal_forces().unwrap();
-    let top = model.mesh.nodes()[2] - 1;
-    let on_top = forces.iter().enumerate().filter(|(n, _)| model.mesh.node_coordinates(*n)[2] == top);
+    let top = model.mesh.block().nodes()[2] - 1;
+    let on_top = forces.iter().enumerate().filter(|(n, _)| model.mesh.block().node_coordinates(*n)[2] == top);
     on_top.map(|(_, f)| *f).sum()
 }
 

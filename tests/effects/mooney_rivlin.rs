@@ -151,7 +151,7 @@ fn stress_of_a_block(engine: &mut dyn Engine, model: &stylet::model::Model, f: D
     let mut volume = 0.0;
     for (node, force) in forces.iter().enumerate() {
         p += outer(*force, model.mesh.rest_position(node));
-        volume += model.mesh.node_volume(node);
+        volume += model.mesh.block().node_volume(node);
     }
     p * (1.0 / volume)
 }

@@ -109,8 +109,8 @@ impl Run {
     /// Nodes of a face.
     fn face(&self, face: Face) -> Vec<usize> {
         let mesh = &self.simulation.model.mesh;
-        let plane = if face.is_max() { mesh.nodes()[face.axis()] - 1 } else { 0 };
-        (0..mesh.node_count()).filter(|&n| mesh.node_coordinates(n)[face.axis()] == plane).collect()
+        let plane = if face.is_max() { mesh.block().nodes()[face.axis()] - 1 } else { 0 };
+        (0..mesh.node_count()).filter(|&n| mesh.block().node_coordinates(n)[face.axis()] == plane).collect()
     }
 
     /// Force [N] and moment about the axis x = y = 0 [N m] that the support of a face exerts on the tissue at rest.

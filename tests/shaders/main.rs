@@ -4,41 +4,65 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 
 use glam::DVec3;
-use stylet::effects::{EFFECTS, EffectSet, friction, gravity, indentation, mass_scaling, puncture};
+use rayon::prelude::*;
+use stylet::effects::{EFFECTS, EffectSet, mass_scaling};
 use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose};
-use stylet::gpu::engine::{defines, stages};
+use stylet::gpu::engine::{Features, LAWS, defines, stages};
 use stylet::gpu::kernel::{Reflected, reflect};
 use stylet::gpu::structs::layouts;
 use stylet::solver::step::Stage;
 
-/// Features of a scene that are no effects: loaded faces, driven faces.
-const SCENES: [(bool, bool); 4] = [(false, false), (true, false), (false, true), (true, true)];
+/// Features of a block of Mooney-Rivlin tissue.
+fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
+    let laws = BTreeSet::from(["mooney_rivlin"]);
+    Features { loaded_faces, driven_faces, regions: false, tetrahedra: false, laws }
+}
+
+/// Scenes that differ in what is no effect: loads, driven faces, regions.
+fn scenes() -> Vec<Features> {
+    let mut scenes = vec![scene(false, false), scene(true, false), scene(false, true), scene(true, true)];
+    scenes.push(Features { regions: true, ..scene(false, false) });
+    scenes
+}
+
+/// Scenes of every elastic law alone, of pairs with Ogden's and with Mooney-Rivlin's, and of all together.
+fn scenes_of_laws() -> Vec<Features> {
+    let keys: Vec<&'static str> = LAWS.iter().map(|l| l.0).collect();
+    let mut sets: Vec<BTreeSet<&'static str>> = keys.iter().map(|k| BTreeSet::from([*k])).collect();
+    sets.extend(keys.iter().flat_map(|k| [BTreeSet::from([*k, "ogden"]), BTreeSet::from([*k, "mooney_rivlin"])]));
+    sets.push(keys.into_iter().collect());
+    sets.into_iter().map(|laws| Features { regions: laws.len() > 1, laws, ..scene(false, false) }).collect()
+}
 
 /// The set with the effects of which `wanted` is true, in the order of [`EFFECTS`].
 fn effect_set(wanted: impl Fn(usize) -> bool) -> EffectSet {
     let set = EffectSet {
         mass_scaling: wanted(0).then_some(mass_scaling::Params { factor: 100.0 }),
-        gravity: wanted(1).then_some(gravity::Params { acceleration: DVec3::NEG_Z }),
-        puncture: wanted(2).then(puncture::Params::default),
-        indentation: wanted(3).then(indentation::Params::default),
-        friction: wanted(4).then(friction::Params::default),
+        gravity: wanted(1).then_some(stylet::effects::gravity::Params { acceleration: DVec3::NEG_Z }),
+        plasticity: wanted(2).then(Default::default),
+        fibres: wanted(3).then(Default::default),
+        viscoelastic: wanted(4).then(Default::default),
+        damage: wanted(5).then(Default::default),
+        puncture: wanted(6).then(Default::default),
+        indentation: wanted(7).then(Default::default),
+        friction: wanted(8).then(Default::default),
     };
     let expected: Vec<&str> = EFFECTS.iter().enumerate().filter(|e| wanted(e.0)).map(|e| e.1.key).collect();
     assert_eq!(set.keys(), expected, "order of the effect table");
     set
 }
 
-/// All 32 subsets: none, every single one, all pairs, all together and what lies between.
+/// All 512 subsets: none, every single one, all pairs, all together and what lies between.
 fn all_sets() -> Vec<EffectSet> {
     (0..1usize << EFFECTS.len()).map(|bits| effect_set(|i| bits >> i & 1 == 1)).collect()
 }
 
 /// All stages of a set of effects.
-fn reflected(set: &EffectSet, (loaded, driven): (bool, bool)) -> Vec<Reflected> {
-    let defines = defines(set, loaded, driven);
-    stages(set)
+fn reflected(set: &EffectSet, features: &Features) -> Vec<Reflected> {
+    let defines = defines(set, features);
+    stages(set, features)
         .into_iter()
-        .map(|stage| reflect(stage, &defines).unwrap_or_else(|e| panic!("{:?} {loaded} {driven}: {e}", set.keys())))
+        .map(|stage| reflect(stage, &defines).unwrap_or_else(|e| panic!("{:?} {features:?}: {e}", set.keys())))
         .collect()
 }
 
@@ -47,21 +71,28 @@ fn everything() -> &'static [(String, Reflected)] {
     static ALL: OnceLock<Vec<(String, Reflected)>> = OnceLock::new();
     ALL.get_or_init(|| {
         let mut seen = BTreeSet::new();
-        let mut all = Vec::new();
-        for set in all_sets() {
-            for (loaded, driven) in SCENES {
-                let defines = defines(&set, loaded, driven);
-                for stage in stages(&set) {
-                    let what = format!("{} with {defines:?}", stage.name());
-                    let composed = compose(&format!("stages/{}", stage.name()), &defines);
-                    let composed = composed.unwrap_or_else(|e| panic!("{what}: {e}"));
-                    if seen.insert(composed.source) {
-                        all.push((what.clone(), reflect(stage, &defines).unwrap_or_else(|e| panic!("{what}: {e}"))));
-                    }
+        let (none, every) = (effect_set(|_| false), effect_set(|_| true));
+        let of_laws = scenes_of_laws().into_iter().flat_map(|f| [(none.clone(), f.clone()), (every.clone(), f)]);
+        let of_effects = all_sets().into_iter().flat_map(|set| scenes().into_iter().map(move |f| (set.clone(), f)));
+        let mut texts = Vec::new();
+        for (set, features) in of_effects.chain(of_laws) {
+            let defines = defines(&set, &features);
+            for stage in stages(&set, &features) {
+                let what = format!("{} with {defines:?}", stage.name());
+                let composed = compose(&format!("stages/{}", stage.name()), &defines);
+                let composed = composed.unwrap_or_else(|e| panic!("{what}: {e}"));
+                if seen.insert(composed.source) {
+                    texts.push((what, stage, defines.clone()));
                 }
             }
         }
-        all
+        texts
+            .into_par_iter()
+            .map(|(what, stage, defines)| {
+                let reflected = reflect(stage, &defines).unwrap_or_else(|e| panic!("{what}: {e}"));
+                (what, reflected)
+            })
+            .collect()
     })
 }
 
@@ -144,7 +175,7 @@ type ShaderStruct = (u32, Vec<(String, u32)>);
 /// All structs of all stages with all effects.
 fn shader_structs() -> BTreeMap<String, ShaderStruct> {
     let mut found: BTreeMap<String, ShaderStruct> = BTreeMap::new();
-    for r in reflected(&effect_set(|_| true), (true, true)) {
+    for r in reflected(&effect_set(|_| true), &Features { regions: true, ..scene(true, true) }) {
         for (_, ty) in r.module.types.iter() {
             let (naga::TypeInner::Struct { members, span }, Some(name)) = (&ty.inner, &ty.name) else {
                 continue;
@@ -190,7 +221,19 @@ fn host_structs_lie_as_the_shaders_read_them() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // Structs that live in buffers must be known to the host.
     let host: BTreeSet<&str> = layouts().into_iter().map(|l| l.0).collect();
-    let local = ["CellEnergy", "IsochoricFactors", "StressState", "AnchorPlace"];
+    let local = [
+        "CellEnergy",
+        "IsochoricFactors",
+        "AnchorPlace",
+        "Slopes",
+        "IsochoricStress",
+        "PointPlace",
+        "PointAnswer",
+        "PointEnergy",
+        "PlasticAnswer",
+        "MandelStress",
+        "FibreStress",
+    ];
     for name in shader.keys().filter(|n| !local.contains(&n.as_str())) {
         assert!(host.contains(name.as_str()), "struct {name} of the shaders is unknown to the host");
     }
@@ -214,18 +257,22 @@ fn a_wrong_layout_is_found_and_named() {
 }
 
 /// Words that would betray an effect, by its key.
-const TRACES: [(&str, &[&str]); 5] = [
+const TRACES: [(&str, &[&str]); 9] = [
     ("mass_scaling", &["mass_scaling", "stable_mass", "selective"]),
     ("gravity", &["gravity", "free fall"]),
+    ("plasticity", &["yield", "hardening", "flow_plastically", "mandel"]),
+    ("fibres", &["fibre_", "i4bar", "fibres["]),
+    ("viscoelastic", &["visc", "prony[", "relax("]),
+    ("damage", &["degradation(", "damage["]),
     ("puncture", &["puncture", "tip_", "needle", "soften", "remaining"]),
     ("indentation", &["indent", "punch"]),
     ("friction", &["friction", "stick_", "coulomb"]),
 ];
 
 /// Lower-case source and binding names of all stages of a set.
-fn text_of(set: &EffectSet, scene: (bool, bool)) -> Vec<(&'static str, String)> {
+fn text_of(set: &EffectSet, features: &Features) -> Vec<(&'static str, String)> {
     let names = |r: &Reflected| r.bindings.iter().map(|b| b.name.clone()).collect::<Vec<_>>().join(" ");
-    reflected(set, scene)
+    reflected(set, features)
         .iter()
         .map(|r| (r.stage.name(), format!("{}\n{}", r.composed.source, names(r)).to_lowercase()))
         .collect()
@@ -234,13 +281,17 @@ fn text_of(set: &EffectSet, scene: (bool, bool)) -> Vec<(&'static str, String)> 
 #[test]
 fn without_effects_the_shaders_know_nothing_of_them() {
     let none = effect_set(|_| false);
-    for scene in SCENES {
-        for (stage, text) in text_of(&none, scene) {
-            for word in ["contact", "friction", "cutting", "puncture", "needle", "tip", "stick", "indent"] {
+    for features in scenes() {
+        for (stage, text) in text_of(&none, &features) {
+            for word in [
+                "contact", "friction", "cutting", "puncture", "needle", "tip", "stick", "indent", "plastic", "fibre",
+                "visc",
+            ] {
                 // The one struct of a step's input serves all scenes that have one; it alone may speak of a tool.
                 let mut lines = text.lines().filter(|l| l.contains(word));
-                let found = lines.find(|l| !(scene != (false, false) && step_input_lines().contains(*l)));
-                assert!(found.is_none(), "{stage} {scene:?}: {word:?} in {found:?}");
+                let found =
+                    lines.find(|l| !(features.driven_faces | features.loaded_faces && step_input_lines().contains(*l)));
+                assert!(found.is_none(), "{stage} {features:?}: {word:?} in {found:?}");
             }
         }
     }
@@ -257,7 +308,7 @@ fn an_absent_effect_leaves_no_trace() {
     for (absent, (key, traces)) in TRACES.iter().enumerate() {
         assert_eq!(EFFECTS[absent].key, *key);
         // The stages of the effect are gone, and so are its blocks in the others.
-        for (stage, text) in text_of(&effect_set(|i| i != absent), (true, true)) {
+        for (stage, text) in text_of(&effect_set(|i| i != absent), &scene(true, true)) {
             for word in *traces {
                 let shared = ["shared/step_input", "shared/contact_node"];
                 let known: BTreeSet<String> = SOURCES
@@ -272,7 +323,7 @@ fn an_absent_effect_leaves_no_trace() {
         }
         // Not a vacuous search: with the effect alone (or with a tool, for friction) the words are there.
         let present = effect_set(|i| i == absent || (*key == "friction" && EFFECTS[i].key == "puncture"));
-        let all: String = text_of(&present, (false, false)).into_iter().map(|t| t.1).collect();
+        let all: String = text_of(&present, &scene(false, false)).into_iter().map(|t| t.1).collect();
         assert!(traces.iter().any(|word| all.contains(word)), "{key}: none of {traces:?} with it");
     }
 }
@@ -295,9 +346,12 @@ fn every_file_and_every_define_is_used() {
     }
 }
 
+/// Files in which effects have blocks of code: their order is physics.
+const BODIES: [&str; 3] = ["shared/material_point", "stages/element_forces", "stages/integrate_nodes"];
+
 #[test]
 fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
-    for (name, text) in SOURCES.iter().filter(|s| s.0 == "stages/element_forces" || s.0 == "stages/integrate_nodes") {
+    for (name, text) in SOURCES.iter().filter(|s| BODIES.contains(&s.0)) {
         let mut last = 0;
         // Imports stand at the top of a file, blocks of code in its functions.
         let body = text.split("fn ").skip(1).collect::<Vec<_>>().join("fn ");
@@ -343,7 +397,7 @@ fn a_broken_stage_names_file_and_line() {
     // The needle's stage without its effect lacks nothing that the composer sees, but the tip stage of a scene
     // without a define still imports what it needs; a line of a shared file must map back to that file.
     let set = effect_set(|i| EFFECTS[i].key == "puncture");
-    let composed = compose("stages/needle_contact", &defines(&set, false, false)).unwrap();
+    let composed = compose("stages/needle_contact", &defines(&set, &scene(false, false))).unwrap();
     for (index, line) in composed.source.lines().enumerate() {
         let place = composed.place(index + 1);
         let (file, number) = place.strip_prefix("shaders/").unwrap().split_once(".wgsl:").unwrap();

@@ -1,7 +1,7 @@
 //! Gmsh meshes, MSH 2.x and 4.1, as text and binary.
 //!
 //! Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". A binary file holds the
-//! same records as the text, as `int` (4 bytes), `double` and, in version 4.1, `size_t` (its width stands in the header).
+//! records of the text as `int` (4 bytes), `double` and, in version 4.1, `size_t` (its width stands in the header).
 //! Regions are physical volumes; physical surfaces, curves and points become node sets.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};

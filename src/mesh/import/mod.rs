@@ -62,7 +62,8 @@ impl LengthUnit {
         }
     }
 
-    /// Length [m]. Powers of ten are divided by, so that 4 mm is the number nearest to 0.004, as if it had been written in metres.
+    /// Length [m]. Powers of ten are divided by, so that 4 mm is the number nearest to 0.004, as if it had been
+    /// written in metres.
     pub fn to_metres(self, length: f64) -> f64 {
         match self {
             LengthUnit::Metre => length,

@@ -120,14 +120,14 @@ impl RawMesh {
             };
             return Err(Error::input(
                 message,
-                "mesh the whole body with tetrahedra of four nodes; a structured block is made by [tissue] without a file",
+                "mesh the whole body with four-node tetrahedra; a structured block is made by [tissue], without a file",
             ));
         }
         if tets == 0 {
             let only = if lower.is_empty() { "no elements at all".to_string() } else { format!("only {lower}") };
             return Err(Error::input(
                 format!("{name}: the file holds no tetrahedra, {only}"),
-                "write the volume mesh, not only its surface: fill the body with tetrahedra in the mesh generator and save again",
+                "fill the body with tetrahedra in the mesh generator and save the volume mesh, not only its surface",
             ));
         }
         if !lower.is_empty() {

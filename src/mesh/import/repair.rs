@@ -470,8 +470,9 @@ fn shape_notice(mesh: &TetMesh, notices: &mut Vec<String>) {
     if slivers > 0 {
         let centre = mesh.corners(worst.1).iter().sum::<DVec3>() / 4.0 * 1e3;
         notices.push(format!(
-            "{} of {} tetrahedra are slivers (smallest altitude below {SLIVER} of the longest edge), the worst with {:.2e} \
-             near ({:.2}, {:.2}, {:.2}) mm: its altitude of {:.2e} mm bounds the time step. Optimise the mesh for faster runs.",
+            "{} of {} tetrahedra are slivers (smallest altitude below {SLIVER} of the longest edge), the worst with \
+             {:.2e} near ({:.2}, {:.2}, {:.2}) mm: its altitude of {:.2e} mm bounds the time step. \
+             Optimise the mesh for faster runs.",
             slivers,
             mesh.tets.len(),
             worst.0,

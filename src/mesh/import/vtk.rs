@@ -32,6 +32,8 @@ pub(super) struct Grid {
     pub types: Vec<i64>,
     /// Region per cell.
     pub tags: Option<Tags>,
+    /// Arrays that could name regions, too.
+    pub unused_tags: Vec<String>,
 }
 
 #[derive(Debug)]
@@ -68,6 +70,16 @@ impl Grid {
         {
             let message = format!("array `{}` has {} values for {cells} cells", tags.name, tags.values.len());
             return Err(fail(GridArray::Tags, 0, message));
+        }
+        if let Some(tags) = &self.tags
+            && !self.unused_tags.is_empty()
+        {
+            let unused = self.unused_tags.join("`, `");
+            let notice = format!("Regions are taken from cell array `{}`; `{unused}` is not used.", tags.name);
+            // Said once for a file of several pieces.
+            if !raw.notices.contains(&notice) {
+                raw.notices.push(notice);
+            }
         }
         let first_node = raw.nodes.len();
         if u32::try_from(first_node + points).is_err() {
@@ -493,8 +505,12 @@ impl VtkFile<'_> {
         if rank.is_some() && (known.is_none() || rank < known) {
             self.mark(GridArray::Tags, kind);
             let values = self.values(count, kind, "a region")?;
-            self.grid.tags = Some(Tags { name: name.to_string(), values });
+            let former = self.grid.tags.replace(Tags { name: name.to_string(), values });
+            self.grid.unused_tags.extend(former.map(|t| t.name));
             return Ok(());
+        }
+        if rank.is_some() {
+            self.grid.unused_tags.push(name.to_string());
         }
         self.skip(count, kind, "a value of an attribute")
     }

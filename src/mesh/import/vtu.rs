@@ -183,15 +183,17 @@ impl<'a> VtuFile<'a> {
         let cells = self.child(piece, "Cells")?;
         let [connectivity, offsets, types] = ["connectivity", "offsets", "types"].map(|n| self.named_array(cells, n));
         let (connectivity, offsets, types) = (connectivity?, offsets?, types?);
-        let tags = child(piece, "CellData").and_then(|data| {
-            arrays(data)
-                .filter(|a| matches!(a.attribute("NumberOfComponents"), None | Some("1")))
-                .filter_map(|a| a.attribute("Name").and_then(region_rank).map(|rank| (rank, a)))
-                .min_by_key(|(rank, _)| *rank)
-                .map(|(_, array)| array)
-        });
+        let mut candidates: Vec<(usize, XmlNode<'a>)> = child(piece, "CellData")
+            .into_iter()
+            .flat_map(arrays)
+            .filter(|a| matches!(a.attribute("NumberOfComponents"), None | Some("1")))
+            .filter_map(|a| a.attribute("Name").and_then(region_rank).map(|rank| (rank, a)))
+            .collect();
+        candidates.sort_by_key(|(rank, _)| *rank);
+        let tags = candidates.first().map(|(_, array)| *array);
 
-        let mut grid = Grid::default();
+        let unused = candidates.iter().skip(1).filter_map(|(_, array)| array.attribute("Name"));
+        let mut grid = Grid { unused_tags: unused.map(str::to_string).collect(), ..Grid::default() };
         let coordinates = self.values(points, point_count.checked_mul(3), "NumberOfPoints")?;
         for (number, x) in coordinates.chunks_exact(3).enumerate() {
             let position = DVec3::new(x[0].float(), x[1].float(), x[2].float());
@@ -325,7 +327,7 @@ impl<'a> VtuFile<'a> {
         let full = if first > 0 && last != 0 { first - 1 } else { first };
         if full.checked_mul(block).and_then(|n| n.checked_add(last)) != Some(expected) {
             return Err(format!(
-                "its head tells {first} blocks of {block} bytes, the last of {last}, where {expected} bytes are expected"
+                "its head tells {first} blocks of {block} bytes (last: {last}) where {expected} bytes are expected"
             ));
         }
         let mut sizes = Vec::new();

@@ -1,0 +1,19 @@
+// Sum of the corner forces at a node of the block: x, y, z force [N], w stiffness bound [N/m].
+#import shared/corner_force
+
+fn gathered_force(i: u32, j: u32, k: u32) -> vec4<f32> {
+    // One strip, or two where the node lies on the plane between them.
+    let above = quotient(k, params.strip_layers);
+    let last = min(above, params.strip_count - 1u);
+    let first = select(last, above - 1u, k > 0u && above * params.strip_layers == k);
+    let stride = params.padded_columns;
+    let row = params.cells_x + 2u;
+    let column = padded_column(i, j);
+    var sum = vec4<f32>(0.0);
+    for (var strip = first; strip <= last; strip++) {
+        let slot = corner_slot(strip, k - strip * params.strip_layers, 0u, column);
+        sum += corner_force[slot] + corner_force[slot + stride - 1u]
+            + corner_force[slot + 2u * stride - row] + corner_force[slot + 3u * stride - row - 1u];
+    }
+    return sum;
+}

@@ -1,0 +1,116 @@
+// One material point with all constitutive effects. Order and reasons: src/material_point.rs.
+#import shared/elastic
+#import shared/point_energy
+#ifdef HISTORY
+#import shared/point_history
+#endif
+#ifdef PLASTICITY
+#import effects/plasticity
+#endif
+#ifdef FIBRES
+#import effects/fibres
+#endif
+#ifdef VISCOELASTIC
+#import effects/viscoelastic
+#endif
+#ifdef DAMAGE
+#import effects/damage
+#endif
+
+struct PointPlace {
+    cell: u32,
+    // Index of the material.
+    material: u32,
+    // Edge of the cell V^(1/3) [m].
+    length: f32,
+    // Part of the stiffness that the cell keeps for other reasons.
+    kept: f32,
+    // Energy per volume beside that of the law: hourglass; and averaged volumetric energy where pressure is averaged.
+    other_energy: f32,
+    averaged_energy: f32,
+}
+
+struct PointAnswer {
+    // Stress without its volumetric part [Pa], cof F, J - 1, bound of the tangent modulus [Pa].
+    P: mat3x3<f32>,
+    cof: mat3x3<f32>,
+    dj: f32,
+    tangent: f32,
+    // Part of the stiffness that is left; P does not know it yet.
+    intact: f32,
+}
+
+// Volumetric energy of the undamaged point [J/m^3].
+fn volumetric_energy(place: PointPlace, dj: f32) -> f32 {
+#ifdef TETRAHEDRA
+    return place.averaged_energy;
+#else
+    return 0.5 * materials[place.material].bulk_modulus * dj * dj;
+#endif
+}
+
+// Stress of the point in this step; brings its history up to date.
+fn material_point(place: PointPlace, H: mat3x3<f32>) -> PointAnswer {
+    let material = materials[place.material];
+    var out: PointAnswer;
+    out.intact = place.kept;
+#ifdef HISTORY
+    var history = PointHistory(0.0, 0.0, 0.0, 0.0);
+    // Equivalent strain of flow before and after this step, and the strain that the law sees.
+    var alpha_before = 0.0;
+    var alpha = 0.0;
+    var elastic_strain = H;
+#endif
+#ifdef PLASTICITY
+    // First: all others see the elastic part that flow leaves.
+    let plastic = flow_plastically(material, place.material, place.cell, H, true);
+    var matrix = plastic.elastic;
+    matrix.cof = cofactor(deformation_gradient(H));
+    matrix.dj = jacobian_minus_one(H);
+    alpha_before = plastic.alpha_before;
+    alpha = plastic.alpha;
+    elastic_strain = plastic.He;
+    history.flow = plastic.dissipation;
+    history.failures = plastic.failure;
+#else
+    let matrix = isochoric_stress(material, H);
+#endif
+    out.P = matrix.P;
+    out.cof = matrix.cof;
+    out.dj = matrix.dj;
+    out.tangent = matrix.tangent;
+#ifdef FIBRES
+    // On the whole F: fibres bridge a matrix that flows.
+    let fibre = fibre_stress(place.material, H, out.cof, out.dj);
+    out.P += fibre.P;
+    out.tangent += fibre.tangent;
+#endif
+#ifdef VISCOELASTIC
+    // Relaxes what matrix and fibres hold together.
+    history.relaxation_work = relax(place.material, place.cell, H, out.P, out.cof, out.dj);
+    out.P -= deformation_gradient(H) * viscous_tensor(viscous_sum(place.cell));
+#endif
+#ifdef DAMAGE
+    // Last: what has failed carries nothing of the sum.
+    let before = degradation(place.material, alpha_before, place.length);
+    let d = degradation(place.material, alpha, place.length);
+    out.intact *= 1.0 - d;
+    history.flow *= 1.0 - before;
+    history.relaxation_work *= 1.0 - d;
+    // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
+    for (var once = select(1u, 0u, d > before); once == 0u; once++) {
+        let energy = free_energy(place, elastic_strain, H, out.dj) + place.other_energy;
+        history.degradation = (d - before) * energy;
+    }
+#endif
+#ifdef HISTORY
+    let happened = history.flow != 0.0 || history.relaxation_work != 0.0 || history.failures != 0.0;
+    for (var once = select(1u, 0u, happened || history.degradation != 0.0); once == 0u; once++) {
+        point_history[place.cell].flow += place.kept * history.flow;
+        point_history[place.cell].degradation += place.kept * history.degradation;
+        point_history[place.cell].relaxation_work += place.kept * history.relaxation_work;
+        point_history[place.cell].failures += history.failures;
+    }
+#endif
+    return out;
+}

@@ -1,0 +1,36 @@
+// Stage measure_faces: what each face exerts on the tissue, 64 partial sums per face; the host adds them in f64.
+#import shared/params
+#import shared/thread_index
+#import shared/gathered_force
+
+// Force on the tissue [N], w unused; faces in the order x-, x+, y-, y+, z-, z+.
+@group(2) @binding(7) var<storage, read_write> face_sums: array<vec4<f32>, 384>;
+
+@compute @workgroup_size(64)
+fn measure_faces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let thread = thread_index(id, groups);
+    if (thread >= 384u) {
+        return;
+    }
+    let face = thread / 64u;
+    let axis = face / 2u;
+    let counts = vec3<u32>(params.nodes_x, params.nodes_y, params.nodes_z);
+    // Nodes per row of the face, and of the face.
+    let row = select(params.nodes_x, params.nodes_y, axis == 0u);
+    let count = row * select(params.nodes_z, params.nodes_y, axis == 2u);
+    let last = (face & 1u) == 1u;
+    var sum = vec3<f32>(0.0);
+    for (var index = thread % 64u; index < count; index += 64u) {
+        let second = index / row;
+        let first = index - second * row;
+        var at = vec3<u32>(first, second, select(0u, counts.z - 1u, last));
+        if (axis == 0u) {
+            at = vec3<u32>(select(0u, counts.x - 1u, last), first, second);
+        } else if (axis == 1u) {
+            at = vec3<u32>(first, select(0u, counts.y - 1u, last), second);
+        }
+        // What holds the node balances the force of the cells on it.
+        sum -= gathered_force(at.x, at.y, at.z).xyz;
+    }
+    face_sums[thread] = vec4<f32>(sum, 0.0);
+}
