@@ -271,6 +271,11 @@ impl Check<'_> {
         } else {
             ""
         };
+        // Nobody meshes below a tenth of a millimetre to keep a displacement that is too small.
+        let finer = match four_digits(limit / MM) {
+            limit if limit < 0.1 => String::new(),
+            limit => format!(", or a cell_size_mm below {limit}"),
+        };
         let whose = index.map(|i| format!(" in region `{}`", file.region[i].name)).unwrap_or_default();
         self.problems.report(
             &format!("{place}.{key}"),
@@ -284,7 +289,7 @@ impl Check<'_> {
                 limit
             ),
             "a cell must be smaller than E u_f/sigma",
-            format!("write {key} of at least {}, or a cell_size_mm below {}", four_digits(value), four_digits(limit / MM)),
+            format!("write {key} of at least {}{finer}", four_digits(value)),
         );
     }
 
