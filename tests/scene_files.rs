@@ -934,7 +934,7 @@ fn wrong_meshes() {
         ("part.inp", "none.inp", "mesh =", &["cannot read the mesh", "relative to the scene file"]),
         ("part.inp", "part.stl", "mesh =", &[".stl files hold a surface"]),
         ("part.inp", "empty.inp", "mesh =", &["the file is empty"]),
-        ("\"bone\"", "\"bones\"", "set = \"", &["no node set called \"bones\"", "\"bone\" (3 nodes)"]),
+        ("\"bone\"", "\"bones\"", "bones", &["no node set called \"bones\"", "\"bone\" (3 nodes)"]),
         ("[\"x\", \"y\", \"z\"]", "[]", "fixed =", &["holds nothing"]),
         ("mesh_tag = \"skin\"", "mesh_tag = \"fat\"", "mesh_tag", &["no region called \"fat\"", "\"skin\" (1 cells)"]),
         (
@@ -963,7 +963,7 @@ fn wrong_meshes() {
     assert_block_refused(
         "",
         &format!("{MATERIAL}[[support]]\nset = \"a\"\nfixed = [\"x\"]\n"),
-        "set = \"",
+        "set = \"a\"",
         &["no node sets"],
     );
     let notices = load_text(

@@ -28,7 +28,7 @@ impl Check<'_> {
     ) -> (Vec<Region>, Vec<Option<TissuePreset>>) {
         if file.region.len() > LARGEST_REGION_COUNT {
             self.problems.report(
-                &format!("region.{LARGEST_REGION_COUNT}"),
+                &format!("region.{LARGEST_REGION_COUNT}.name"),
                 format!("the scene has {} regions", file.region.len()),
                 "too many: the GPU holds 16 materials, the tissue's own and 15 of regions",
                 format!(
