@@ -491,7 +491,7 @@ fn presets_bring_law_and_parameters_of_their_own() {
         let preset = presets::tissue(name).unwrap();
         assert_eq!(preset.law.verdict(), Verdict::Stable);
         assert!(preset.cutting.is_some() && preset.plasticity.is_some(), "{name}");
-        assert_eq!(preset.fibres.unwrap().k1, 0.0, "{name}");
+        assert_eq!(preset.fibres.as_ref().unwrap().k1_kpa, Some(0.0), "{name}");
     }
 }
 
@@ -593,6 +593,15 @@ deletion = true
                   plasticity = { yield_stress_kpa = 10 }\n";
     let scene = load_block(effects, &format!("{by_energy}{region}")).unwrap();
     assert!((scene.regions[0].material.damage.unwrap().failure_displacement - 6e-3).abs() < 1e-12);
+    // A preset states what it knows, the scene the rest; a region that is as the scene has nothing of its own.
+    let region = "[[region]]\nname = \"top\"\nlayer_mm = [0, 2]\nmaterial = { preset = \"along-fibre\" }\n\
+                  [[region]]\nname = \"low\"\nlayer_mm = [2, 4]\nmaterial = { preset = \"muscle-60kpa\" }\n";
+    let scene = load_block(effects, &format!("{text}{region}")).unwrap();
+    let along = scene.regions[0].material.damage.unwrap();
+    assert_eq!((along.onset, along.largest), (0.072, 0.9));
+    assert!((along.failure_displacement - 3e-3).abs() < 1e-12);
+    let low = &scene.regions[1].material;
+    assert!(low.plasticity.is_none() && low.damage.is_none() && low.fibres.is_none());
     // Without tables: the defaults.
     let set = load_block("\"plasticity\", \"fibres\", \"viscoelastic\"", MATERIAL).unwrap().effects;
     assert_eq!(set.plasticity, Some(Default::default()));
@@ -967,7 +976,7 @@ fn wrong_meshes() {
         &["no node sets"],
     );
     let notices = load_text(
-        &&format!("{}{MATERIAL}", BLOCK.replace("cell_size_mm = 2.0", "cell_size_mm = 2.0\nunit = \"mm\"")),
+        &format!("{}{MATERIAL}", BLOCK.replace("cell_size_mm = 2.0", "cell_size_mm = 2.0\nunit = \"mm\"")),
         &[],
     );
     assert!(notices.unwrap().notices[0].contains("`tissue.unit` has no effect"));

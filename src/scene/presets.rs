@@ -6,8 +6,7 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use super::convert::library;
-use super::file::CuttingTable;
-use crate::effects;
+use super::file::{CuttingTable, DamageTable, FibresTable, PlasticityTable, ViscoelasticTable};
 use crate::material::ElasticLaw;
 
 /// A tissue material with its origin and range of validity.
@@ -23,11 +22,11 @@ pub struct TissuePreset {
     pub law: ElasticLaw,
     /// Density [kg/m^3].
     pub density: f64,
-    /// Parameters of its own for effects.
-    pub plasticity: Option<effects::plasticity::Params>,
-    pub fibres: Option<effects::fibres::Params>,
-    pub viscoelastic: Option<effects::viscoelastic::Params>,
-    pub damage: Option<effects::damage::Params>,
+    /// Parameters of its own for effects, as written: what a table leaves out comes from the scene.
+    pub plasticity: Option<PlasticityTable>,
+    pub fibres: Option<FibresTable>,
+    pub viscoelastic: Option<ViscoelasticTable>,
+    pub damage: Option<DamageTable>,
     /// Tip forces as written: a cutting energy becomes a force with the needle of the scene.
     pub cutting: Option<CuttingTable>,
 }

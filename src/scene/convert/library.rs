@@ -5,8 +5,7 @@ use std::path::Path;
 use super::super::document::Document;
 use super::super::file::{CuttingTable, LibraryFile, LibraryMaterial, MaterialTable};
 use super::super::presets::TissuePreset;
-use super::{Check, parameters};
-use crate::effects;
+use super::Check;
 
 /// Reads and checks a library; the error is the rendered text of all problems, with the name of the library.
 pub fn read(path: &Path, source: &str) -> std::result::Result<Vec<TissuePreset>, String> {
@@ -56,25 +55,9 @@ impl Check<'_> {
         let density = self.density(at, entry.density_kg_m3);
         self.material_ranges(at, &table);
         let law = self.law(at, &table);
-        let within = |key: &str| format!("{at}.{key}");
-        let plasticity = entry.plasticity.as_ref().map(|t| {
-            self.plasticity_table(&within("plasticity"), t);
-            parameters::plasticity_over(t, effects::plasticity::Params::default())
-        });
-        let fibres = entry.fibres.as_ref().map(|t| {
-            self.fibres_table(&within("fibres"), t);
-            parameters::fibres_over(t, effects::fibres::Params::default())
-        });
-        let viscoelastic = entry.viscoelastic.as_ref().map(|t| {
-            self.viscoelastic_table(&within("viscoelastic"), t);
-            parameters::viscoelastic_over(t, effects::viscoelastic::Params::default())
-        });
-        let damage = entry.damage.as_ref().map(|t| {
-            self.damage_table(&within("damage"), t);
-            parameters::damage_over(t, effects::damage::Params::default(), plasticity.unwrap_or_default())
-        });
+        self.own_tables(&format!("{at}."), entry.own_tables());
         let cutting = entry.cutting.unwrap_or_default();
-        self.cutting_table(&within("cutting"), &cutting);
+        self.cutting_table(&format!("{at}.cutting"), &cutting);
         Some(TissuePreset {
             name: entry.name.clone(),
             summary: entry.summary.clone().unwrap_or_default(),
@@ -82,10 +65,10 @@ impl Check<'_> {
             range: entry.range.clone(),
             law: law?,
             density,
-            plasticity,
-            fibres,
-            viscoelastic,
-            damage,
+            plasticity: entry.plasticity.clone(),
+            fibres: entry.fibres.clone(),
+            viscoelastic: entry.viscoelastic.clone(),
+            damage: entry.damage.clone(),
             cutting: (cutting != CuttingTable::default()).then_some(cutting),
         })
     }

@@ -138,18 +138,8 @@ impl Check<'_> {
             law.bulk_modulus = bulk;
         }
         let range = preset.range.as_ref().map(|range| format!("; valid: {range}")).unwrap_or_default();
-        let material = TissueMaterial {
-            plasticity: preset.plasticity,
-            fibres: preset.fibres,
-            viscoelastic: preset.viscoelastic.clone(),
-            damage: preset.damage,
-            ..TissueMaterial::new(
-                name,
-                format!("{}{range}", preset.source),
-                law,
-                if table.density_kg_m3.is_some() { density } else { preset.density },
-            )
-        };
+        let density = if table.density_kg_m3.is_some() { density } else { preset.density };
+        let material = TissueMaterial::new(name, format!("{}{range}", preset.source), law, density);
         self.verdict(at, table, &material, cell_size);
         (material, Some(preset))
     }

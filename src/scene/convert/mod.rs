@@ -15,6 +15,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use parameters::OwnTables;
+
 use super::document::{Document, Problems, closest};
 use super::file::*;
 use super::*;
@@ -127,9 +129,17 @@ impl Check<'_> {
         let tool = self.tool(file);
         let motion = self.motion(file, tool.is_some());
         let effects = self.effects(file, &tool, &motion, &faces, &material);
-        file.own_tables().settle(&mut material, &effects, None);
-        for (region, table) in regions.iter_mut().zip(&file.region) {
-            table.own_tables().settle(&mut region.material, &effects, file.damage.as_ref());
+        parameters::settle(
+            &mut material,
+            &[parameters::of_preset(preset.as_ref()), file.own_tables()],
+            &EffectSet::default(),
+            &effects,
+        );
+        // A fracture energy of the scene means another displacement where a region flows at another stress.
+        let energy = OwnTables { damage: file.damage.as_ref(), ..OwnTables::default() };
+        for ((region, table), preset) in regions.iter_mut().zip(&file.region).zip(&region_presets) {
+            let layers = [energy, parameters::of_preset(preset.as_ref()), table.own_tables()];
+            parameters::settle(&mut region.material, &layers, &effects, &effects);
         }
         self.cuttings(file, &tool, &effects, (&mut material, preset), (&mut regions, region_presets));
         let solver = self.solver(&file.solver, tool.is_some(), effects.puncture.is_some());
@@ -388,7 +398,7 @@ impl Check<'_> {
             (None, Some(speed)) => {
                 let speed = self.number(&at("speed_mm_min"), speed, Within::Positive(1e5)) * MM / 60.0;
                 let length = displacement.unwrap_or_default().length();
-                if length == 0.0 || !(speed > 0.0) {
+                if length == 0.0 || speed <= 0.0 {
                     self.problems.report(
                         &at("speed_mm_min"),
                         "a speed needs a displacement that is not zero",

@@ -56,8 +56,8 @@ fn flow_stress(flow: plasticity::Params, alpha: f64) -> f64 {
     flow.yield_stress + flow.hardening * alpha
 }
 
-/// The tables that one material may write, and where they stand.
-#[derive(Clone, Copy)]
+/// The tables that one place may write: the scene, a region or a preset.
+#[derive(Clone, Copy, Default)]
 pub struct OwnTables<'a> {
     pub plasticity: Option<&'a PlasticityTable>,
     pub fibres: Option<&'a FibresTable>,
@@ -65,51 +65,51 @@ pub struct OwnTables<'a> {
     pub damage: Option<&'a DamageTable>,
 }
 
-impl SceneFile {
-    pub fn own_tables(&self) -> OwnTables<'_> {
-        OwnTables {
-            plasticity: self.plasticity.as_ref(),
-            fibres: self.fibres.as_ref(),
-            viscoelastic: self.viscoelastic.as_ref(),
-            damage: self.damage.as_ref(),
+macro_rules! own_tables_of {
+    ($($place:ty),*) => {$(
+        impl $place {
+            pub(super) fn own_tables(&self) -> OwnTables<'_> {
+                OwnTables {
+                    plasticity: self.plasticity.as_ref(),
+                    fibres: self.fibres.as_ref(),
+                    viscoelastic: self.viscoelastic.as_ref(),
+                    damage: self.damage.as_ref(),
+                }
+            }
         }
-    }
+    )*};
 }
 
-impl RegionTable {
-    pub fn own_tables(&self) -> OwnTables<'_> {
-        OwnTables {
-            plasticity: self.plasticity.as_ref(),
-            fibres: self.fibres.as_ref(),
-            viscoelastic: self.viscoelastic.as_ref(),
-            damage: self.damage.as_ref(),
-        }
-    }
+own_tables_of!(SceneFile, RegionTable, LibraryMaterial, TissuePreset);
+
+/// The tables of a preset, if there is one.
+pub fn of_preset(preset: Option<&TissuePreset>) -> OwnTables<'_> {
+    preset.map(TissuePreset::own_tables).unwrap_or_default()
 }
 
-impl OwnTables<'_> {
-    /// Puts the tables over what the preset of `material` states, and over `scene` where that states nothing. A material
-    /// for which nothing is written keeps `None`: it follows the scene.
-    pub fn settle(&self, material: &mut TissueMaterial, scene: &EffectSet, scene_damage: Option<&DamageTable>) {
-        if let Some(t) = self.plasticity {
-            let base = material.plasticity.or(scene.plasticity).unwrap_or_default();
-            material.plasticity = Some(plasticity_over(t, base));
-        }
-        if let Some(t) = self.fibres {
-            material.fibres = Some(fibres_over(t, material.fibres.or(scene.fibres).unwrap_or_default()));
-        }
-        if let Some(t) = self.viscoelastic {
-            let base = material.viscoelastic.clone().or(scene.viscoelastic.clone()).unwrap_or_default();
-            material.viscoelastic = Some(viscoelastic_over(t, base));
-        }
-        // The scene's fracture energy means another displacement in a material with a flow stress of its own.
-        let energy = scene_damage.filter(|t| t.fracture_energy_j_m2.is_some());
-        let inherited = energy.filter(|_| material.plasticity.is_some() && material.damage.is_none());
-        if let Some(t) = self.damage.or(inherited) {
-            let flow = material.plasticity.or(scene.plasticity).unwrap_or_default();
-            material.damage = Some(damage_over(t, material.damage.or(scene.damage).unwrap_or_default(), flow));
-        }
+/// Settles what `material` has of its own: `layers`, lowest first, key by key over `base`. A material whose parameters
+/// are those of the scene keeps `None`.
+pub fn settle(material: &mut TissueMaterial, layers: &[OwnTables], base: &EffectSet, scene: &EffectSet) {
+    let mut flow = base.plasticity.unwrap_or_default();
+    for table in layers.iter().filter_map(|t| t.plasticity) {
+        flow = plasticity_over(table, flow);
     }
+    let mut fibres = base.fibres.unwrap_or_default();
+    for table in layers.iter().filter_map(|t| t.fibres) {
+        fibres = fibres_over(table, fibres);
+    }
+    let mut viscoelastic = base.viscoelastic.clone().unwrap_or_default();
+    for table in layers.iter().filter_map(|t| t.viscoelastic) {
+        viscoelastic = viscoelastic_over(table, viscoelastic);
+    }
+    let mut damage = base.damage.unwrap_or_default();
+    for table in layers.iter().filter_map(|t| t.damage) {
+        damage = damage_over(table, damage, flow);
+    }
+    material.plasticity = (flow != scene.plasticity.unwrap_or_default()).then_some(flow);
+    material.fibres = (fibres != scene.fibres.unwrap_or_default()).then_some(fibres);
+    material.viscoelastic = (viscoelastic != scene.viscoelastic.clone().unwrap_or_default()).then_some(viscoelastic);
+    material.damage = (damage != scene.damage.unwrap_or_default()).then_some(damage);
 }
 
 impl Check<'_> {
@@ -256,7 +256,6 @@ impl Check<'_> {
         }
         let place = match index {
             Some(i) if file.region[i].damage.is_some() => format!("region.{i}.damage"),
-            Some(i) if material.damage.is_some() => format!("region.{i}.material.preset"),
             _ if file.damage.is_some() => "damage".into(),
             _ => format!("effects.{}", file.effects.iter().position(|key| key == "damage").unwrap_or(0)),
         };
