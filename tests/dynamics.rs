@@ -155,7 +155,8 @@ fn compressed_cube(hourglass: (f64, f64)) -> Vec<(&'static str, f64)> {
     scene.faces[5] = held(true, true, true);
     let factor = 4.0;
     // First shear period of the scaled cube 64 ms: pressed over 100 ms, then at rest in 120 ms of strong damping.
-    scene.faces[5].drive = Some(FaceDrive { displacement: DVec3::new(0.0, 0.0, -6e-3), rotation: 0.0, duration: 0.1 });
+    scene.faces[5].drive =
+        Some(FaceDrive { displacement: DVec3::new(0.0, 0.0, -6e-3), rotation: 0.0, duration: 0.1, cycles: 0 });
     scene.solver.mass_damping = 150.0;
     scene.effects.mass_scaling = Some(mass_scaling::Params { factor });
     let model = model(scene);
@@ -267,7 +268,7 @@ fn a_slow_boundary_is_followed_exactly() {
     scene.faces[4] = held(true, true, true);
     scene.faces[5] = held(true, true, true);
     scene.faces[5].drive =
-        Some(FaceDrive { displacement: DVec3::new(0.37e-4, 0.0, -1e-4), rotation: 0.01, duration: 1.0 });
+        Some(FaceDrive { displacement: DVec3::new(0.37e-4, 0.0, -1e-4), rotation: 0.01, duration: 1.0, cycles: 0 });
     let model = model(scene);
     let dt = 1e-5;
     let top = model.mesh.block().nodes()[2] - 1;
@@ -300,7 +301,7 @@ fn a_twisted_cube_is_the_same_on_both_engines() {
     let mut scene = block([8.0, 8.0, 8.0], 2.0);
     scene.faces[4] = held(true, true, true);
     scene.faces[5] = held(true, true, true);
-    scene.faces[5].drive = Some(FaceDrive { displacement: DVec3::ZERO, rotation: 1.2, duration: 0.02 });
+    scene.faces[5].drive = Some(FaceDrive { displacement: DVec3::ZERO, rotation: 1.2, duration: 0.02, cycles: 0 });
     scene.solver.mass_damping = 200.0;
     let model = model(scene);
     let dt = 0.6 * wave_speed_bound(&model);

@@ -3,10 +3,11 @@
 use std::fmt::Write;
 use std::time::Instant;
 
+use crate::effects::{EffectSet, damage, fibres, plasticity, viscoelastic};
 use crate::error::Result;
-use crate::material::{describe_constants, describe_verdict};
+use crate::material::{describe_constants, describe_verdict, four_digits};
 use crate::mesh::Mesh;
-use crate::scene::{Face, Scene, Tool};
+use crate::scene::{Face, FaceDrive, RegionShape, Scene, TissueMaterial, Tool};
 use crate::solver::simulation::{EngineChoice, Simulation, tool_mach};
 use crate::solver::stable_dt::power_iteration;
 
@@ -44,19 +45,9 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         model.mesh.smallest_edge() * 1e3
     ));
     line(format!("material     {}: {}", scene.material.name, scene.material.source));
-    line(format!(
-        "             {}: {}, density {} kg/m^3",
-        law.isochoric.key(),
-        describe_constants(&law),
-        scene.material.density
-    ));
-    line(format!(
-        "             shear modulus {:.3} kPa, bulk modulus {:.1} kPa, E {:.2} kPa, nu {:.4}",
-        law.shear_modulus() / 1e3,
-        law.bulk_modulus / 1e3,
-        law.youngs_modulus() / 1e3,
-        law.poisson_ratio()
-    ));
+    for text in describe_material(&scene.material, &scene.effects) {
+        line(format!("             {text}"));
+    }
     let wave = |modulus: f64| (modulus / scene.material.density).sqrt();
     line(format!(
         "             wave speeds: P {:.2} m/s, S {:.2} m/s (at true density)",
@@ -64,19 +55,38 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         wave(law.shear_modulus())
     ));
     line(format!("stability    {}", describe_verdict(&law)));
+    for region in &scene.regions {
+        line(format!("region       {}: {}", region.name, describe_shape(&region.shape)));
+        line(format!("             {}: {}", region.material.name, region.material.source));
+        for text in describe_material(&region.material, &scene.effects) {
+            line(format!("             {text}"));
+        }
+        line(format!("             {}", describe_verdict(&region.material.law)));
+    }
     let held: Vec<String> = Face::ALL
         .into_iter()
         .map(|f| {
             let c = &scene.faces[f as usize];
             let fixed: String =
                 ["x", "y", "z"].into_iter().zip(c.fixed).filter(|(_, on)| *on).map(|(n, _)| n).collect();
-            let moved = if c.drive.is_some() { " moved" } else { "" };
+            let moved = match c.drive {
+                None => String::new(),
+                Some(FaceDrive { cycles: 0, duration, .. }) => format!(" moved over {duration:.3} s"),
+                Some(FaceDrive { cycles, duration, .. }) => {
+                    format!(" moved {cycles} times to and fro, {duration:.3} s each way")
+                }
+            };
             let loaded = if c.traction.is_some() { " loaded" } else { "" };
             let held = if fixed.is_empty() { "free".into() } else { format!("{fixed} held") };
             format!("{} {held}{moved}{loaded}", f.key())
         })
         .collect();
     line(format!("boundaries   {}", held.join(", ")));
+    for support in &scene.supports {
+        let names = ["x", "y", "z"].into_iter().zip(support.fixed);
+        let fixed: String = names.filter(|(_, on)| *on).map(|(name, _)| name).collect();
+        line(format!("support      {}: {fixed} held", support.set));
+    }
     if let Some(tool) = &scene.tool {
         line(format!("tool         {}", describe_tool(tool)));
     }
@@ -94,6 +104,7 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     line(format!("effects      {}", if scene.effects.keys().is_empty() { "none" } else { "only these run:" }));
     for effect in scene.effects.active() {
         line(format!("  {:<13}{}; cost: {}", effect.key, effect.summary, effect.cost));
+        line(format!("  {:<13}{}", "", describe_parameters(effect.key, &scene.effects)));
     }
     line(format!("mass scaling {}", model.mass_scaling()));
     line(format!(
@@ -128,6 +139,119 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     }
     line("ok".into());
     Ok(out.trim_end().into())
+}
+
+/// Law, moduli and what the material states of its own for effects that are on.
+fn describe_material(material: &TissueMaterial, effects: &EffectSet) -> Vec<String> {
+    let law = &material.law;
+    let mut lines = vec![
+        format!(
+            "{}: {}, density {} kg/m^3",
+            law.isochoric.key(),
+            describe_constants(law),
+            four_digits(material.density)
+        ),
+        format!(
+            "shear modulus {:.3} kPa, bulk modulus {:.1} kPa, E {:.2} kPa, nu {:.4}",
+            law.shear_modulus() / 1e3,
+            law.bulk_modulus / 1e3,
+            law.youngs_modulus() / 1e3,
+            law.poisson_ratio()
+        ),
+    ];
+    let own = [
+        material.plasticity.filter(|_| effects.plasticity.is_some()).map(|p| describe_plasticity(&p)),
+        material.fibres.filter(|_| effects.fibres.is_some()).map(|p| describe_fibres(&p)),
+        material.viscoelastic.as_ref().filter(|_| effects.viscoelastic.is_some()).map(describe_viscoelastic),
+        material.damage.filter(|_| effects.damage.is_some()).map(|p| describe_damage(&p)),
+        material.cutting.filter(|_| effects.puncture.is_some()).map(|c| {
+            format!("puncture {} N, cutting {} N", four_digits(c.puncture_force), four_digits(c.cutting_force))
+        }),
+    ];
+    let own: Vec<String> = own.into_iter().flatten().collect();
+    if !own.is_empty() {
+        lines.push(format!("its own: {}", own.join("; ")));
+    }
+    lines
+}
+
+/// A region's shape in mm.
+fn describe_shape(shape: &RegionShape) -> String {
+    let mm = |length: f64| four_digits(length * 1e3);
+    let point = |p: &glam::DVec3| format!("({}, {}, {})", mm(p.x), mm(p.y), mm(p.z));
+    match shape {
+        RegionShape::Layer { top, bottom } => format!("layer from {} to {} mm below the top", mm(*top), mm(*bottom)),
+        RegionShape::Box { low, high } => format!("box from {} to {} mm", point(low), point(high)),
+        RegionShape::Sphere { centre, radius } => format!("sphere of {} mm about {} mm", mm(*radius), point(centre)),
+        RegionShape::Cylinder { from, to, radius } => {
+            format!("cylinder of {} mm from {} to {} mm", mm(*radius), point(from), point(to))
+        }
+        RegionShape::MeshTag(tag) => format!("cells of the mesh called {tag}"),
+    }
+}
+
+fn describe_plasticity(p: &plasticity::Params) -> String {
+    format!("yield {} kPa, hardening {} kPa", four_digits(p.yield_stress / 1e3), four_digits(p.hardening / 1e3))
+}
+
+fn describe_fibres(p: &fibres::Params) -> String {
+    if p.k1 == 0.0 {
+        return "no fibres".into();
+    }
+    let [x, y, z] = p.direction.to_array().map(four_digits);
+    format!("fibres along ({x}, {y}, {z}), k1 {} kPa, k2 {}", four_digits(p.k1 / 1e3), four_digits(p.k2))
+}
+
+fn describe_viscoelastic(p: &viscoelastic::Params) -> String {
+    let terms: Vec<String> =
+        p.terms.iter().map(|t| format!("{} in {} s", four_digits(t.ratio), four_digits(t.time))).collect();
+    let left = 1.0 - p.terms.iter().map(|t| t.ratio).sum::<f64>();
+    format!("relaxes {}; {} is left", terms.join(", "), four_digits(left))
+}
+
+fn describe_damage(p: &damage::Params) -> String {
+    format!(
+        "damage from plastic strain {}, failure displacement {} mm, at most {}{}",
+        four_digits(p.onset),
+        four_digits(p.failure_displacement * 1e3),
+        four_digits(p.largest),
+        if p.deletion { ", then deleted" } else { "" }
+    )
+}
+
+/// The scene's parameters of one effect.
+fn describe_parameters(key: &str, effects: &EffectSet) -> String {
+    let text = match key {
+        "mass_scaling" => effects.mass_scaling.map(|p| format!("factor {}", four_digits(p.factor))),
+        "gravity" => effects.gravity.map(|p| format!("acceleration {} m/s^2", p.acceleration)),
+        "plasticity" => effects.plasticity.map(|p| describe_plasticity(&p)),
+        "fibres" => effects.fibres.map(|p| describe_fibres(&p)),
+        "viscoelastic" => effects.viscoelastic.as_ref().map(describe_viscoelastic),
+        "damage" => effects.damage.map(|p| describe_damage(&p)),
+        "puncture" => effects.puncture.map(|p| {
+            format!(
+                "puncture {} N, cutting {} N, transition {} mm, tip stiffness {} N/mm, softened radius {} mm, ring {} mm",
+                four_digits(p.puncture_force),
+                four_digits(p.cutting_force),
+                four_digits(p.transition_length * 1e3),
+                four_digits(p.tip_stiffness * 1e-3),
+                four_digits(p.softened_radius * 1e3),
+                four_digits(p.ring_radius * 1e3)
+            )
+        }),
+        "indentation" => effects.indentation.map(|p| {
+            format!(
+                "contact stiffness factor {}, contact damping {}",
+                four_digits(p.stiffness_factor),
+                four_digits(p.contact_damping)
+            )
+        }),
+        "friction" => effects.friction.map(|p| {
+            format!("coefficient {}, fade {} mm", four_digits(p.coefficient), four_digits(p.fade_length * 1e3))
+        }),
+        _ => None,
+    };
+    text.unwrap_or_default()
 }
 
 fn describe_tool(tool: &Tool) -> String {

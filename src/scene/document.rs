@@ -144,6 +144,12 @@ impl<'a> Problems<'a> {
         self.found.push((span.start, text));
     }
 
+    /// Adds the rendered problems of another file that the value at `path` names.
+    pub fn append(&mut self, path: &str, text: String) {
+        let start = self.document.span(path).start;
+        self.found.push((start, text));
+    }
+
     /// `Err` with all problems, in the order of the file, where there are any.
     pub fn check(&mut self) -> Result<(), String> {
         if self.found.is_empty() {

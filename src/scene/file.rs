@@ -18,9 +18,15 @@ pub struct SceneFile {
     pub effects: Vec<String>,
     pub tissue: TissueTable,
     pub material: MaterialTable,
-    /// What holds, moves or loads the six faces; default: sides and bottom fixed, top free.
+    /// Parts of another material, at most 15; where two overlap, the later one counts.
+    #[serde(default)]
+    pub region: Vec<RegionTable>,
+    /// What holds, moves or loads the six faces; default: sides and bottom fixed, top free; all free for a mesh.
     #[serde(default)]
     pub boundaries: BoundariesTable,
+    /// Node sets of a mesh that are held.
+    #[serde(default)]
+    pub support: Vec<SupportTable>,
     /// A rigid solid needle with a conical tip. At most one tool per scene.
     pub needle: Option<NeedleTable>,
     /// A rigid sphere. At most one tool per scene.
@@ -33,53 +39,208 @@ pub struct SceneFile {
     pub friction: Option<FrictionTable>,
     pub indentation: Option<IndentationTable>,
     pub gravity: Option<GravityTable>,
+    pub plasticity: Option<PlasticityTable>,
+    pub fibres: Option<FibresTable>,
+    pub viscoelastic: Option<ViscoelasticTable>,
+    pub damage: Option<DamageTable>,
     #[serde(default)]
     pub solver: SolverTable,
     #[serde(default)]
     pub outputs: OutputsTable,
 }
 
-/// The tissue block. It spans -size/2..size/2 in x and y and -size..0 in z; the top face is z = 0.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
+/// The tissue: a block (`size_mm`, `cell_size_mm`) or a mesh of tetrahedra (`mesh`, `unit`). The block spans
+/// -size/2..size/2 in x and y and -size..0 in z; its top face is z = 0. A mesh keeps its own coordinates.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TissueTable {
     /// Edge lengths of the block in x, y, z [mm].
-    pub size_mm: [f64; 3],
+    pub size_mm: Option<[f64; 3]>,
     /// Cell edge around the planned path [mm].
-    pub cell_size_mm: f64,
+    pub cell_size_mm: Option<f64>,
     /// Half width of the fine zone around the path [mm]; default 2.5.
     pub fine_radius_mm: Option<f64>,
     /// Wanted ratio of neighbouring cell edges outside the fine zone, 1 to 2; default 1.25.
     pub growth: Option<f64>,
     /// Where the entry point lies between two grid lines in x and y, as a fraction of the cell; default [0.23, 0.31].
     pub axis_offset_cells: Option<[f64; 2]>,
+    /// A file of tetrahedra (.msh, .vtk, .vtu, .inp) instead of the block; relative to the scene file.
+    pub mesh: Option<String>,
+    /// Unit of length in the mesh file: m, cm, mm, um or inch.
+    pub unit: Option<String>,
+    /// Accept a mesh smaller than 1 mm or larger than 1 m, which is otherwise taken for a wrong unit.
+    pub accept_size: Option<bool>,
 }
 
-/// The tissue law: a preset, or Mooney-Rivlin constants with one volumetric key, or E, nu and the share of c10.
+/// Names of the elastic laws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LawWord {
+    NeoHookean,
+    MooneyRivlin,
+    Yeoh,
+    Ogden,
+    Demiray,
+}
+
+/// A tissue material: a preset, or the constants of a law with one volumetric key, or E and nu with a share of c10.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialTable {
     /// Name in the material library.
     pub preset: Option<String>,
-    /// First Mooney-Rivlin constant c10 [kPa].
+    /// A library of your own, in the format of assets/materials.toml; relative to the scene file.
+    pub library: Option<String>,
+    /// Elastic law; default "mooney_rivlin".
+    pub law: Option<LawWord>,
+    /// First constant c10 of neo_hookean, mooney_rivlin and yeoh [kPa].
     pub c10_kpa: Option<f64>,
-    /// Second Mooney-Rivlin constant c01 [kPa].
+    /// Second constant c01 of mooney_rivlin [kPa].
     pub c01_kpa: Option<f64>,
+    /// Second constant c20 of yeoh [kPa].
+    pub c20_kpa: Option<f64>,
+    /// Third constant c30 of yeoh [kPa].
+    pub c30_kpa: Option<f64>,
+    /// Shear modulus at rest mu of ogden and demiray [kPa].
+    pub mu_kpa: Option<f64>,
+    /// Exponent alpha of ogden.
+    pub alpha: Option<f64>,
+    /// Exponent b of demiray.
+    pub b: Option<f64>,
     /// Bulk modulus K = 2/D [kPa].
     pub bulk_modulus_kpa: Option<f64>,
     /// D = 2/K [1/MPa].
     pub d_per_mpa: Option<f64>,
     /// Poisson's ratio at rest; beside K or D it is only compared.
     pub poisson_ratio: Option<f64>,
-    /// Young's modulus at rest [kPa]; beside c10 and c01 it is only compared.
+    /// Young's modulus at rest [kPa]; beside the constants of a law it is only compared.
     pub youngs_modulus_kpa: Option<f64>,
-    /// Share of the shear modulus that goes to c10 when E and nu are given, 0 to 1; default 0.7.
+    /// Share of the shear modulus that goes to c10 when E and nu are given, 0 to 1; default 0.7; mooney_rivlin only.
     pub c10_share: Option<f64>,
     /// Density [kg/m^3]; default 1060, or the preset's.
     pub density_kg_m3: Option<f64>,
-    /// Accept constants of which one is negative while their sum is positive (stable up to a stretch limit).
+    /// Accept a law that is stable only within a stretch limit.
     #[serde(default)]
     pub allow_limited: bool,
+    /// Tip force at which this material gives way [N]; default: that of [puncture].
+    pub puncture_force_n: Option<f64>,
+    /// Tip force of steady cutting in this material [N]; default: that of [puncture].
+    pub cutting_force_n: Option<f64>,
+    /// Cutting energy per area G_c instead of the cutting force, which is G_c times the needle diameter [J/m^2].
+    pub cutting_energy_j_m2: Option<f64>,
+}
+
+/// A part of the tissue with a material of its own: exactly one shape, in the coordinates of the scene.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RegionTable {
+    /// Name for messages and outputs, e.g. "skin".
+    pub name: String,
+    /// Depths of its top and bottom below z = 0 [mm].
+    pub layer_mm: Option<[f64; 2]>,
+    /// An axis-parallel box [mm].
+    pub box_mm: Option<BoxTable>,
+    /// A sphere [mm].
+    pub sphere_mm: Option<SphereShapeTable>,
+    /// A cylinder between two points of its axis [mm].
+    pub cylinder_mm: Option<CylinderTable>,
+    /// Name of a region of the mesh file.
+    pub mesh_tag: Option<String>,
+    pub material: MaterialTable,
+    pub plasticity: Option<PlasticityTable>,
+    pub fibres: Option<FibresTable>,
+    pub viscoelastic: Option<ViscoelasticTable>,
+    pub damage: Option<DamageTable>,
+    /// As in `material`.
+    pub puncture_force_n: Option<f64>,
+    /// As in `material`.
+    pub cutting_force_n: Option<f64>,
+    /// As in `material`.
+    pub cutting_energy_j_m2: Option<f64>,
+}
+
+/// Lowest and highest corner.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoxTable {
+    pub low: [f64; 3],
+    pub high: [f64; 3],
+}
+
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SphereShapeTable {
+    pub centre: [f64; 3],
+    pub radius: f64,
+}
+
+/// Both ends of the axis and the radius.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderTable {
+    pub from: [f64; 3],
+    pub to: [f64; 3],
+    pub radius: f64,
+}
+
+/// A node set of the mesh that is held.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SupportTable {
+    /// Name of the set in the mesh file.
+    pub set: String,
+    /// Components held at zero.
+    pub fixed: Vec<Axis>,
+}
+
+/// A library of tissue materials, e.g. assets/materials.toml.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LibraryFile {
+    #[serde(default)]
+    pub material: Vec<LibraryMaterial>,
+}
+
+/// One material of a library: constants as in [`MaterialTable`], and parameters of its own for effects.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LibraryMaterial {
+    pub name: String,
+    /// One line: what it is.
+    pub summary: Option<String>,
+    /// Where the constants come from.
+    pub source: String,
+    /// Where they hold.
+    pub range: Option<String>,
+    pub law: Option<LawWord>,
+    pub c10_kpa: Option<f64>,
+    pub c01_kpa: Option<f64>,
+    pub c20_kpa: Option<f64>,
+    pub c30_kpa: Option<f64>,
+    pub mu_kpa: Option<f64>,
+    pub alpha: Option<f64>,
+    pub b: Option<f64>,
+    pub bulk_modulus_kpa: Option<f64>,
+    pub d_per_mpa: Option<f64>,
+    pub poisson_ratio: Option<f64>,
+    pub youngs_modulus_kpa: Option<f64>,
+    pub c10_share: Option<f64>,
+    pub density_kg_m3: Option<f64>,
+    pub plasticity: Option<PlasticityTable>,
+    pub fibres: Option<FibresTable>,
+    pub viscoelastic: Option<ViscoelasticTable>,
+    pub damage: Option<DamageTable>,
+    pub cutting: Option<CuttingTable>,
+}
+
+/// Tip forces of a material; `cutting_force_n` or `cutting_energy_j_m2`. What is missing keeps the ratio of the two
+/// forces in the scene's table [puncture].
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CuttingTable {
+    pub puncture_force_n: Option<f64>,
+    pub cutting_force_n: Option<f64>,
+    pub cutting_energy_j_m2: Option<f64>,
 }
 
 /// Conditions on the six faces.
@@ -137,6 +298,10 @@ pub struct FaceTable {
     pub rotation_deg: Option<f64>,
     /// Time over which displacement and rotation grow linearly [s].
     pub duration_s: Option<f64>,
+    /// Speed of the displacement instead of `duration_s` [mm/min].
+    pub speed_mm_min: Option<f64>,
+    /// Cycles from zero to the full motion and back, each half lasting as long as the ramp; default: ramp and hold.
+    pub cycles: Option<u32>,
     /// Dead load per rest area [kPa].
     pub traction_kpa: Option<[f64; 3]>,
     /// Time over which the load grows linearly [s]; default 0: at once.
@@ -294,6 +459,54 @@ pub struct IndentationTable {
 pub struct GravityTable {
     /// Acceleration of free fall [m/s^2]; default [0, 0, -9.81].
     pub acceleration_m_s2: Option<[f64; 3]>,
+}
+
+/// Parameters of the effect `plasticity`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlasticityTable {
+    /// Yield stress, a Kirchhoff stress [kPa]; default 23.4.
+    pub yield_stress_kpa: Option<f64>,
+    /// Hardening modulus: slope of the Kirchhoff stress over the plastic strain [kPa]; default 314.
+    pub hardening_kpa: Option<f64>,
+}
+
+/// Parameters of the effect `fibres`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FibresTable {
+    /// Direction of the fibres at rest, any length; default [1, 0, 0].
+    pub direction: Option<[f64; 3]>,
+    /// Stiffness k1 [kPa]; default 4.26; 0: no fibres in this material.
+    pub k1_kpa: Option<f64>,
+    /// Exponent k2; default 0.3.
+    pub k2: Option<f64>,
+}
+
+/// Parameters of the effect `viscoelastic`: a Prony series of 1 to 8 terms.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ViscoelasticTable {
+    /// Shares of the isochoric stress that relax, each above 0, sum below 1; default [0.25, 0.15, 0.10].
+    pub g: Option<Vec<f64>>,
+    /// Relaxation times, one per share [s]; default [0.5, 5, 60].
+    pub tau_s: Option<Vec<f64>>,
+}
+
+/// Parameters of the effect `damage`, which needs `plasticity`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DamageTable {
+    /// Equivalent plastic strain at which damage begins; default 0.0625.
+    pub onset: Option<f64>,
+    /// Plastic displacement at which nothing would be left [mm]; default 1.
+    pub failure_displacement_mm: Option<f64>,
+    /// Energy per area from onset to failure, instead of the displacement [J/m^2].
+    pub fracture_energy_j_m2: Option<f64>,
+    /// Largest damage, below 1; default 0.95.
+    pub d_max: Option<f64>,
+    /// Delete a cell that has reached d_max; default false.
+    pub deletion: Option<bool>,
 }
 
 /// Numbers of the time integration.

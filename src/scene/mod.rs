@@ -230,7 +230,7 @@ pub struct FaceCondition {
 }
 
 /// Prescribed motion of a face: a translation and a rotation about the outward axis through the face centre, both
-/// growing linearly over `duration` and then held.
+/// growing linearly over `duration`, then held or going to and fro.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaceDrive {
     /// Final displacement [m].
@@ -239,6 +239,26 @@ pub struct FaceDrive {
     pub rotation: f64,
     /// Time over which both grow [s].
     pub duration: f64,
+    /// Triangles from zero to the full motion and back, each of twice the duration; 0: ramp and hold.
+    pub cycles: u32,
+}
+
+impl FaceDrive {
+    /// Part of the full motion at the time `t` [s], 0..1.
+    pub fn part(&self, t: f64) -> f64 {
+        if self.duration <= 0.0 {
+            return 1.0;
+        }
+        let halves = t / self.duration;
+        if self.cycles == 0 {
+            return halves.clamp(0.0, 1.0);
+        }
+        if halves >= 2.0 * f64::from(self.cycles) {
+            return 0.0;
+        }
+        let within = halves.max(0.0) % 2.0;
+        within.min(2.0 - within)
+    }
 }
 
 /// A rigid tool.

@@ -1,9 +1,12 @@
 //! The library of tissue presets, needle gauges and needle materials, built into the program.
 
+use std::path::Path;
 use std::sync::LazyLock;
 
 use serde::Deserialize;
 
+use super::convert::library;
+use super::file::{CuttingTable, DamageTable, FibresTable, PlasticityTable, ViscoelasticTable};
 use crate::material::ElasticLaw;
 
 /// A tissue material with its origin and range of validity.
@@ -15,10 +18,17 @@ pub struct TissuePreset {
     /// Where the constants come from.
     pub source: String,
     /// Where they hold.
-    pub range: String,
+    pub range: Option<String>,
     pub law: ElasticLaw,
     /// Density [kg/m^3].
     pub density: f64,
+    /// Parameters of its own for effects, as written: what a table leaves out comes from the scene.
+    pub plasticity: Option<PlasticityTable>,
+    pub fibres: Option<FibresTable>,
+    pub viscoelastic: Option<ViscoelasticTable>,
+    pub damage: Option<DamageTable>,
+    /// Tip forces as written: a cutting energy becomes a force with the needle of the scene.
+    pub cutting: Option<CuttingTable>,
 }
 
 /// A needle size.
@@ -91,45 +101,8 @@ pub fn law_from_youngs_modulus(youngs_modulus: f64, poisson_ratio: f64, share: f
 static NEEDLES: LazyLock<(Vec<NeedlePreset>, Vec<NeedleMaterial>)> = LazyLock::new(read_needles);
 
 fn read_tissues() -> Vec<TissuePreset> {
-    #[derive(Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct Library {
-        material: Vec<Entry>,
-    }
-    #[derive(Deserialize)]
-    struct Entry {
-        name: String,
-        summary: String,
-        source: String,
-        range: String,
-        density_kg_m3: f64,
-        #[serde(flatten)]
-        constants: Constants,
-    }
-    #[derive(Deserialize)]
-    #[serde(untagged, deny_unknown_fields)]
-    enum Constants {
-        MooneyRivlin { c10_kpa: f64, c01_kpa: f64, d_per_mpa: f64 },
-        Moduli { youngs_modulus_kpa: f64, poisson_ratio: f64, c10_share: f64 },
-    }
-    let library: Library = toml::from_str(include_str!("../../assets/materials.toml"))
-        .expect("assets/materials.toml is part of the program and tested");
-    let preset = |entry: Entry| TissuePreset {
-        law: match entry.constants {
-            Constants::MooneyRivlin { c10_kpa, c01_kpa, d_per_mpa } => {
-                ElasticLaw::mooney_rivlin(c10_kpa * 1e3, c01_kpa * 1e3, 2.0e6 / d_per_mpa)
-            }
-            Constants::Moduli { youngs_modulus_kpa, poisson_ratio, c10_share } => {
-                law_from_youngs_modulus(youngs_modulus_kpa * 1e3, poisson_ratio, c10_share)
-            }
-        },
-        name: entry.name,
-        summary: entry.summary,
-        source: entry.source,
-        range: entry.range,
-        density: entry.density_kg_m3,
-    };
-    library.material.into_iter().map(preset).collect()
+    library::read(Path::new("assets/materials.toml"), include_str!("../../assets/materials.toml"))
+        .unwrap_or_else(|text| panic!("assets/materials.toml is part of the program and tested:\n{text}"))
 }
 
 fn read_needles() -> (Vec<NeedlePreset>, Vec<NeedleMaterial>) {
@@ -185,7 +158,7 @@ mod tests {
     fn every_tissue_preset_is_stable_and_has_an_origin() {
         for preset in tissues() {
             assert_eq!(preset.law.verdict(), Verdict::Stable, "{}", preset.name);
-            assert!(!preset.source.is_empty() && !preset.range.is_empty() && !preset.summary.is_empty());
+            assert!(!preset.source.is_empty() && preset.range.is_some() && !preset.summary.is_empty());
         }
     }
 

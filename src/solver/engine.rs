@@ -51,7 +51,7 @@ impl StepInput {
         let mut drives = [DriveStep::default(); 6];
         for face in Face::ALL {
             let Some(drive) = model.faces()[face as usize].drive else { continue };
-            let (s0, s1) = (ramp(time, drive.duration), ramp(time + dt, drive.duration));
+            let (s0, s1) = (drive.part(time), drive.part(time + dt));
             let (t0, t1) = (drive.rotation * s0, drive.rotation * s1);
             drives[face as usize] = DriveStep {
                 translation: drive.displacement * (s1 - s0),

@@ -20,7 +20,8 @@ fn pressed_block(duration: f64, damping: f64) -> Scene {
     let mut scene = block([4.0, 4.0, 4.0], 1.0);
     scene.faces[4] = held(true, true, true);
     scene.faces[5] = held(true, true, true);
-    scene.faces[5].drive = Some(FaceDrive { displacement: DVec3::new(0.1e-3, 0.0, -0.4e-3), rotation: 0.0, duration });
+    scene.faces[5].drive =
+        Some(FaceDrive { displacement: DVec3::new(0.1e-3, 0.0, -0.4e-3), rotation: 0.0, duration, cycles: 0 });
     scene.solver.mass_damping = damping;
     scene
 }

@@ -2,7 +2,7 @@
 
 use super::super::file::*;
 use super::super::{FaceCondition, Motion, TissueMaterial, Tool};
-use super::{Check, MM, Within};
+use super::{Check, MM, Within, parameters};
 use crate::effects::{self, EFFECTS, EffectSet};
 
 impl Check<'_> {
@@ -53,6 +53,21 @@ impl Check<'_> {
                 "add [needle], [sphere] or [flat_punch], or remove the effect",
             );
         }
+        if listed("damage") && !listed("plasticity") {
+            self.problems.report(
+                &place("damage"),
+                "effect `damage` needs `plasticity`: it grows with the plastic displacement",
+                "nothing drives the damage",
+                "add \"plasticity\" to the list `effects`, or remove \"damage\"",
+            );
+        }
+        if file.tissue.mesh.is_some() {
+            for key in ["puncture", "indentation"] {
+                if listed(key) {
+                    self.needs_block(&place(key), &format!("effect `{key}`"));
+                }
+            }
+        }
         if is_needle && !listed("puncture") {
             self.notices.push("The needle has no effect on the tissue: effect `puncture` is not listed.".into());
         }
@@ -64,9 +79,28 @@ impl Check<'_> {
             ("friction", file.friction.is_some()),
             ("indentation", file.indentation.is_some()),
             ("gravity", file.gravity.is_some()),
+            ("plasticity", file.plasticity.is_some()),
+            ("fibres", file.fibres.is_some()),
+            ("viscoelastic", file.viscoelastic.is_some()),
+            ("damage", file.damage.is_some()),
         ] {
             if present && !listed(key) {
                 self.notices.push(format!("Table [{key}] has no effect: `{key}` is not in the list `effects`."));
+            }
+        }
+        for region in &file.region {
+            for (key, present) in [
+                ("plasticity", region.plasticity.is_some()),
+                ("fibres", region.fibres.is_some()),
+                ("viscoelastic", region.viscoelastic.is_some()),
+                ("damage", region.damage.is_some()),
+            ] {
+                if present && !listed(key) {
+                    self.notices.push(format!(
+                        "Table [region.{key}] of `{}` has no effect: `{key}` is not in the list `effects`.",
+                        region.name
+                    ));
+                }
             }
         }
         if file.solver.mass_scaling.is_some() && !listed("mass_scaling") {
@@ -87,13 +121,20 @@ impl Check<'_> {
             _ if listed("mass_scaling") => self.automatic_mass_scaling(motion, faces, material),
             _ => 1.0,
         };
+        self.own_tables("", file.own_tables());
+        let plasticity = parameters::plasticity_over(&file.plasticity.clone().unwrap_or_default(), Default::default());
         EffectSet {
             mass_scaling: listed("mass_scaling").then_some(effects::mass_scaling::Params { factor }),
             gravity: listed("gravity").then_some(gravity),
-            plasticity: listed("plasticity").then(Default::default),
-            fibres: listed("fibres").then(Default::default),
-            viscoelastic: listed("viscoelastic").then(Default::default),
-            damage: listed("damage").then(Default::default),
+            plasticity: listed("plasticity").then_some(plasticity),
+            fibres: listed("fibres")
+                .then(|| parameters::fibres_over(&file.fibres.clone().unwrap_or_default(), Default::default())),
+            viscoelastic: listed("viscoelastic").then(|| {
+                parameters::viscoelastic_over(&file.viscoelastic.clone().unwrap_or_default(), Default::default())
+            }),
+            damage: listed("damage").then(|| {
+                parameters::damage_over(&file.damage.clone().unwrap_or_default(), Default::default(), plasticity)
+            }),
             puncture: listed("puncture").then_some(puncture),
             indentation: listed("indentation").then_some(indentation),
             friction: listed("friction").then_some(friction),

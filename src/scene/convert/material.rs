@@ -1,9 +1,12 @@
-//! The tissue law of a scene: its forms, its stability and what is stated twice.
+//! A tissue material of a scene or a library: its forms, its stability and what is stated twice.
 
-use super::super::file::MaterialTable;
+use super::super::file::{LawWord, MaterialTable};
+use super::super::presets::TissuePreset;
 use super::super::{TissueMaterial, presets};
-use super::{Check, KPA, MM, Within};
-use crate::material::{ElasticLaw, Isochoric, Verdict, describe_verdict, four_digits, ripple_growth_time};
+use super::{Check, KPA, MM, Within, library};
+use crate::material::{
+    Demiray, ElasticLaw, Isochoric, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict, four_digits, ripple_growth_time,
+};
 
 /// Young's modulus above which a material is no soft tissue [Pa].
 const LARGEST_TISSUE_MODULUS: f64 = 10.0e6;
@@ -12,157 +15,368 @@ const TISSUE_DENSITY: f64 = 1060.0;
 /// Share of the shear modulus that goes to c10 unless the scene says otherwise.
 const C10_SHARE: f64 = 0.7;
 
+impl LawWord {
+    /// Name in the scene file.
+    fn key(self) -> &'static str {
+        match self {
+            LawWord::NeoHookean => "neo_hookean",
+            LawWord::MooneyRivlin => "mooney_rivlin",
+            LawWord::Yeoh => "yeoh",
+            LawWord::Ogden => "ogden",
+            LawWord::Demiray => "demiray",
+        }
+    }
+
+    /// Keys of its constants; all are needed.
+    fn constants(self) -> &'static [&'static str] {
+        match self {
+            LawWord::NeoHookean => &["c10_kpa"],
+            LawWord::MooneyRivlin => &["c10_kpa", "c01_kpa"],
+            LawWord::Yeoh => &["c10_kpa", "c20_kpa", "c30_kpa"],
+            LawWord::Ogden => &["mu_kpa", "alpha"],
+            LawWord::Demiray => &["mu_kpa", "b"],
+        }
+    }
+
+    /// What makes it stable, for a way out.
+    fn stable_constants(self) -> &'static str {
+        match self {
+            LawWord::NeoHookean => "write c10_kpa > 0",
+            LawWord::MooneyRivlin => "write c10_kpa and c01_kpa that are >= 0 with a sum > 0",
+            LawWord::Yeoh => {
+                "write c10_kpa > 0; c20_kpa and c30_kpa >= 0 are stable everywhere, negative ones need allow_limited = true"
+            }
+            LawWord::Ogden => "write mu_kpa > 0 and an alpha other than 0; |alpha| >= 1 is stable everywhere",
+            LawWord::Demiray => "write mu_kpa > 0 and b > 0",
+        }
+    }
+
+    const ALL: [LawWord; 5] =
+        [LawWord::NeoHookean, LawWord::MooneyRivlin, LawWord::Yeoh, LawWord::Ogden, LawWord::Demiray];
+
+    fn of(law: &ElasticLaw) -> LawWord {
+        match law.isochoric {
+            Isochoric::NeoHookean(_) => LawWord::NeoHookean,
+            Isochoric::MooneyRivlin(_) => LawWord::MooneyRivlin,
+            Isochoric::Yeoh(_) => LawWord::Yeoh,
+            Isochoric::Ogden(_) => LawWord::Ogden,
+            Isochoric::Demiray(_) => LawWord::Demiray,
+        }
+    }
+}
+
+/// The constants of all laws with their keys, as written.
+fn written_constants(table: &MaterialTable) -> [(&'static str, Option<f64>); 7] {
+    [
+        ("c10_kpa", table.c10_kpa),
+        ("c01_kpa", table.c01_kpa),
+        ("c20_kpa", table.c20_kpa),
+        ("c30_kpa", table.c30_kpa),
+        ("mu_kpa", table.mu_kpa),
+        ("alpha", table.alpha),
+        ("b", table.b),
+    ]
+}
+
+/// Bulk modulus that is written directly [Pa].
+fn direct_bulk(table: &MaterialTable) -> Option<f64> {
+    table.bulk_modulus_kpa.map(|k| k * KPA).or(table.d_per_mpa.map(|d| 2.0e6 / d))
+}
+
+/// Bulk modulus of a law with the shear modulus `shear` [Pa]; a Poisson's ratio beside K or D is only compared.
+fn bulk_modulus(table: &MaterialTable, shear: f64) -> Option<f64> {
+    direct_bulk(table).or(table.poisson_ratio.map(|nu| presets::bulk_modulus_from_poisson(shear, nu)))
+}
+
 impl Check<'_> {
-    /// The tissue law and its verdict. `cell_size` [m] names the ripple in the refusal.
-    pub(super) fn material(&mut self, table: &MaterialTable, cell_size: f64) -> TissueMaterial {
-        let density = self.optional(
-            "material.density_kg_m3",
-            table.density_kg_m3,
-            1.0,
-            TISSUE_DENSITY,
-            Within::Between(100.0, 5000.0),
-        );
+    /// The material at the path `at` and the preset that it comes from. `cell_size` [m] names the ripple in the refusal.
+    pub(super) fn material(
+        &mut self,
+        at: &str,
+        table: &MaterialTable,
+        cell_size: f64,
+    ) -> (TissueMaterial, Option<TissuePreset>) {
+        let density = self.density(at, table.density_kg_m3);
         // Stands in after a reported problem, so that the other tables are still checked; it never leaves `scene`.
         let placeholder = TissueMaterial::new("refused", "", ElasticLaw::mooney_rivlin(1.0, 1.0, 1.0), density);
-        // Ranges first: signs of c10 and c01 are the verdict's business.
-        for (key, value) in [("c10_kpa", table.c10_kpa), ("c01_kpa", table.c01_kpa)] {
-            if let Some(value) = value {
-                self.number(&format!("material.{key}"), value, Within::Between(-1e6, 1e6));
+        self.material_ranges(at, table);
+        let Some(name) = &table.preset else {
+            if table.library.is_some() {
+                self.notices.push(format!("`{at}.library` has no effect without a preset."));
             }
+            let Some(law) = self.law(at, table) else { return (placeholder, None) };
+            let constants: Vec<&str> = written_constants(table).iter().filter_map(|(k, v)| v.map(|_| *k)).collect();
+            let origin =
+                if constants.is_empty() { "E and nu".into() } else { constants.join(", ").replace("_kpa", "") };
+            let material = TissueMaterial::new("constants", format!("{origin} of the scene file"), law, density);
+            self.verdict(at, table, &material, cell_size);
+            return (material, None);
+        };
+        let constant = written_constants(table).iter().find_map(|(key, value)| value.map(|_| *key));
+        let other = [
+            ("law", table.law.is_some()),
+            ("youngs_modulus_kpa", table.youngs_modulus_kpa.is_some()),
+            ("c10_share", table.c10_share.is_some()),
+        ];
+        if let Some(key) = constant.or(other.iter().find_map(|(key, on)| on.then_some(*key))) {
+            self.problems.report(
+                &format!("{at}.preset"),
+                "a preset and constants of the law exclude each other",
+                format!("preset beside {key}"),
+                "keep `preset` (with density_kg_m3 or one volumetric key at most), or the constants",
+            );
+            return (placeholder, None);
+        }
+        let Some(preset) = self.preset(at, name, table.library.as_deref()) else { return (placeholder, None) };
+        let mut law = preset.law;
+        if let Some(bulk) = bulk_modulus(table, law.shear_modulus()) {
+            self.notices.push(format!(
+                "The bulk modulus {} kPa of preset `{name}` is replaced by {} kPa.",
+                four_digits(law.bulk_modulus / KPA),
+                four_digits(bulk / KPA)
+            ));
+            law.bulk_modulus = bulk;
+        }
+        let range = preset.range.as_ref().map(|range| format!("; valid: {range}")).unwrap_or_default();
+        let density = if table.density_kg_m3.is_some() { density } else { preset.density };
+        let material = TissueMaterial::new(name, format!("{}{range}", preset.source), law, density);
+        self.verdict(at, table, &material, cell_size);
+        (material, Some(preset))
+    }
+
+    /// The preset called `name`, from the built-in library or from the file `library`.
+    fn preset(&mut self, at: &str, name: &str, library: Option<&str>) -> Option<TissuePreset> {
+        let Some(library) = library else {
+            if let Some(preset) = presets::tissue(name) {
+                return Some(preset.clone());
+            }
+            let names: Vec<&str> = presets::tissues().iter().map(|p| p.name.as_str()).collect();
+            self.unknown_name(&format!("{at}.preset"), "tissue preset", name, &names);
+            return None;
+        };
+        let path = self.folder.join(library);
+        let place = format!("{at}.library");
+        let source = match std::fs::read_to_string(&path) {
+            Ok(source) => source,
+            Err(error) => {
+                self.problems.report(
+                    &place,
+                    format!("cannot read the material library {}: {error}", path.display()),
+                    "not readable",
+                    "write its path relative to the scene file, e.g. library = \"my_materials.toml\", \
+                     or remove the key to use the built-in presets",
+                );
+                return None;
+            }
+        };
+        match library::read(&path, &source) {
+            Err(text) => {
+                self.problems.append(&place, text);
+                None
+            }
+            Ok(presets) => {
+                let found = presets.iter().find(|preset| preset.name == name);
+                if found.is_none() {
+                    let names: Vec<&str> = presets.iter().map(|p| p.name.as_str()).collect();
+                    let what = format!("material in {}", path.display());
+                    self.unknown_name(&format!("{at}.preset"), &what, name, &names);
+                }
+                found.cloned()
+            }
+        }
+    }
+
+    /// Density [kg/m^3].
+    pub(super) fn density(&mut self, at: &str, written: Option<f64>) -> f64 {
+        self.optional(&format!("{at}.density_kg_m3"), written, 1.0, TISSUE_DENSITY, Within::Between(100.0, 5000.0))
+    }
+
+    /// Ranges of all numbers of the law; the signs of its constants are the verdict's business.
+    pub(super) fn material_ranges(&mut self, at: &str, table: &MaterialTable) {
+        let path = |key: &str| format!("{at}.{key}");
+        for (key, value) in written_constants(table) {
+            let Some(value) = value else { continue };
+            let within = match key {
+                "alpha" => Within::Between(-50.0, 50.0),
+                "b" => Within::Between(-100.0, 100.0),
+                _ => Within::Between(-1e6, 1e6),
+            };
+            self.number(&path(key), value, within);
         }
         let largest = LARGEST_TISSUE_MODULUS / KPA;
         if let Some(value) = table.youngs_modulus_kpa {
             if value > largest {
-                self.refuse_stiff_tissue("material.youngs_modulus_kpa", value * KPA);
+                self.refuse_stiff_tissue(&path("youngs_modulus_kpa"), value * KPA);
             } else {
-                self.number("material.youngs_modulus_kpa", value, Within::Positive(largest));
+                self.number(&path("youngs_modulus_kpa"), value, Within::Positive(largest));
             }
         }
         if let Some(value) = table.bulk_modulus_kpa {
-            self.number("material.bulk_modulus_kpa", value, Within::Positive(1e7));
+            self.number(&path("bulk_modulus_kpa"), value, Within::Positive(1e7));
         }
         if let Some(value) = table.d_per_mpa {
-            self.number("material.d_per_mpa", value, Within::Between(2e-4, 2e6));
+            self.number(&path("d_per_mpa"), value, Within::Between(2e-4, 2e6));
         }
         if let Some(value) = table.poisson_ratio {
             if value >= 0.5 {
                 self.problems.report(
-                    "material.poisson_ratio",
+                    &path("poisson_ratio"),
                     format!("Poisson's ratio {value} means incompressible or worse"),
                     "must be below 0.5",
                     "write 0.45 to 0.495; explicit time steps shrink without limit towards 0.5",
                 );
             } else {
-                self.number("material.poisson_ratio", value, Within::Between(0.0, 0.4999));
+                self.number(&path("poisson_ratio"), value, Within::Between(0.0, 0.4999));
             }
         }
         if let Some(value) = table.c10_share {
-            self.number("material.c10_share", value, Within::Between(0.0, 1.0));
+            self.number(&path("c10_share"), value, Within::Between(0.0, 1.0));
         }
         if table.bulk_modulus_kpa.is_some() && table.d_per_mpa.is_some() {
             self.problems.report(
-                "material.d_per_mpa",
+                &path("d_per_mpa"),
                 "`bulk_modulus_kpa` and `d_per_mpa` say the same thing (K = 2/D)",
                 "second of two",
                 "keep one of them",
             );
         }
-        // Bulk modulus written directly [Pa]; a Poisson's ratio beside it is only compared.
-        let direct_bulk = table.bulk_modulus_kpa.map(|k| k * KPA).or(table.d_per_mpa.map(|d| 2.0e6 / d));
-        let bulk = |shear: f64| match (direct_bulk, table.poisson_ratio) {
-            (Some(bulk), _) => Some(bulk),
-            (None, Some(nu)) => Some(presets::bulk_modulus_from_poisson(shear, nu)),
-            (None, None) => None,
+    }
+
+    /// The law from its constants or from E and nu; `None` after a reported problem.
+    pub(super) fn law(&mut self, at: &str, table: &MaterialTable) -> Option<ElasticLaw> {
+        let word = table.law.unwrap_or(LawWord::MooneyRivlin);
+        if self.reports_foreign_constants(at, table, word) {
+            return None;
+        }
+        let written = written_constants(table);
+        let value = |key: &str| written.iter().find(|(k, _)| *k == key).and_then(|(_, value)| *value);
+        let missing: Vec<&str> = word.constants().iter().copied().filter(|key| value(key).is_none()).collect();
+        if missing.len() == word.constants().len() {
+            return self.law_from_moduli(at, table, word);
+        }
+        if !missing.is_empty() {
+            self.problems.report(
+                at,
+                format!("the law {} has no {}", word.key(), missing.join(" and no ")),
+                "incomplete",
+                format!("add {} (0 is a value), or write preset = \"across-fibre\"", missing.join(" and ")),
+            );
+            return None;
+        }
+        let kpa = |key: &str| value(key).unwrap_or_default() * KPA;
+        let isochoric = match word {
+            LawWord::NeoHookean => Isochoric::NeoHookean(NeoHookean { c10: kpa("c10_kpa") }),
+            LawWord::MooneyRivlin => ElasticLaw::mooney_rivlin(kpa("c10_kpa"), kpa("c01_kpa"), 1.0).isochoric,
+            LawWord::Yeoh => Isochoric::Yeoh(Yeoh { c10: kpa("c10_kpa"), c20: kpa("c20_kpa"), c30: kpa("c30_kpa") }),
+            LawWord::Ogden => Isochoric::Ogden(Ogden { mu: kpa("mu_kpa"), alpha: value("alpha").unwrap_or_default() }),
+            LawWord::Demiray => Isochoric::Demiray(Demiray { mu: kpa("mu_kpa"), b: value("b").unwrap_or_default() }),
         };
-        let material = match (&table.preset, table.c10_kpa, table.c01_kpa) {
-            (Some(name), None, None) if table.youngs_modulus_kpa.is_none() && table.c10_share.is_none() => {
-                let Some(preset) = presets::tissue(name) else {
-                    let names: Vec<&str> = presets::tissues().iter().map(|p| p.name.as_str()).collect();
-                    self.unknown_name("material.preset", "tissue preset", name, &names);
-                    return placeholder;
-                };
-                let mut law = preset.law;
-                if let Some(bulk) = bulk(law.shear_modulus()) {
-                    self.notices.push(format!(
-                        "The bulk modulus {} kPa of preset `{name}` is replaced by {} kPa.",
-                        four_digits(law.bulk_modulus / KPA),
-                        four_digits(bulk / KPA)
-                    ));
-                    law.bulk_modulus = bulk;
-                }
-                TissueMaterial {
-                    name: preset.name.clone(),
-                    source: format!("{}; valid: {}", preset.source, preset.range),
-                    law,
-                    density: if table.density_kg_m3.is_some() { density } else { preset.density },
-                    ..placeholder
-                }
-            }
-            (Some(_), _, _) => {
-                self.problems.report(
-                    "material.preset",
-                    "a preset and constants of the law exclude each other",
-                    "preset beside c10, c01, E or c10_share",
-                    "keep `preset` (with density_kg_m3 or one volumetric key at most), or the constants",
-                );
-                return placeholder;
-            }
-            (None, Some(c10), Some(c01)) => {
-                let shear = 2.0 * (c10 + c01) * KPA;
-                let Some(bulk_modulus) = bulk(shear) else {
-                    self.problems.report(
-                        "material",
-                        "the law needs its volumetric part",
-                        "no bulk modulus here",
-                        "add one of bulk_modulus_kpa, d_per_mpa, poisson_ratio, e.g. poisson_ratio = 0.45",
-                    );
-                    return placeholder;
-                };
-                TissueMaterial {
-                    name: "constants".into(),
-                    source: "c10, c01 of the scene file".into(),
-                    law: ElasticLaw::mooney_rivlin(c10 * KPA, c01 * KPA, bulk_modulus),
-                    ..placeholder
-                }
-            }
-            (None, None, None) if table.youngs_modulus_kpa.is_some() => {
-                let young = table.youngs_modulus_kpa.expect("checked by the guard") * KPA;
-                let Some(nu) = table.poisson_ratio else {
-                    self.problems.report(
-                        "material.youngs_modulus_kpa",
-                        "E alone does not fix the law",
-                        "no Poisson's ratio beside it",
-                        "add poisson_ratio, e.g. poisson_ratio = 0.45",
-                    );
-                    return placeholder;
-                };
-                if direct_bulk.is_some() {
-                    self.problems.report(
-                        "material.youngs_modulus_kpa",
-                        "E, nu and a bulk modulus are one number too many",
-                        "over-determined",
-                        "remove bulk_modulus_kpa or d_per_mpa",
-                    );
-                }
-                TissueMaterial {
-                    name: "constants".into(),
-                    source: "E and nu of the scene file".into(),
-                    law: presets::law_from_youngs_modulus(young, nu, table.c10_share.unwrap_or(C10_SHARE)),
-                    ..placeholder
-                }
-            }
-            _ => {
-                self.problems.report(
-                    "material",
-                    "the tissue has no complete law",
-                    "incomplete",
-                    "write preset = \"across-fibre\", or c10_kpa, c01_kpa and one volumetric key, or youngs_modulus_kpa and poisson_ratio",
-                );
-                return placeholder;
-            }
+        let Some(bulk_modulus) = bulk_modulus(table, isochoric.shear_modulus()) else {
+            self.problems.report(
+                at,
+                "the law needs its volumetric part",
+                "no bulk modulus here",
+                "add one of bulk_modulus_kpa, d_per_mpa, poisson_ratio, e.g. poisson_ratio = 0.45",
+            );
+            return None;
         };
-        self.verdict(table, &material, cell_size);
-        material
+        if table.c10_share.is_some() {
+            self.notices.push(format!("`{at}.c10_share` has no effect: the constants are given."));
+        }
+        Some(ElasticLaw { isochoric, bulk_modulus })
+    }
+
+    /// Reports constants of other laws; true where there is one.
+    fn reports_foreign_constants(&mut self, at: &str, table: &MaterialTable, word: LawWord) -> bool {
+        let mut found = false;
+        for (key, value) in written_constants(table) {
+            if value.is_none() || word.constants().contains(&key) {
+                continue;
+            }
+            found = true;
+            let owners: Vec<LawWord> = LawWord::ALL.into_iter().filter(|w| w.constants().contains(&key)).collect();
+            let names: Vec<&str> = owners.iter().map(|owner| owner.key()).collect();
+            let this = match table.law {
+                Some(word) => format!("this material is {}", word.key()),
+                None => "without the key `law` a material is mooney_rivlin".into(),
+            };
+            let laws: Vec<String> = names.iter().map(|name| format!("law = \"{name}\"")).collect();
+            self.problems.report(
+                &format!("{at}.{key}"),
+                format!("`{key}` belongs to {}, and {this}", names.join(" and ")),
+                "constant of another law",
+                format!(
+                    "write {}, or remove {key}; {} has {}",
+                    laws.join(" or "),
+                    word.key(),
+                    word.constants().join(", ")
+                ),
+            );
+        }
+        found
+    }
+
+    /// Neo-Hookean or Mooney-Rivlin from E and nu.
+    fn law_from_moduli(&mut self, at: &str, table: &MaterialTable, word: LawWord) -> Option<ElasticLaw> {
+        let path = format!("{at}.youngs_modulus_kpa");
+        let Some(young) = table.youngs_modulus_kpa.map(|e| e * KPA) else {
+            let way_out = match (table.law, word) {
+                (None, _) => "write preset = \"across-fibre\", or law with its constants and one volumetric key, or \
+                     youngs_modulus_kpa and poisson_ratio"
+                    .into(),
+                (_, LawWord::NeoHookean | LawWord::MooneyRivlin) => format!(
+                    "write {} and one volumetric key, or youngs_modulus_kpa and poisson_ratio",
+                    word.constants().join(", ")
+                ),
+                _ => format!("write {} and one volumetric key, e.g. poisson_ratio = 0.45", word.constants().join(", ")),
+            };
+            self.problems.report(at, "the tissue has no complete law", "incomplete", way_out);
+            return None;
+        };
+        if !matches!(word, LawWord::NeoHookean | LawWord::MooneyRivlin) {
+            let shear = young / (2.0 * (1.0 + table.poisson_ratio.unwrap_or(0.45)));
+            let start = if word == LawWord::Yeoh {
+                format!("c10_kpa = {}", four_digits(0.5 * shear / KPA))
+            } else {
+                format!("mu_kpa = {}", four_digits(shear / KPA))
+            };
+            self.problems.report(
+                &path,
+                format!("E and nu do not fix the law {}: they say nothing about its stiffening", word.key()),
+                "for neo_hookean and mooney_rivlin only",
+                format!(
+                    "write its constants instead, {}; this E means {start} at rest; keep poisson_ratio",
+                    word.constants().join(", ")
+                ),
+            );
+            return None;
+        }
+        let Some(nu) = table.poisson_ratio else {
+            self.problems.report(
+                &path,
+                "E alone does not fix the law",
+                "no Poisson's ratio beside it",
+                "add poisson_ratio, e.g. poisson_ratio = 0.45",
+            );
+            return None;
+        };
+        if direct_bulk(table).is_some() {
+            self.problems.report(
+                &path,
+                "E, nu and a bulk modulus are one number too many",
+                "over-determined",
+                "remove bulk_modulus_kpa or d_per_mpa",
+            );
+        }
+        if word == LawWord::MooneyRivlin {
+            return Some(presets::law_from_youngs_modulus(young, nu, table.c10_share.unwrap_or(C10_SHARE)));
+        }
+        if table.c10_share.is_some() {
+            self.notices.push(format!("`{at}.c10_share` has no effect: neo_hookean has no second constant."));
+        }
+        let c10 = presets::law_from_youngs_modulus(young, nu, 1.0);
+        let isochoric = Isochoric::NeoHookean(NeoHookean { c10: 0.5 * c10.shear_modulus() });
+        Some(ElasticLaw { isochoric, bulk_modulus: c10.bulk_modulus })
     }
 
     fn refuse_stiff_tissue(&mut self, path: &str, modulus: f64) {
@@ -179,48 +393,38 @@ impl Check<'_> {
     }
 
     /// Accepts, limits or refuses the law; compares values that are stated twice.
-    fn verdict(&mut self, table: &MaterialTable, material: &TissueMaterial, cell_size: f64) {
+    fn verdict(&mut self, at: &str, table: &MaterialTable, material: &TissueMaterial, cell_size: f64) {
         let law = &material.law;
-        let place = if table.c01_kpa.is_some() { "material.c01_kpa" } else { "material" };
+        let key = written_constants(table).iter().filter(|(_, value)| value.is_some()).map(|(key, _)| *key).next();
+        let place = match key {
+            Some(_) if table.c01_kpa.is_some() => format!("{at}.c01_kpa"),
+            Some(key) => format!("{at}.{key}"),
+            None if table.preset.is_some() => format!("{at}.preset"),
+            None => at.to_string(),
+        };
         match law.verdict() {
-            Verdict::Unstable => {
-                let (c10, c01) = match law.isochoric {
-                    Isochoric::MooneyRivlin(l) => (l.c10 / KPA, l.c01 / KPA),
-                    _ => (0.5 * law.shear_modulus() / KPA, 0.0),
-                };
-                let shear = four_digits(law.shear_modulus() / KPA);
-                let growth = match ripple_growth_time(law, material.density, cell_size) {
-                    Some(time) => format!(
-                        "a {} mm ripple grows e-fold every {} ms; no time step helps",
-                        four_digits(cell_size / MM),
-                        four_digits(time * 1e3)
-                    ),
-                    None => "it does not resist shear".into(),
-                };
-                let lv2022 = if (c10 - 4.75).abs() < 1e-3 && (c01 + 4.91).abs() < 1e-3 {
-                    " Printed Table 1 of Lv et al. 2022 has this defect."
-                } else {
-                    ""
-                };
-                self.problems.report(
-                    place,
-                    format!(
-                        "REFUSED material: c10 {c10} kPa + c01 {c01} kPa = {} kPa -> ground-state shear modulus {shear} kPa, \
-                         must be > 0. The undeformed tissue is unstable ({growth}).{lv2022}",
-                        four_digits(c10 + c01)
-                    ),
-                    "unstable at rest",
-                    "write preset = \"lv2022-refit\" (c10 2.3 kPa, c01 1.0 kPa, D 4e-6 1/Pa) instead of the constants, \
-                     or constants with c10 + c01 > 0 (allow_limited = true if one of them is negative)",
-                );
-                return;
-            }
+            Verdict::Unstable => return self.refuse_unstable(&place, material, cell_size),
             Verdict::StableBelow(_) | Verdict::StableAbove(_) if !table.allow_limited => {
+                let (cause, way_out) = match law.isochoric {
+                    Isochoric::MooneyRivlin(_) => (
+                        "one constant is negative: ",
+                        "write allow_limited = true to accept the limit, or constants that are both >= 0, or \
+                         preset = \"lv2022-refit\""
+                            .to_string(),
+                    ),
+                    _ => (
+                        "",
+                        format!(
+                            "write allow_limited = true to accept the limit; without it {}",
+                            LawWord::of(law).stable_constants()
+                        ),
+                    ),
+                };
                 self.problems.report(
-                    place,
-                    format!("REFUSED material: one constant is negative: {}", describe_verdict(law)),
+                    &place,
+                    format!("REFUSED material: {cause}{}", describe_verdict(law)),
                     "limited stability",
-                    "write allow_limited = true to accept the limit, or constants that are both >= 0, or preset = \"lv2022-refit\"",
+                    way_out,
                 );
                 return;
             }
@@ -230,22 +434,21 @@ impl Check<'_> {
             Verdict::Stable => {}
         }
         if table.youngs_modulus_kpa.is_none() && law.youngs_modulus() > LARGEST_TISSUE_MODULUS {
-            self.refuse_stiff_tissue(place, law.youngs_modulus());
+            self.refuse_stiff_tissue(&place, law.youngs_modulus());
         }
-        if let (Some(stated), true) =
-            (table.poisson_ratio, table.bulk_modulus_kpa.is_some() || table.d_per_mpa.is_some())
+        if let (Some(stated), true) = (table.poisson_ratio, direct_bulk(table).is_some())
             && (stated - law.poisson_ratio()).abs() > 1e-3
         {
             self.notices.push(format!(
-                "material.poisson_ratio {stated} disagrees with the law, whose c10, c01 and K give nu {}; the law counts.",
+                "{at}.poisson_ratio {stated} disagrees with the law, whose constants and K give nu {}; the law counts.",
                 four_digits(law.poisson_ratio())
             ));
         }
-        if let (Some(stated), true) = (table.youngs_modulus_kpa, table.c10_kpa.is_some())
+        if let (Some(stated), true) = (table.youngs_modulus_kpa, key.is_some())
             && (stated * KPA / law.youngs_modulus() - 1.0).abs() > 0.02
         {
             self.notices.push(format!(
-                "material.youngs_modulus_kpa {stated} disagrees with the law, whose constants give E {} kPa; the law counts.",
+                "{at}.youngs_modulus_kpa {stated} disagrees with the law, whose constants give E {} kPa; the law counts.",
                 four_digits(law.youngs_modulus() / KPA)
             ));
         }
@@ -255,5 +458,44 @@ impl Check<'_> {
                 law.poisson_ratio()
             ));
         }
+    }
+
+    fn refuse_unstable(&mut self, place: &str, material: &TissueMaterial, cell_size: f64) {
+        let law = &material.law;
+        let growth = match ripple_growth_time(law, material.density, cell_size) {
+            Some(time) => format!(
+                "a {} mm ripple grows e-fold every {} ms; no time step helps",
+                four_digits(cell_size / MM),
+                four_digits(time * 1e3)
+            ),
+            None => "it does not resist shear".into(),
+        };
+        let Isochoric::MooneyRivlin(constants) = law.isochoric else {
+            self.problems.report(
+                place,
+                format!("REFUSED material: {} ({growth})", describe_verdict(law)),
+                "unstable at rest",
+                LawWord::of(law).stable_constants(),
+            );
+            return;
+        };
+        let (c10, c01) = (constants.c10 / KPA, constants.c01 / KPA);
+        let shear = four_digits(law.shear_modulus() / KPA);
+        let lv2022 = if (c10 - 4.75).abs() < 1e-3 && (c01 + 4.91).abs() < 1e-3 {
+            " Printed Table 1 of Lv et al. 2022 has this defect."
+        } else {
+            ""
+        };
+        self.problems.report(
+            place,
+            format!(
+                "REFUSED material: c10 {c10} kPa + c01 {c01} kPa = {} kPa -> ground-state shear modulus {shear} kPa, \
+                 must be > 0. The undeformed tissue is unstable ({growth}).{lv2022}",
+                four_digits(c10 + c01)
+            ),
+            "unstable at rest",
+            "write preset = \"lv2022-refit\" (c10 2.3 kPa, c01 1.0 kPa, D 4e-6 1/Pa) instead of the constants, \
+             or constants with c10 + c01 > 0 (allow_limited = true if one of them is negative)",
+        );
     }
 }

@@ -4,18 +4,24 @@
 //! number is in range.
 
 mod effects;
+pub(super) mod library;
 mod material;
+mod mesh;
+mod parameters;
+mod regions;
 mod tool;
 
 use std::path::Path;
 
 use glam::DVec3;
 
+use parameters::OwnTables;
+
 use super::document::{Document, Problems, closest};
 use super::file::*;
 use super::*;
 use crate::material::four_digits;
-use crate::mesh::BlockMesh;
+use crate::mesh::{BlockMesh, Mesh, TetMesh};
 
 const MM: f64 = 1e-3;
 const KPA: f64 = 1e3;
@@ -34,18 +40,9 @@ const LARGEST_BINDING: f64 = 128.0 * 1024.0 * 1024.0;
 pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, String> {
     let source = std::fs::read_to_string(path).map_err(|error| unreadable(path, &error))?;
     let document = Document::parse(path, &source, overrides)?;
-    let mut problems = Problems::new(&document);
-    for place in document.non_finite_numbers() {
-        problems.report(
-            &place,
-            format!("`{place}` is not a finite number"),
-            "NaN, infinite or too large",
-            "write a finite number",
-        );
-    }
-    problems.check()?;
+    let mut check = Check::new(&document, path);
+    check.finite_numbers(&document)?;
     let file: SceneFile = document.deserialize()?;
-    let mut check = Check { problems, notices: Vec::new() };
     check.scene(path, &file)
 }
 
@@ -96,27 +93,84 @@ enum Within {
 struct Check<'a> {
     problems: Problems<'a>,
     notices: Vec<String>,
+    /// Folder that relative paths start from: that of the file.
+    folder: &'a Path,
 }
 
 type Checked<T> = std::result::Result<T, String>;
 
+impl<'a> Check<'a> {
+    /// The check of the document that was read from `path`.
+    fn new(document: &'a Document<'a>, path: &'a Path) -> Self {
+        Check { problems: Problems::new(document), notices: Vec::new(), folder: path.parent().unwrap_or(Path::new("")) }
+    }
+
+    fn finite_numbers(&mut self, document: &Document) -> Checked<()> {
+        for place in document.non_finite_numbers() {
+            self.problems.report(
+                &place,
+                format!("`{place}` is not a finite number"),
+                "NaN, infinite or too large",
+                "write a finite number",
+            );
+        }
+        self.problems.check()
+    }
+}
+
 impl Check<'_> {
     fn scene(&mut self, path: &Path, file: &SceneFile) -> Checked<Scene> {
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-        let tissue = self.tissue(&file.tissue);
-        let material = self.material(&file.material, tissue.cell_size);
-        let faces = self.faces(&file.boundaries);
+        let (tissue, mesh) = self.tissue(&file.tissue);
+        let (mut material, preset) = self.material("material", &file.material, tissue.cell_size);
+        let (mut regions, region_presets) = self.regions(file, &tissue, mesh.as_deref());
+        let supports = self.supports(file, mesh.as_deref());
+        let faces = self.faces(&file.boundaries, file.tissue.mesh.is_some());
         let tool = self.tool(file);
         let motion = self.motion(file, tool.is_some());
         let effects = self.effects(file, &tool, &motion, &faces, &material);
+        parameters::settle(
+            &mut material,
+            &[parameters::of_preset(preset.as_ref()), file.own_tables()],
+            &EffectSet::default(),
+            &effects,
+        );
+        // A fracture energy of the scene means another displacement where a region flows at another stress.
+        let energy = OwnTables { damage: file.damage.as_ref(), ..OwnTables::default() };
+        for ((region, table), preset) in regions.iter_mut().zip(&file.region).zip(&region_presets) {
+            let layers = [energy, parameters::of_preset(preset.as_ref()), table.own_tables()];
+            parameters::settle(&mut region.material, &layers, &effects, &effects);
+        }
+        self.cuttings(file, &tool, &effects, (&mut material, preset), (&mut regions, region_presets));
         let solver = self.solver(&file.solver, tool.is_some(), effects.puncture.is_some());
         let outputs = self.outputs(&file.outputs, &motion, tool.is_some(), solver.duration);
         self.problems.check()?;
-        self.geometry(&tissue, tool.as_ref(), &motion);
+        for (index, material) in parameters::all_materials(&material, &regions) {
+            self.snap_back(file, index, material, tissue.cell_size, &effects);
+        }
+        if mesh.is_none() {
+            self.geometry(&tissue, tool.as_ref(), &motion);
+        }
+        self.overlaps(&regions, &tissue, mesh.as_deref());
         self.problems.check()?;
-        self.memory(&tissue, tool.as_ref(), &motion);
+        if mesh.is_none() {
+            self.memory(&tissue, tool.as_ref(), &motion);
+        }
         self.problems.check()?;
-        if tool.is_some() && faces.iter().all(|face| face.fixed == [false; 3]) {
+        let cells = match &mesh {
+            Some(tets) => Mesh::Tets(tets.clone()),
+            None => Mesh::Block(BlockMesh::for_tissue(&tissue, tool.as_ref().map(|_| &motion))),
+        };
+        self.cells(&cells, &material, &regions, &tissue, &effects);
+        if mesh.is_some() {
+            if supports.is_empty() && faces.iter().all(|face| face.fixed == [false; 3]) {
+                self.notices.push(
+                    "Nothing holds the mesh, so it floats; add [[support]] with a node set, or fix a face of the \
+                     bounding box, e.g. boundaries.z_min = \"fixed\"."
+                        .into(),
+                );
+            }
+        } else if tool.is_some() && faces.iter().all(|face| face.fixed == [false; 3]) {
             self.notices.push(
                 "No face of the block is fixed, so the tool pushes it away; set e.g. boundaries.z_min = \"fixed\"."
                     .into(),
@@ -128,9 +182,9 @@ impl Check<'_> {
             path: path.to_path_buf(),
             tissue,
             material,
-            regions: Vec::new(),
-            mesh: None,
-            supports: Vec::new(),
+            regions,
+            mesh,
+            supports,
             faces,
             tool,
             motion,
@@ -172,27 +226,12 @@ impl Check<'_> {
         DVec3::from(value)
     }
 
-    fn tissue(&mut self, table: &TissueTable) -> Tissue {
-        for (index, size) in table.size_mm.iter().enumerate() {
-            self.number(&format!("tissue.size_mm.{index}"), *size, Within::Positive(1000.0));
-        }
-        let smallest = table.size_mm.iter().cloned().fold(f64::INFINITY, f64::min);
-        let cell = self.number("tissue.cell_size_mm", table.cell_size_mm, Within::Between(1e-3, 100.0));
-        if cell > 0.5 * smallest && smallest > 0.0 {
-            self.problems.report(
-                "tissue.cell_size_mm",
-                format!("a cell of {cell} mm is more than half of the smallest edge of the block ({smallest} mm)"),
-                "too coarse",
-                format!("write at most {}", 0.5 * smallest),
-            );
-        }
-        let offset = table.axis_offset_cells.unwrap_or([0.23, 0.31]);
-        for (index, value) in offset.iter().enumerate() {
-            self.number(&format!("tissue.axis_offset_cells.{index}"), *value, Within::Between(0.0, 1.0));
-        }
-        Tissue {
-            size: DVec3::from(table.size_mm) * MM,
-            cell_size: cell * MM,
+    /// The tissue, and the mesh where the scene names one.
+    fn tissue(&mut self, table: &TissueTable) -> (Tissue, Option<Arc<TetMesh>>) {
+        // Stands in after a reported problem; it never leaves `scene`.
+        let mut tissue = Tissue {
+            size: DVec3::splat(10.0 * MM),
+            cell_size: MM,
             fine_radius: self.optional(
                 "tissue.fine_radius_mm",
                 table.fine_radius_mm,
@@ -201,8 +240,52 @@ impl Check<'_> {
                 Within::Positive(1000.0),
             ),
             growth: self.optional("tissue.growth", table.growth, 1.0, 1.25, Within::Between(1.0, 2.0)),
-            axis_offset_cells: offset,
+            axis_offset_cells: table.axis_offset_cells.unwrap_or([0.23, 0.31]),
+        };
+        for (index, value) in tissue.axis_offset_cells.into_iter().enumerate() {
+            self.number(&format!("tissue.axis_offset_cells.{index}"), value, Within::Between(0.0, 1.0));
         }
+        if let Some(name) = &table.mesh {
+            let mesh = self.mesh(name, table);
+            if let Some(mesh) = &mesh {
+                (tissue.size, tissue.cell_size) = mesh::extent(mesh);
+            }
+            return (tissue, mesh);
+        }
+        for (key, written) in [("unit", table.unit.is_some()), ("accept_size", table.accept_size.is_some())] {
+            if written {
+                self.notices.push(format!("`tissue.{key}` has no effect without tissue.mesh."));
+            }
+        }
+        let (Some(size_mm), Some(cell)) = (table.size_mm, table.cell_size_mm) else {
+            let missing = match (table.size_mm, table.cell_size_mm) {
+                (None, None) => "neither a block nor a mesh",
+                (None, _) => "no `size_mm`",
+                _ => "no `cell_size_mm`",
+            };
+            self.problems.report(
+                "tissue",
+                format!("the tissue has {missing}"),
+                "incomplete",
+                "write size_mm = [20, 20, 16] and cell_size_mm = 0.6, or mesh = \"part.msh\" and unit = \"mm\"",
+            );
+            return (tissue, None);
+        };
+        for (index, size) in size_mm.iter().enumerate() {
+            self.number(&format!("tissue.size_mm.{index}"), *size, Within::Positive(1000.0));
+        }
+        let smallest = size_mm.iter().cloned().fold(f64::INFINITY, f64::min);
+        self.number("tissue.cell_size_mm", cell, Within::Between(1e-3, 100.0));
+        if cell > 0.5 * smallest && smallest > 0.0 {
+            self.problems.report(
+                "tissue.cell_size_mm",
+                format!("a cell of {cell} mm is more than half of the smallest edge of the block ({smallest} mm)"),
+                "too coarse",
+                format!("write at most {}", 0.5 * smallest),
+            );
+        }
+        (tissue.size, tissue.cell_size) = (DVec3::from(size_mm) * MM, cell * MM);
+        (tissue, None)
     }
 
     fn unknown_name(&mut self, path: &str, what: &str, name: &str, names: &[&str]) {
@@ -214,14 +297,20 @@ impl Check<'_> {
         self.problems.report(path, format!("there is no {what} called \"{name}\""), "unknown name", way_out);
     }
 
-    fn faces(&mut self, table: &BoundariesTable) -> [FaceCondition; 6] {
+    /// Conditions of the six faces; those of a mesh are the sides of its bounding box and free unless written.
+    fn faces(&mut self, table: &BoundariesTable, of_mesh: bool) -> [FaceCondition; 6] {
         let entries = [&table.x_min, &table.x_max, &table.y_min, &table.y_max, &table.z_min, &table.z_max];
         Face::ALL.map(|face| {
-            let default = if face == Face::ZMax { FaceKind::Free } else { FaceKind::Fixed };
+            let default = if of_mesh || face == Face::ZMax { FaceKind::Free } else { FaceKind::Fixed };
             match entries[face as usize] {
                 None => face_of_kind(face, default),
                 Some(FaceEntry::Kind(kind)) => face_of_kind(face, *kind),
-                Some(FaceEntry::Table(table)) => self.face(face, table),
+                Some(FaceEntry::Table(table)) => {
+                    if of_mesh && table.traction_kpa.is_some() {
+                        self.needs_block(&format!("boundaries.{}.traction_kpa", face.key()), "a traction on a face");
+                    }
+                    self.face(face, table)
+                }
             }
         })
     }
@@ -236,27 +325,7 @@ impl Check<'_> {
         let rotation = table
             .rotation_deg
             .map(|value| self.number(&at("rotation_deg"), value, Within::Between(-3600.0, 3600.0)).to_radians());
-        if displacement.is_some() || rotation.is_some() {
-            let key = at(if displacement.is_some() { "displacement_mm" } else { "rotation_deg" });
-            match table.duration_s {
-                None => self.problems.report(
-                    &key,
-                    format!("the motion of face {} has no duration", face.key()),
-                    "no duration_s beside it",
-                    "add duration_s, the time over which the motion grows, e.g. duration_s = 0.5",
-                ),
-                Some(duration) => {
-                    self.number(&at("duration_s"), duration, Within::Positive(3600.0));
-                    condition.drive = Some(FaceDrive {
-                        displacement: displacement.unwrap_or_default(),
-                        rotation: rotation.unwrap_or(0.0),
-                        duration,
-                    });
-                }
-            }
-        } else if table.duration_s.is_some() {
-            self.notices.push(format!("`{}` has no effect without displacement_mm or rotation_deg.", at("duration_s")));
-        }
+        condition.drive = self.drive(face, table, displacement, rotation);
         let names = ["x", "y", "z"];
         for axis in 0..3 {
             if displacement.is_some_and(|d| d[axis] != 0.0) && !condition.fixed[axis] {
@@ -288,6 +357,83 @@ impl Check<'_> {
         condition.traction_ramp =
             self.optional(&at("traction_ramp_s"), table.traction_ramp_s, 1.0, 0.0, Within::NotNegative(3600.0));
         condition
+    }
+
+    /// The prescribed motion of a face: `displacement` [m], `rotation` [rad], and the time they take.
+    fn drive(
+        &mut self,
+        face: Face,
+        table: &FaceTable,
+        displacement: Option<DVec3>,
+        rotation: Option<f64>,
+    ) -> Option<FaceDrive> {
+        let at = |key: &str| format!("boundaries.{}.{key}", face.key());
+        if displacement.is_none() && rotation.is_none() {
+            for (key, written) in [
+                ("duration_s", table.duration_s.is_some()),
+                ("speed_mm_min", table.speed_mm_min.is_some()),
+                ("cycles", table.cycles.is_some()),
+            ] {
+                if written {
+                    self.notices.push(format!("`{}` has no effect without displacement_mm or rotation_deg.", at(key)));
+                }
+            }
+            return None;
+        }
+        let cycles = table.cycles.unwrap_or(0);
+        if table.cycles.is_some() {
+            self.number(&at("cycles"), f64::from(cycles), Within::Between(1.0, 1e6));
+        }
+        let duration = match (table.duration_s, table.speed_mm_min) {
+            (Some(_), Some(_)) => {
+                self.problems.report(
+                    &at("speed_mm_min"),
+                    "`duration_s` and `speed_mm_min` both say how long the motion takes",
+                    "second of two",
+                    "keep one of them",
+                );
+                return None;
+            }
+            (Some(duration), None) => self.number(&at("duration_s"), duration, Within::Positive(3600.0)),
+            (None, Some(speed)) => {
+                let speed = self.number(&at("speed_mm_min"), speed, Within::Positive(1e5)) * MM / 60.0;
+                let length = displacement.unwrap_or_default().length();
+                if length == 0.0 || speed <= 0.0 {
+                    self.problems.report(
+                        &at("speed_mm_min"),
+                        "a speed needs a displacement that is not zero",
+                        "no length to divide by",
+                        "write displacement_mm, or duration_s instead of the speed",
+                    );
+                    return None;
+                }
+                let duration = length / speed;
+                if duration > 3600.0 {
+                    self.problems.report(
+                        &at("speed_mm_min"),
+                        format!("the motion takes {} s, more than an hour", four_digits(duration)),
+                        "too slow",
+                        format!("write at least {}", four_digits(length / MM / 60.0)),
+                    );
+                }
+                duration
+            }
+            (None, None) => {
+                self.problems.report(
+                    &at(if displacement.is_some() { "displacement_mm" } else { "rotation_deg" }),
+                    format!("the motion of face {} has no duration", face.key()),
+                    "no duration_s beside it",
+                    "add duration_s, the time over which the motion grows, e.g. duration_s = 0.5, or speed_mm_min",
+                );
+                return None;
+            }
+        };
+        Some(FaceDrive {
+            displacement: displacement.unwrap_or_default(),
+            rotation: rotation.unwrap_or(0.0),
+            duration,
+            cycles,
+        })
     }
 
     fn solver(&mut self, table: &SolverTable, has_tool: bool, punctures: bool) -> SolverSettings {
