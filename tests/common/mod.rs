@@ -244,6 +244,7 @@ pub fn pulled(size_mm: [f64; 3], cell_mm: f64, strain: f64, duration: f64) -> Sc
             displacement: DVec3::Z * (strain * scene.tissue.size.z),
             rotation: 0.0,
             duration,
+            cycles: 0,
         }),
         ..held(false, false, true)
     };
