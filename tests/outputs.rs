@@ -174,12 +174,7 @@ fn snapshot(scene: &Scene, mesh: &Mesh, depth: f64) -> FieldSnapshot {
         })
         .collect();
     let per_cell = |value: &dyn Fn(DVec3) -> f64| -> Vec<f64> {
-        (0..mesh.cell_count())
-            .map(|c| {
-                let corners = mesh.cell_nodes(c).map(|n| mesh.rest_position(n));
-                value(corners.into_iter().sum::<DVec3>() / 8.0)
-            })
-            .collect()
+        (0..mesh.cell_count()).map(|c| value(mesh.cell_centre(c))).collect()
     };
     FieldSnapshot {
         frame: 90,

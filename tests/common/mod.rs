@@ -11,7 +11,9 @@ use stylet::gpu::{Gpu, GpuEngine};
 use stylet::material::ElasticLaw;
 use stylet::mesh::BlockMesh;
 use stylet::model::Model;
-use stylet::scene::{Face, FaceCondition, FaceDrive, Motion, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool};
+use stylet::scene::{
+    Face, FaceCondition, FaceDrive, Motion, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool,
+};
 use stylet::solver::cpu::CpuEngine;
 use stylet::solver::engine::{Engine, FramePlan, FrameSums, State, StepInput};
 

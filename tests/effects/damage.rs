@@ -40,8 +40,7 @@ fn run(model: &Arc<Model>, dt: f64, frames: usize, steps: usize) -> Vec<(&'stati
 #[test]
 fn the_dissipation_does_not_depend_on_the_mesh() {
     let yield_stress = 200.0;
-    let params =
-        damage::Params { onset: 0.0, failure_displacement: 0.5e-3, largest: 0.95, deletion: false };
+    let params = damage::Params { onset: 0.0, failure_displacement: 0.5e-3, largest: 0.95, deletion: false };
     for count in [1usize, 5, 20] {
         // A plastic strain of 0.475 stretches the weak cell to 1.61 mm; the rest gives a little elastically.
         let pulled_mm = 0.75 + 0.011 * count as f64;
@@ -57,8 +56,7 @@ fn the_dissipation_does_not_depend_on_the_mesh() {
             let last = samples.last().unwrap();
             assert!((last.damage - 0.95).abs() < 1e-5, "{name}: damage {}", last.damage);
             let s = &last.sums;
-            let accounted =
-                s.elastic + s.hourglass + s.kinetic + last.plastic + last.degradation + last.damping;
+            let accounted = s.elastic + s.hourglass + s.kinetic + last.plastic + last.degradation + last.damping;
             at_most(&format!("{name}: imbalance"), (last.work - accounted).abs() / last.work, 1e-2);
             assert_eq!(s.return_failures, 0);
         }
