@@ -9,6 +9,7 @@ mod fibres;
 mod friction;
 mod gravity;
 mod indentation;
+mod laws;
 mod mass_scaling;
 mod mooney_rivlin;
 mod plasticity;

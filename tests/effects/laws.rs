@@ -1,0 +1,162 @@
+//! Elastic laws, regions and all constitutive effects together: the kernels against the f64 engine.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use stylet::effects::{damage, fibres, plasticity, viscoelastic};
+use stylet::material::{Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean, Ogden, Yeoh};
+use stylet::model::Model;
+use stylet::scene::{Region, RegionShape, Scene, TissueMaterial};
+use stylet::solver::cpu::CpuEngine;
+use stylet::solver::engine::Engine;
+
+use crate::common::*;
+
+const LAWS: [Isochoric; 6] = [
+    Isochoric::NeoHookean(NeoHookean { c10: 3300.0 }),
+    Isochoric::MooneyRivlin(MooneyRivlin { c10: 2300.0, c01: 1000.0 }),
+    Isochoric::Yeoh(Yeoh { c10: 2500.0, c20: 900.0, c30: 300.0 }),
+    Isochoric::Ogden(Ogden { mu: 6600.0, alpha: 3.7 }),
+    Isochoric::Ogden(Ogden { mu: 6600.0, alpha: -5.0 }),
+    Isochoric::Demiray(Demiray { mu: 4000.0, b: 1.9 }),
+];
+
+fn elastic(isochoric: Isochoric) -> ElasticLaw {
+    ElasticLaw { isochoric, bulk_modulus: 2.0e5 }
+}
+
+fn graded(scene: Scene) -> Arc<Model> {
+    Arc::new(Model::new(scene, graded_mesh([4, 5, 6])))
+}
+
+/// Gives both engines the same random field, rounded to what the device holds.
+fn shake(gpu: &mut dyn Engine, cpu: &mut dyn Engine, amplitude: f64, seed: u64) {
+    let mut random = Random(seed);
+    let mut state = gpu.read_state().unwrap();
+    state.displacement.iter_mut().for_each(|u| *u = random.vector() * amplitude * 1e-3);
+    gpu.write_state(&state).unwrap();
+    let rounded = gpu.read_state().unwrap();
+    cpu.write_state(&rounded).unwrap();
+}
+
+fn force_difference(gpu: &mut dyn Engine, cpu: &mut dyn Engine) -> f64 {
+    relative_difference(&gpu.internal_forces().unwrap(), &cpu.internal_forces().unwrap())
+}
+
+#[test]
+fn every_law_in_its_kernel() {
+    for law in LAWS {
+        let mut scene = block([1.0; 3], 1.0);
+        scene.material.law = elastic(law);
+        let model = graded(scene.clone());
+        let Some(mut gpu) = gpu_engine(&model, 1e-9, 1) else { return };
+        let mut cpu = CpuEngine::new(model, 1e-9);
+        for (amplitude, seed) in [(0.002, 1), (0.1, 2), (0.4, 3), (0.7, 4)] {
+            shake(&mut gpu, &mut cpu, amplitude, seed);
+            let difference = force_difference(&mut gpu, &mut cpu);
+            at_most(&format!("{law:?}, amplitude {amplitude} mm"), difference, 3e-5);
+            let (found, expected) = (
+                advance(&mut gpu, &cpu_model(&scene), 1e-12, &mut 0, 1),
+                advance(&mut cpu, &cpu_model(&scene), 1e-12, &mut 0, 1),
+            );
+            // Ogden's energy is a difference of powers near 1: strains of 0.2 % leave four digits of it.
+            let allowed = if amplitude < 0.01 { 3e-4 } else { 3e-5 };
+            close("elastic energy", found.elastic, expected.elastic, allowed);
+        }
+        // One wrong constant is seen.
+        scene.material.law.bulk_modulus *= 1.001;
+        let mut wrong = CpuEngine::new(graded(scene), 1e-9);
+        shake(&mut gpu, &mut wrong, 0.4, 3);
+        assert!(force_difference(&mut gpu, &mut wrong) > 3e-5, "{law:?}");
+    }
+}
+
+fn cpu_model(scene: &Scene) -> Arc<Model> {
+    graded(scene.clone())
+}
+
+/// A block of five laws in five regions, with everything that a material point can do.
+fn everything() -> Scene {
+    let mut scene = block([1.0; 3], 1.0);
+    scene.material.law = elastic(LAWS[1]);
+    scene.effects.plasticity = Some(plasticity::Params { yield_stress: 900.0, hardening: 3.0e3 });
+    scene.effects.fibres =
+        Some(fibres::Params { direction: DVec3::new(1.0, 0.4, -0.3).normalize(), k1: 2.0e3, k2: 0.6 });
+    let terms = [(0.3, 2e-5), (0.2, 4e-4)].map(|(ratio, time)| viscoelastic::Term { ratio, time });
+    scene.effects.viscoelastic = Some(viscoelastic::Params { terms: terms.to_vec() });
+    scene.effects.damage =
+        Some(damage::Params { onset: 0.02, failure_displacement: 1e-3, largest: 0.9, deletion: false });
+    let shapes = [
+        RegionShape::Layer { top: 0.0, bottom: 1.5e-3 },
+        RegionShape::Sphere { centre: DVec3::new(0.0, 0.0, -4e-3), radius: 1.6e-3 },
+        RegionShape::Box { low: DVec3::new(-9e-3, -9e-3, -9e-3), high: DVec3::new(-1e-3, 9e-3, -4e-3) },
+        RegionShape::Cylinder { from: DVec3::new(-9e-3, 1e-3, -5e-3), to: DVec3::new(9e-3, 1e-3, -5e-3), radius: 1e-3 },
+    ];
+    for (shape, law) in shapes.into_iter().zip([LAWS[0], LAWS[3], LAWS[5], LAWS[2]]) {
+        let mut material = TissueMaterial::new(elastic(law).isochoric.key(), "test", elastic(law), 900.0);
+        material.plasticity = Some(plasticity::Params { yield_stress: 700.0, hardening: 1.0e3 });
+        material.fibres = Some(fibres::Params { direction: DVec3::Y, k1: 500.0, k2: 1.0 });
+        scene.regions.push(Region { name: material.name.clone(), shape, material });
+    }
+    scene
+}
+
+#[test]
+fn regions_and_all_effects_together() {
+    let scene = everything();
+    let model = graded(scene.clone());
+    let used: std::collections::BTreeSet<u8> = model.cell_material.iter().copied().collect();
+    assert_eq!(used.len(), 5, "regions without a cell: {used:?}");
+    let dt = 2e-6;
+    let Some(mut gpu) = gpu_engine(&model, dt, 20) else { return };
+    let mut cpu = CpuEngine::new(model.clone(), dt);
+    shake(&mut gpu, &mut cpu, 0.15, 7);
+    // A blow, and what the histories make of it in 80 steps.
+    let (mut a, mut b) = (0, 0);
+    let mut totals = [[0.0; 3]; 2];
+    for _ in 0..4 {
+        let found = advance(&mut gpu, &model, dt, &mut a, 20);
+        let expected = advance(&mut cpu, &model, dt, &mut b, 20);
+        for (total, s) in totals.iter_mut().zip([&found, &expected]) {
+            total[0] += s.plastic_dissipation;
+            total[1] += s.damage_dissipation;
+            total[2] = s.viscous_dissipation;
+        }
+        close("elastic energy", found.elastic, expected.elastic, 1e-3);
+        assert_eq!((found.return_failures, expected.return_failures), (0, 0));
+        at_most("damage", (found.largest_damage - expected.largest_damage).abs(), 1e-3);
+    }
+    for (name, i) in [("plastic", 0), ("damage", 1), ("viscous", 2)] {
+        assert!(totals[1][i] > 0.0, "{name}: nothing happened");
+        close(&format!("{name} dissipation"), totals[0][i], totals[1][i], 5e-3);
+    }
+    let (found, expected) = (gpu.read_state().unwrap(), cpu.read_state().unwrap());
+    at_most("displacement", relative_difference(&found.displacement, &expected.displacement), 1e-4);
+    let alpha = |s: &stylet::solver::engine::State| s.points.iter().map(|p| p.plastic.alpha).fold(0.0, f64::max);
+    close("largest plastic strain", alpha(&found), alpha(&expected), 1e-3);
+    at_most("internal forces of the states", force_difference(&mut gpu, &mut cpu), 1e-3);
+}
+
+#[test]
+fn reading_forces_changes_no_history() {
+    let model = graded(everything());
+    let dt = 2e-6;
+    for (name, mut engine) in engines(&model, dt, 20) {
+        let mut random = Random(9);
+        let mut state = engine.read_state().unwrap();
+        state.displacement.iter_mut().for_each(|u| *u = random.vector() * 1e-4);
+        engine.write_state(&state).unwrap();
+        advance(engine.as_mut(), &model, dt, &mut 0, 5);
+        let before = engine.read_state().unwrap();
+        let first = engine.internal_forces().unwrap();
+        let second = engine.internal_forces().unwrap();
+        assert_eq!(first, second, "{name}");
+        let after = engine.read_state().unwrap();
+        assert_eq!(before.points.len(), after.points.len());
+        for (a, b) in before.points.iter().zip(&after.points) {
+            assert_eq!(a.plastic, b.plastic, "{name}");
+            let difference = a.viscous.iter().zip(&b.viscous).map(|(a, b)| largest_entry(*a - *b)).fold(0.0, f64::max);
+            assert!(difference <= 1e-6 * a.viscous.iter().map(|q| largest_entry(*q)).fold(1e-6, f64::max), "{name}");
+        }
+    }
+}
