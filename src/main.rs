@@ -90,6 +90,9 @@ struct BenchArgs {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
+    /// Measure what every effect costs instead
+    #[arg(long)]
+    effects: bool,
     /// Largest number of cells
     #[arg(long, default_value_t = 500_000)]
     max_cells: usize,
@@ -172,6 +175,11 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
         }
         Some(Command::Material(args)) => {
             print(commands::material::material(&args)?.trim_end());
+            Ok(0)
+        }
+        Some(Command::Bench(args)) if args.effects => {
+            let report = commands::bench_effects::bench_effects(args.engine)?;
+            print(&if args.json { report.json() } else { report.table() });
             Ok(0)
         }
         Some(Command::Bench(args)) => {

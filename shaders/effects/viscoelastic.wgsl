@@ -6,8 +6,7 @@ struct PronyTerm {
     ratio: f32,
     decay: f32,
     compliance: f32,
-    // Steps between two updates less one; a power of two less one.
-    interval_mask: u32,
+    _pad: f32,
 }
 
 // Terms of one material; those that it lacks have no share and never change.
@@ -20,20 +19,20 @@ struct ViscousStress {
     xx: f32,
     yy: f32,
     zz: f32,
-    // In the sum of a cell: number of terms. Constant, and here because a loop whose end comes from a uniform beside the
-    // step number makes one software adapter compile the stage anew in every step.
-    term_count: u32,
+    // In the sum of a cell: binary logarithm of the steps between two updates, one byte for each of the terms 1 to 4 and
+    // (below) 5 to 8. Constant, and here because a branch that depends on uniforms alone, the step number among them,
+    // makes one software adapter compile the stage anew in every step.
+    first_intervals: u32,
     xy: f32,
     yz: f32,
     zx: f32,
-    // In the sum of a cell: some term is due only where these bits of the step number are zero.
-    interval_mask: u32,
+    last_intervals: u32,
 }
 
 struct ViscousLayout {
-    // Entries of one cell: the sum and the terms of the longest series.
+    // Entries of one cell: the sum and the terms of the longest series; these terms.
     entries: u32,
-    _pad0: u32,
+    term_count: u32,
     _pad1: u32,
     _pad2: u32,
 }
@@ -48,7 +47,7 @@ fn viscous_tensor(q: ViscousStress) -> mat3x3<f32> {
 }
 
 fn viscous_entries(T: mat3x3<f32>, sum: ViscousStress) -> ViscousStress {
-    return ViscousStress(T[0].x, T[1].y, T[2].z, sum.term_count, T[1].x, T[2].y, T[0].z, sum.interval_mask);
+    return ViscousStress(T[0].x, T[1].y, T[2].z, sum.first_intervals, T[1].x, T[2].y, T[0].z, sum.last_intervals);
 }
 
 // F^-1 P, symmetric; below J = 0.2 with J = 0.2.
@@ -61,27 +60,27 @@ fn green_lagrange(H: mat3x3<f32>) -> mat3x3<f32> {
     return (H + transpose(H) + transpose(H) * H) * 0.5;
 }
 
-// Brings the terms of a cell to this step; returns sum E:dq [J/m^3].
+// Brings the terms of a cell that are due in this step up to date, each in the middle of its interval; returns the work
+// sum E:dq [J/m^3].
 fn relax(number: u32, cell: u32, H: mat3x3<f32>, P: mat3x3<f32>, cof: mat3x3<f32>, dj: f32) -> f32 {
     var work = 0.0;
     let step = step_input.step;
     let base = cell * viscous_layout.entries;
     let head = viscous_state[base];
-    // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
-    for (var once = select(1u, 0u, (step & head.interval_mask) == 0u); once == 0u; once++) {
-        let S = second_piola_kirchhoff(P, cof, dj);
-        let E = green_lagrange(H);
-        var sum = S * 0.0;
-        for (var i = 0u; i < head.term_count; i++) {
+    for (var i = 0u; i < viscous_layout.term_count; i++) {
+        let bytes = select(head.last_intervals, head.first_intervals, i < 4u);
+        let interval = 1u << ((bytes >> (8u * (i & 3u))) & 31u);
+        let due = (step & (interval - 1u)) == interval / 2u;
+        // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
+        for (var once = select(1u, 0u, due); once == 0u; once++) {
             let term = prony[number].terms[i];
+            let S = second_piola_kirchhoff(P, cof, dj);
             let q = viscous_tensor(viscous_state[base + 1u + i]);
-            let decay = select(0.0, term.decay, (step & term.interval_mask) == (term.interval_mask + 1u) / 2u);
-            let dq = (S * term.ratio - q) * decay;
+            let dq = (S * term.ratio - q) * term.decay;
             viscous_state[base + 1u + i] = viscous_entries(q + dq, head);
-            sum += q + dq;
-            work += double_dot(E, dq);
+            viscous_state[base] = viscous_entries(viscous_sum(cell) + dq, head);
+            work += double_dot(green_lagrange(H), dq);
         }
-        viscous_state[base] = viscous_entries(sum, head);
     }
     return work;
 }
@@ -94,7 +93,7 @@ fn viscous_sum(cell: u32) -> mat3x3<f32> {
 fn viscous_energy(number: u32, cell: u32) -> f32 {
     var energy = 0.0;
     let base = cell * viscous_layout.entries;
-    for (var i = 0u; i < viscous_state[base].term_count; i++) {
+    for (var i = 0u; i < viscous_layout.term_count; i++) {
         let q = viscous_tensor(viscous_state[base + 1u + i]);
         energy += prony[number].terms[i].compliance * double_dot(q, q);
     }

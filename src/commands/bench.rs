@@ -83,7 +83,7 @@ pub struct Report {
 }
 
 /// A block of 0.8 mm cells with nu 0.45 at mass scaling 1000, with or without a 16G needle going in at 2 mm/s.
-fn scene(cells: [usize; 3], needle: bool) -> Scene {
+pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
     let h = 0.8e-3;
     let shear = 60e3 / 2.9;
     let fixed = FaceCondition { fixed: [true; 3], ..Default::default() };
@@ -142,7 +142,7 @@ fn scene(cells: [usize; 3], needle: bool) -> Scene {
     }
 }
 
-fn uniform_mesh(cells: [usize; 3], h: f64) -> BlockMesh {
+pub(super) fn uniform_mesh(cells: [usize; 3], h: f64) -> BlockMesh {
     BlockMesh {
         lines: std::array::from_fn(|a| {
             let n = cells[a];
@@ -153,10 +153,10 @@ fn uniform_mesh(cells: [usize; 3], h: f64) -> BlockMesh {
 }
 
 /// A prepared block that steps on request.
-struct Subject {
-    model: Arc<Model>,
-    engine: Box<dyn Engine>,
-    dt: f64,
+pub(super) struct Subject {
+    pub(super) model: Arc<Model>,
+    pub(super) engine: Box<dyn Engine>,
+    pub(super) dt: f64,
     step: u64,
     frame: u64,
     recording: f64,
@@ -167,6 +167,11 @@ impl Subject {
     fn new(cells: [usize; 3], needle: bool, gpu: Option<&Gpu>, max_steps: usize) -> Result<Self> {
         let scene = scene(cells, needle);
         let mesh = uniform_mesh(cells, scene.tissue.cell_size);
+        Self::of(scene, mesh, gpu, max_steps)
+    }
+
+    /// A block of any scene.
+    pub(super) fn of(scene: Scene, mesh: BlockMesh, gpu: Option<&Gpu>, max_steps: usize) -> Result<Self> {
         let model = Arc::new(Model::new(scene, mesh));
         let dt = 0.8 * wave_speed_bound(&model);
         let engine: Box<dyn Engine> = match gpu {
@@ -178,7 +183,7 @@ impl Subject {
     }
 
     /// One frame of `steps` steps, waited for; the tool moves `haste` times as fast as the scene says.
-    fn frame(&mut self, steps: usize, haste: f64) -> Result<()> {
+    pub(super) fn frame(&mut self, steps: usize, haste: f64) -> Result<()> {
         let inputs = (0..steps)
             .map(|i| {
                 let time = (self.step + i as u64) as f64 * self.dt * haste;
@@ -200,7 +205,7 @@ impl Subject {
     }
 
     /// Brings the needle 6 mm in, ten times as fast as later: the tip has punctured and the shaft rubs when it counts.
-    fn puncture(&mut self, steps: usize) -> Result<()> {
+    pub(super) fn puncture(&mut self, steps: usize) -> Result<()> {
         while (self.step as f64) * self.dt * 10.0 * 2e-3 < 6e-3 {
             self.frame(steps, 10.0)?;
         }
@@ -209,7 +214,7 @@ impl Subject {
     }
 
     /// Wall and CPU seconds per step over about `ROUND_SECONDS`, in frames of `steps`.
-    fn round(&mut self, steps: usize) -> Result<(f64, Option<f64>)> {
+    pub(super) fn round(&mut self, steps: usize) -> Result<(f64, Option<f64>)> {
         let (begin, cpu) = (Instant::now(), process::cpu_seconds());
         let mut count = 0;
         while begin.elapsed().as_secs_f64() < ROUND_SECONDS {
@@ -323,7 +328,7 @@ pub fn first_step(engine: EngineChoice, program_start: Instant) -> Result<String
     Ok(format!("{ms:.3} {}", process::peak_bytes().unwrap_or(0)))
 }
 
-fn open(engine: EngineChoice) -> Result<Option<Gpu>> {
+pub(super) fn open(engine: EngineChoice) -> Result<Option<Gpu>> {
     match engine {
         EngineChoice::Cpu => Ok(None),
         EngineChoice::Gpu => Gpu::open().map(Some),

@@ -1,6 +1,7 @@
 //! What the command line does, one file per command.
 
 pub mod bench;
+pub mod bench_effects;
 pub mod check;
 pub mod fit;
 pub mod material;

@@ -98,11 +98,55 @@ pub fn compose(root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed>
     compose_from(SOURCES, root, defines)
 }
 
-fn compose_from(
-    files: &[(&'static str, &'static str)],
-    root: &str,
-    defines: &BTreeSet<&'static str>,
-) -> Result<Composed> {
+/// The same from sources in which no effect was ever written: their files and their `#ifdef` blocks are taken out
+/// first. What a run without effects must be equal to.
+pub fn compose_without_effects(root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed> {
+    let stripped: Vec<(&'static str, String)> = SOURCES
+        .iter()
+        .filter(|(name, _)| !name.starts_with("effects/"))
+        .map(|(name, text)| (*name, without_effect_blocks(text)))
+        .collect();
+    let files: Vec<(&'static str, &str)> = stripped.iter().map(|(name, text)| (*name, text.as_str())).collect();
+    compose_from(&files, root, defines)
+}
+
+/// A source without the blocks of effects; the other branch of such a block stays.
+fn without_effect_blocks(text: &str) -> String {
+    // Per open block: is it one of an effect, and is its present branch kept?
+    let mut open: Vec<(bool, bool)> = Vec::new();
+    let mut out = String::new();
+    for line in text.lines() {
+        let kept = open.iter().all(|(effect, keep)| !effect || *keep);
+        let word = line.trim();
+        let is_effect =
+            |name: &str| crate::effects::EFFECTS.iter().any(|e| e.define == name.trim()) || name == "HISTORY";
+        if let Some(name) = word.strip_prefix("#ifdef ") {
+            open.push((is_effect(name), false));
+        } else if let Some(name) = word.strip_prefix("#ifndef ") {
+            open.push((is_effect(name), true));
+        } else if word == "#else"
+            && let Some((true, keep)) = open.last_mut()
+        {
+            *keep = !*keep;
+            continue;
+        } else if word == "#endif"
+            && let Some((true, _)) = open.last()
+        {
+            open.pop();
+            continue;
+        } else if word == "#endif" {
+            open.pop();
+        }
+        let directive_of_effect = word.starts_with("#if") && open.last().is_some_and(|o| o.0);
+        if kept && !directive_of_effect {
+            out.push_str(line);
+            out.push('\n');
+        }
+    }
+    out
+}
+
+fn compose_from(files: &[(&'static str, &str)], root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed> {
     let mut out = Composed { source: String::new(), origin: Vec::new() };
     let mut included = BTreeSet::new();
     include(files, root, root, 0, defines, &mut included, &mut out)?;
@@ -110,7 +154,7 @@ fn compose_from(
 }
 
 fn include(
-    files: &[(&'static str, &'static str)],
+    files: &[(&'static str, &str)],
     name: &str,
     from: &str,
     from_line: usize,

@@ -654,9 +654,11 @@ fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads
             FibreParams { direction: vec4(p.direction), k1: p.k1 as f32, k2: p.k2 as f32, ..Zeroable::zeroed() }
         })),
         "prony" => bytes_of(&per_material(model, |m| prony_series(m, dt))),
-        "viscous_layout" => {
-            bytes_of(&[ViscousLayout { entries: model.prony_term_count() as u32 + 1, ..Zeroable::zeroed() }])
-        }
+        "viscous_layout" => bytes_of(&[ViscousLayout {
+            entries: model.prony_term_count() as u32 + 1,
+            term_count: model.prony_term_count() as u32,
+            ..Zeroable::zeroed()
+        }]),
         "viscous_state" => bytes_of(&viscous_state(model, dt, &vec![PointState::default(); cells as usize])),
         "damage" => bytes_of(&per_material(model, |m| {
             let p = m.damage.unwrap_or_default();
@@ -766,7 +768,7 @@ fn prony_series(m: &Constants, dt: f64) -> PronySeries {
             ratio: term.ratio as f32,
             decay: term.decay(dt) as f32,
             compliance: (1.0 / (4.0 * m.law.shear_modulus() * term.ratio.max(1e-12))) as f32,
-            interval_mask: term.interval(dt) - 1,
+            _pad: 0.0,
         };
     }
     series
@@ -775,25 +777,34 @@ fn prony_series(m: &Constants, dt: f64) -> PronySeries {
 /// Per cell the sum of the terms and the terms.
 fn viscous_state(model: &Model, dt: f64, points: &[PointState]) -> Vec<ViscousStress> {
     let count = model.prony_term_count();
-    let terms = model.materials.iter().filter_map(|m| m.viscoelastic.as_ref()).flat_map(|v| &v.terms);
-    let shortest = terms.map(|t| t.interval(dt)).min().unwrap_or(1);
-    // A term is due in the middle of its interval, which is a power of two.
-    let interval_mask = (shortest / 2).max(1) - 1;
-    let entries = |q: DMat3| ViscousStress {
+    // Binary logarithms of the intervals, one byte each; a term that a material lacks never changes.
+    let intervals: Vec<[u32; 2]> = model
+        .materials
+        .iter()
+        .map(|m| {
+            let mut bytes = [0u8; 8];
+            for (byte, term) in bytes.iter_mut().zip(m.viscoelastic.iter().flat_map(|v| &v.terms)) {
+                *byte = term.interval(dt).ilog2() as u8;
+            }
+            [0, 4].map(|i| u32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]))
+        })
+        .collect();
+    let entries = |q: DMat3, [first_intervals, last_intervals]: [u32; 2]| ViscousStress {
         xx: q.x_axis.x as f32,
         yy: q.y_axis.y as f32,
         zz: q.z_axis.z as f32,
-        term_count: count as u32,
+        first_intervals,
         xy: q.y_axis.x as f32,
         yz: q.z_axis.y as f32,
         zx: q.x_axis.z as f32,
-        interval_mask,
+        last_intervals,
     };
     let mut state = Vec::with_capacity(points.len() * (count + 1));
-    for point in points {
+    for (cell, point) in points.iter().enumerate() {
+        let intervals = intervals[model.material_index(cell)];
         let q = |i: usize| point.viscous.get(i).copied().unwrap_or(DMat3::ZERO);
-        state.push(entries((0..count).map(q).fold(DMat3::ZERO, |sum, q| sum + q)));
-        state.extend((0..count).map(q).map(entries));
+        state.push(entries((0..count).map(q).fold(DMat3::ZERO, |sum, q| sum + q), intervals));
+        state.extend((0..count).map(q).map(|q| entries(q, intervals)));
     }
     state
 }

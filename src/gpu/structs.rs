@@ -90,7 +90,7 @@ shared_structs! {
         ratio: f32,
         decay: f32,
         compliance: f32,
-        interval_mask: u32,
+        _pad: f32,
     }
     /// shaders/effects/viscoelastic.wgsl
     struct PronySeries {
@@ -99,7 +99,7 @@ shared_structs! {
     /// shaders/effects/viscoelastic.wgsl
     struct ViscousLayout {
         entries: u32,
-        _pad0: u32,
+        term_count: u32,
         _pad1: u32,
         _pad2: u32,
     }
@@ -108,11 +108,11 @@ shared_structs! {
         xx: f32,
         yy: f32,
         zz: f32,
-        term_count: u32,
+        first_intervals: u32,
         xy: f32,
         yz: f32,
         zx: f32,
-        interval_mask: u32,
+        last_intervals: u32,
     }
     /// shaders/effects/damage.wgsl
     struct DamageParams {

@@ -150,7 +150,8 @@ fn reading_forces_changes_no_history() {
         let before = engine.read_state().unwrap();
         let first = engine.internal_forces().unwrap();
         let second = engine.internal_forces().unwrap();
-        assert_eq!(first, second, "{name}");
+        // The sum of the Prony terms is formed anew when the state is put back.
+        at_most(name, relative_difference(&first, &second), 1e-6);
         let after = engine.read_state().unwrap();
         assert_eq!(before.points.len(), after.points.len());
         for (a, b) in before.points.iter().zip(&after.points) {

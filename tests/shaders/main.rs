@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use glam::DVec3;
 use rayon::prelude::*;
 use stylet::effects::{EFFECTS, EffectSet, mass_scaling};
-use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose};
+use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose, compose_without_effects};
 use stylet::gpu::engine::{Features, LAWS, defines, stages};
 use stylet::gpu::kernel::{Reflected, reflect};
 use stylet::gpu::structs::layouts;
@@ -301,6 +301,18 @@ fn without_effects_the_shaders_know_nothing_of_them() {
 fn step_input_lines() -> BTreeSet<String> {
     let (_, text) = SOURCES.iter().find(|(name, _)| *name == "shared/step_input").unwrap();
     text.lines().map(str::to_lowercase).collect()
+}
+
+#[test]
+fn the_bare_stages_are_those_of_shaders_that_never_had_an_effect() {
+    assert!(stylet::commands::bench_effects::off_is_absent().unwrap());
+    // Not a comparison of a text with itself: with an effect on the texts differ.
+    let set = effect_set(|i| EFFECTS[i].key == "fibres");
+    let defines = defines(&set, &scene(false, false));
+    let path = "stages/element_forces";
+    let without = compose_without_effects(path, &defines).unwrap();
+    assert_ne!(compose(path, &defines).unwrap().source, without.source);
+    assert!(!without.source.contains("fibre"));
 }
 
 #[test]
