@@ -12,7 +12,11 @@ struct Tetrahedron {
 @group(1) @binding(8) var<storage, read> tetrahedra: array<Tetrahedron>;
 
 fn material_number(tet: Tetrahedron) -> u32 {
+#ifdef REGIONS
     return u32(tet.gradient_d_and_material.w);
+#else
+    return 0u;
+#endif
 }
 
 // H = F - I from the displacements of b, c, d relative to a [m].
