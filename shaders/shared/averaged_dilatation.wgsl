@@ -1,8 +1,11 @@
 // What tetrahedra share through their nodes: the averaged dilatation and its pressure.
 
-// Per cell: V/4 (J - 1) [m^3] and V/4 w K [J], with the part w of the stiffness that is left. A last entry of zeros
-// fills up the lists of cells around the nodes.
-@group(2) @binding(8) var<storage, read_write> cell_dilatation: array<vec2<f32>>;
+// Per cell: V/4 (J - 1) [m^3]. A last entry of zero fills up the lists of cells around the nodes.
+@group(2) @binding(8) var<storage, read_write> cell_dilatation: array<f32>;
+#ifdef VARYING_STIFFNESS
+// Per cell: V/4 w K [J] with the part w of the stiffness that is left; a last entry of zero as well.
+@group(2) @binding(11) var<storage, read_write> cell_bulk_stiffness: array<f32>;
+#endif
 // Per node: displacement in fixed point, and in w the bits of the averaged pressure; one load gives both.
 @group(2) @binding(9) var<storage, read_write> pressed_nodes: array<vec4<i32>>;
 // Per node: averaged dilatation theta.

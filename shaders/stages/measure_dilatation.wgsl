@@ -14,6 +14,7 @@
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
+#ifdef VARYING_STIFFNESS
 // Part of its stiffness that a cell has left from the last step.
 fn stiffness_left(cell: u32, tet: Tetrahedron) -> f32 {
     var left = 1.0;
@@ -26,6 +27,7 @@ fn stiffness_left(cell: u32, tet: Tetrahedron) -> f32 {
 #endif
     return left;
 }
+#endif
 
 @compute @workgroup_size(64)
 fn measure_dilatation(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -42,6 +44,9 @@ fn measure_dilatation(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num
         relative_displacement(node_displacement[tet.nodes.w], origin),
     );
     let share = 0.25 * tet.gradient_b_and_volume.w;
+    cell_dilatation[cell] = share * jacobian_minus_one(H);
+#ifdef VARYING_STIFFNESS
     let bulk_modulus = materials[material_number(tet)].bulk_modulus;
-    cell_dilatation[cell] = share * vec2<f32>(jacobian_minus_one(H), stiffness_left(cell, tet) * bulk_modulus);
+    cell_bulk_stiffness[cell] = share * stiffness_left(cell, tet) * bulk_modulus;
+#endif
 }

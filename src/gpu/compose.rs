@@ -68,7 +68,7 @@ pub const SOURCES: &[(&str, &str)] = &[
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 14] = [
+pub const SCENE_DEFINES: [&str; 15] = [
     "STEP_INPUT",
     "LOADED_FACES",
     "DRIVEN_FACES",
@@ -76,6 +76,7 @@ pub const SCENE_DEFINES: [&str; 14] = [
     "REGIONS",
     "TETRAHEDRA",
     "HISTORY",
+    "VARYING_STIFFNESS",
     "NEO_HOOKEAN",
     "MOONEY_RIVLIN",
     "YEOH",

@@ -90,6 +90,8 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     define("NODE_WORK", loaded || driven);
     define("REGIONS", features.regions);
     define("TETRAHEDRA", features.tetrahedra);
+    // The bulk stiffness of a cell is not that of all others.
+    define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || effects.damage.is_some()));
     define("HISTORY", effects.plasticity.is_some() || effects.viscoelastic.is_some() || effects.damage.is_some());
     for (key, name) in LAWS {
         define(name, features.laws.contains(key));
@@ -482,7 +484,7 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 44] = [
+const BUFFERS: [&str; 45] = [
     "params",
     STEP_INPUT,
     "gravity",
@@ -525,6 +527,7 @@ const BUFFERS: [&str; 44] = [
     "mesh_nodes",
     "node_cells",
     "cell_dilatation",
+    "cell_bulk_stiffness",
     "pressed_nodes",
     "node_dilatation",
 ];
@@ -613,7 +616,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "tetrahedra" => bytes_of(&tetrahedra(model, layout)),
         "mesh_nodes" => bytes_of(&mesh_nodes(model, layout)),
         "node_cells" => bytes_of(&layout.fours().cells),
-        "cell_dilatation" => zeros(cells + 1, 8),
+        "cell_dilatation" | "cell_bulk_stiffness" => zeros(cells + 1, 4),
         "pressed_nodes" => zeros(nodes, 16),
         "node_dilatation" => zeros(nodes, 4),
         "clamped_nodes" => zeros(1, 4),
