@@ -176,9 +176,14 @@ impl Model {
         self.materials.iter().filter_map(|m| m.viscoelastic.as_ref()).map(|v| v.terms.len()).max().unwrap_or(0)
     }
 
-    /// Largest nodal speed that is let through: 0.05 of the smallest edge per step [m/s].
+    /// Largest nodal speed that is let through: 0.05 of the smallest edge per step, of tetrahedra of the smallest
+    /// V^(1/3), so that one flat cell does not slow down the whole mesh [m/s].
     pub fn speed_limit(&self, dt: f64) -> f64 {
-        0.05 * self.mesh.smallest_edge() / dt
+        let size = match &self.mesh {
+            Mesh::Block(_) => self.mesh.smallest_edge(),
+            Mesh::Tets(tets) => (0..tets.tets.len()).map(|t| tets.volume(t)).fold(f64::INFINITY, f64::min).cbrt(),
+        };
+        0.05 * size / dt
     }
 
     /// Stiffness of a penalty contact, `factor (K + 4/3 mu) l^2 / h` with the reference length l = 0.6 mm [N/m].

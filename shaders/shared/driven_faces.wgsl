@@ -1,10 +1,12 @@
 // Prescribed motion of faces: translation and rotation about the axis of the face normal through its centre.
+#import shared/node_place
+#ifndef TETRAHEDRA
 #import shared/grid_lines
+#endif
 
-// Velocity that one face prescribes at rest position X; `centre` is the centre of the block.
-fn face_velocity(face: u32, X: vec3<f32>, centre: vec3<f32>) -> vec3<f32> {
+// Velocity that one face prescribes at the place `arm` relative to the centre of the tissue.
+fn face_velocity(face: u32, arm: vec3<f32>) -> vec3<f32> {
     let drive = step_input.drives[face];
-    let arm = X - centre;
     let axis = face / 2u;
     // Components b, c = axis + 1, axis + 2 (cyclic) turn into each other.
     let turned_x = vec3<f32>(0.0, drive.cosine_rate * arm.y - drive.sine_rate * arm.z,
@@ -16,20 +18,35 @@ fn face_velocity(face: u32, X: vec3<f32>, centre: vec3<f32>) -> vec3<f32> {
     return drive.translation_rate.xyz + select(select(turned_z, turned_y, axis == 1u), turned_x, axis == 0u);
 }
 
-// Sum over the faces that the node (i, j, k) lies on. Faces that do not move carry zeros.
-fn prescribed_velocity(i: u32, j: u32, k: u32) -> vec3<f32> {
+// Sum over the faces that the node lies on. Faces that do not move carry zeros.
+#ifdef TETRAHEDRA
+fn prescribed_velocity(place: NodePlace) -> vec3<f32> {
+    let faces = place.flags >> 3u;
+    var v = vec3<f32>(0.0);
+    // Nodes inside skip the loop.
+    for (var face = select(0u, 6u, faces == 0u); face < 6u; face++) {
+        v += face_velocity(face, place.arm.xyz) * f32((faces >> face) & 1u);
+    }
+    return v;
+}
+#else
+fn prescribed_velocity(place: NodePlace) -> vec3<f32> {
+    let i = place.i;
+    let j = place.j;
+    let k = place.k;
     let y0 = params.nodes_x;
     let z0 = params.nodes_x + params.nodes_y;
     let X = vec3<f32>(grid_lines[i], grid_lines[y0 + j], grid_lines[z0 + k]);
     let low = vec3<f32>(grid_lines[0], grid_lines[y0], grid_lines[z0]);
     let high = vec3<f32>(grid_lines[y0 - 1u], grid_lines[z0 - 1u], grid_lines[z0 + params.nodes_z - 1u]);
-    let centre = 0.5 * (low + high);
+    let arm = X - 0.5 * (low + high);
     var v = vec3<f32>(0.0);
-    if (i == 0u) { v += face_velocity(0u, X, centre); }
-    if (i + 1u == params.nodes_x) { v += face_velocity(1u, X, centre); }
-    if (j == 0u) { v += face_velocity(2u, X, centre); }
-    if (j + 1u == params.nodes_y) { v += face_velocity(3u, X, centre); }
-    if (k == 0u) { v += face_velocity(4u, X, centre); }
-    if (k + 1u == params.nodes_z) { v += face_velocity(5u, X, centre); }
+    if (i == 0u) { v += face_velocity(0u, arm); }
+    if (i + 1u == params.nodes_x) { v += face_velocity(1u, arm); }
+    if (j == 0u) { v += face_velocity(2u, arm); }
+    if (j + 1u == params.nodes_y) { v += face_velocity(3u, arm); }
+    if (k == 0u) { v += face_velocity(4u, arm); }
+    if (k + 1u == params.nodes_z) { v += face_velocity(5u, arm); }
     return v;
 }
+#endif

@@ -1,14 +1,28 @@
-// Sum of the corner forces at a node of the block: x, y, z force [N], w stiffness bound [N/m].
+// Sum of the corner forces at a node: x, y, z force [N], w stiffness bound [N/m].
+#import shared/node_place
+#ifdef TETRAHEDRA
+// Forces of cells on their corners, those of one node side by side, filled up with zeros to fours.
+@group(2) @binding(2) var<storage, read_write> corner_force: array<vec4<f32>>;
+
+fn gathered_force(place: NodePlace) -> vec4<f32> {
+    var sum = vec4<f32>(0.0);
+    for (var slot = 4u * place.first_four; slot < 4u * place.end_four; slot += 4u) {
+        sum += (corner_force[slot] + corner_force[slot + 1u]) + (corner_force[slot + 2u] + corner_force[slot + 3u]);
+    }
+    return sum;
+}
+#else
 #import shared/corner_force
 
-fn gathered_force(i: u32, j: u32, k: u32) -> vec4<f32> {
+fn gathered_force(place: NodePlace) -> vec4<f32> {
     // One strip, or two where the node lies on the plane between them.
+    let k = place.k;
     let above = quotient(k, params.strip_layers);
     let last = min(above, params.strip_count - 1u);
     let first = select(last, above - 1u, k > 0u && above * params.strip_layers == k);
     let stride = params.padded_columns;
     let row = params.cells_x + 2u;
-    let column = padded_column(i, j);
+    let column = padded_column(place.i, place.j);
     var sum = vec4<f32>(0.0);
     for (var strip = first; strip <= last; strip++) {
         let slot = corner_slot(strip, k - strip * params.strip_layers, 0u, column);
@@ -17,3 +31,4 @@ fn gathered_force(i: u32, j: u32, k: u32) -> vec4<f32> {
     }
     return sum;
 }
+#endif

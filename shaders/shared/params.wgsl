@@ -30,6 +30,9 @@ struct Params {
     mass_damping: f32,
     // Largest nodal speed that is let through [m/s].
     speed_limit: f32,
+    // Cells and nodes of the whole mesh.
+    cell_count: u32,
+    node_count: u32,
     _pad0: u32,
 }
 

@@ -35,15 +35,11 @@
 @compute @workgroup_size(64)
 fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let node = thread_index(id, groups);
-    let layer = params.nodes_x * params.nodes_y;
-    if (node >= layer * params.nodes_z) {
+    if (node >= params.node_count) {
         return;
     }
-    let k = quotient(node, layer);
-    let j = quotient(node - k * layer, params.nodes_x);
-    let i = node - k * layer - j * params.nodes_x;
-
-    let sum = gathered_force(i, j, k);
+    let place = node_place(node);
+    let sum = gathered_force(place);
     var force = sum.xyz;
     let scaled_mass = node_mass[node];
     var mass = scaled_mass;
@@ -62,10 +58,7 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
     let half = 0.5 * params.mass_damping * params.dt;
     var next = (old.xyz * (1.0 - half) + force * (params.dt / mass)) / (1.0 + half);
-    var held = select(0u, params.fixed_x_min, i == 0u) | select(0u, params.fixed_x_max, i + 1u == params.nodes_x);
-    held |= select(0u, params.fixed_y_min, j == 0u) | select(0u, params.fixed_y_max, j + 1u == params.nodes_y);
-    held |= select(0u, params.fixed_z_min, k == 0u) | select(0u, params.fixed_z_max, k + 1u == params.nodes_z);
-    let is_free = vec3<f32>((vec3<u32>(held) & vec3<u32>(1u, 2u, 4u)) == vec3<u32>(0u));
+    let is_free = vec3<f32>((vec3<u32>(held_components(place)) & vec3<u32>(1u, 2u, 4u)) == vec3<u32>(0u));
     // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
     next *= is_free;
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
@@ -77,7 +70,7 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     }
     var prescribed = vec3<f32>(0.0);
 #ifdef DRIVEN_FACES
-    prescribed = prescribed_velocity(i, j, k) * (1.0 - is_free);
+    prescribed = prescribed_velocity(place) * (1.0 - is_free);
 #endif
 #ifdef NODE_WORK
     // What the support adds so that the node moves as prescribed, times its velocity at mid step.

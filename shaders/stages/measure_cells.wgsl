@@ -2,12 +2,12 @@
 #import shared/params
 #import shared/thread_index
 #import shared/displacement
-#import shared/cell_edge
 #import shared/material_point
-#import shared/cell_energy
 #import shared/cell_sums
-#ifdef PUNCTURE
-#import effects/puncture
+#ifdef TETRAHEDRA
+#import shared/measured_tetrahedron
+#else
+#import shared/measured_hexahedron
 #endif
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
@@ -30,43 +30,20 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     if (thread >= params.measure_threads) {
         return;
     }
-    let layer = params.cells_x * params.cells_y;
-    let count = layer * params.cells_z;
     var sums: CellSums;
     sums.min_jacobian = 1e30;
     sums.min_corner_jacobian = 1e30;
     sums.least_intact = 1.0;
-    for (var index = thread; index < count; index += params.measure_threads) {
-        let k = quotient(index, layer);
-        let j = quotient(index - k * layer, params.cells_x);
-        let cell = vec3<u32>(index - k * layer - j * params.cells_x, j, k);
-        var u: array<vec3<f32>, 8>;
-        // Relative to the first corner in integers: differences stay exact.
-        let origin = node_displacement[corner_node(cell, 0u)].xyz;
-        for (var corner = 0u; corner < 8u; corner++) {
-            u[corner] = vec3<f32>(node_displacement[corner_node(cell, corner)].xyz - origin) * DISPLACEMENT_UNIT;
-        }
-        var apart = vec3<f32>(0.0);
-        for (var corner = 1u; corner < 8u; corner++) {
-            apart = max(apart, abs(u[corner]));
-        }
-        sums.overstretched_cells += select(0u, 1u, max(apart.x, max(apart.y, apart.z)) > LARGEST_DIFFERENCE);
-        var kept = 1.0;
-#ifdef PUNCTURE
-        kept = cell_stiffness[index];
-#endif
-        let energy = cell_energy(cell, material_of(index), kept, &u);
+    for (var index = thread; index < params.cell_count; index += params.measure_threads) {
+        let cell = measured_cell(index);
+        let energy = cell.energy;
+        sums.overstretched_cells += select(0u, 1u, cell.apart > LARGEST_DIFFERENCE);
         sums.elastic += energy.elastic;
         sums.hourglass += energy.hourglass;
 #ifdef HISTORY
-        let edges = vec3<f32>(
-            cell_edges[cell.x].length,
-            cell_edges[params.cells_x + cell.y].length,
-            cell_edges[params.cells_x + params.cells_y + cell.z].length,
-        );
-        book_history(&sums, index, edges.x * edges.y * edges.z, energy.held);
+        book_history(&sums, index, cell.volume, energy.held);
 #endif
-        sums.least_intact = min(sums.least_intact, energy.intact / kept);
+        sums.least_intact = min(sums.least_intact, energy.intact / cell.kept);
         // What has been deleted may be turned inside out.
         let present = energy.intact > 0.0;
         sums.deleted_cells += select(1u, 0u, present);

@@ -6,13 +6,21 @@
 // Force on the tissue [N], w unused; faces in the order x-, x+, y-, y+, z-, z+.
 @group(2) @binding(7) var<storage, read_write> face_sums: array<vec4<f32>, 384>;
 
-@compute @workgroup_size(64)
-fn measure_faces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let thread = thread_index(id, groups);
-    if (thread >= 384u) {
-        return;
+// Sum over every 64th node of the face. What holds a node balances the force of the cells on it.
+#ifdef TETRAHEDRA
+fn part_of_face(face: u32, part: u32) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var node = part; node < params.node_count; node += 64u) {
+        let place = node_place(node);
+        // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
+        for (var once = 1u - ((place.flags >> (3u + face)) & 1u); once == 0u; once++) {
+            sum -= gathered_force(place).xyz;
+        }
     }
-    let face = thread / 64u;
+    return sum;
+}
+#else
+fn part_of_face(face: u32, part: u32) -> vec3<f32> {
     let axis = face / 2u;
     let counts = vec3<u32>(params.nodes_x, params.nodes_y, params.nodes_z);
     // Nodes per row of the face, and of the face.
@@ -20,7 +28,7 @@ fn measure_faces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     let count = row * select(params.nodes_z, params.nodes_y, axis == 2u);
     let last = (face & 1u) == 1u;
     var sum = vec3<f32>(0.0);
-    for (var index = thread % 64u; index < count; index += 64u) {
+    for (var index = part; index < count; index += 64u) {
         let second = index / row;
         let first = index - second * row;
         var at = vec3<u32>(first, second, select(0u, counts.z - 1u, last));
@@ -29,8 +37,18 @@ fn measure_faces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         } else if (axis == 1u) {
             at = vec3<u32>(first, select(0u, counts.y - 1u, last), second);
         }
-        // What holds the node balances the force of the cells on it.
-        sum -= gathered_force(at.x, at.y, at.z).xyz;
+        sum -= gathered_force(NodePlace(at.x, at.y, at.z)).xyz;
     }
-    face_sums[thread] = vec4<f32>(sum, 0.0);
+    return sum;
+}
+#endif
+
+@compute @workgroup_size(64)
+fn measure_faces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let thread = thread_index(id, groups);
+    if (thread >= 384u) {
+        return;
+    }
+    let face = thread / 64u;
+    face_sums[thread] = vec4<f32>(part_of_face(face, thread % 64u), 0.0);
 }

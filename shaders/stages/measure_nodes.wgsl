@@ -23,9 +23,8 @@ fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     if (thread >= params.measure_threads) {
         return;
     }
-    let count = params.nodes_x * params.nodes_y * params.nodes_z;
     var sums: NodeSums;
-    for (var node = thread; node < count; node += params.measure_threads) {
+    for (var node = thread; node < params.node_count; node += params.measure_threads) {
         let u = node_displacement[node];
         let v = node_velocity[node];
         let mass = node_mass[node];

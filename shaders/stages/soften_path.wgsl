@@ -3,9 +3,8 @@
 #import shared/params
 #import shared/thread_index
 #import shared/displacement
-#import shared/cell_edge
 #import shared/material_point
-#import shared/cell_energy
+#import shared/hexahedron_energy
 #import effects/puncture
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;

@@ -16,6 +16,7 @@ use crate::gpu::engine::{Features, stages};
 use crate::gpu::{Gpu, GpuEngine};
 use crate::material::ElasticLaw;
 use crate::mesh::BlockMesh;
+use crate::mesh::tets::TetMesh;
 use crate::model::Model;
 use crate::process;
 use crate::scene::{
@@ -167,12 +168,11 @@ impl Subject {
     fn new(cells: [usize; 3], needle: bool, gpu: Option<&Gpu>, max_steps: usize) -> Result<Self> {
         let scene = scene(cells, needle);
         let mesh = uniform_mesh(cells, scene.tissue.cell_size);
-        Self::of(scene, mesh, gpu, max_steps)
+        Self::of_model(Arc::new(Model::new(scene, mesh)), gpu, max_steps)
     }
 
-    /// A block of any scene.
-    pub(super) fn of(scene: Scene, mesh: BlockMesh, gpu: Option<&Gpu>, max_steps: usize) -> Result<Self> {
-        let model = Arc::new(Model::new(scene, mesh));
+    /// A model of any scene.
+    pub(super) fn of_model(model: Arc<Model>, gpu: Option<&Gpu>, max_steps: usize) -> Result<Self> {
         let dt = 0.8 * wave_speed_bound(&model);
         let engine: Box<dyn Engine> = match gpu {
             Some(gpu) => Box::new(GpuEngine::new(model.clone(), gpu.clone(), dt, max_steps)?),
@@ -284,6 +284,20 @@ fn needle_over_bare(gpu: Option<&Gpu>) -> Result<f64> {
     }
     ratios.sort_by(f64::total_cmp);
     Ok(ratios[ratios.len() / 2])
+}
+
+/// Wall and CPU time per tetrahedron and step [ns] of 20 k tetrahedra with averaged pressure.
+fn tetrahedra(gpu: Option<&Gpu>) -> Result<(f64, Option<f64>)> {
+    const STEPS: usize = 100;
+    const CELLS: [usize; 3] = [15; 3];
+    let scene = scene(CELLS, false);
+    let block = uniform_mesh(CELLS, scene.tissue.cell_size);
+    let model = Arc::new(Model::new(scene, Arc::new(TetMesh::from_block(&block))));
+    let mut subject = Subject::of_model(model, gpu, STEPS)?;
+    subject.frame(STEPS, 1.0)?;
+    let (wall, cpu) = subject.best(STEPS)?;
+    let scale = 1e9 / subject.model.mesh.cell_count() as f64;
+    Ok((wall * scale, cpu.map(|c| c * scale)))
 }
 
 /// Share of a 16-step frame that is no step: submission, measuring stages and read-back together.
@@ -421,6 +435,10 @@ pub fn bench(options: &BenchOptions) -> Result<Report> {
             goal(&what, cost(row), unit, "<=", 120.0);
         }
     }
+    eprintln!("measuring tetrahedra");
+    let (wall, cpu) = tetrahedra(gpu.as_ref())?;
+    let measured = cpu.filter(|_| software).unwrap_or(wall);
+    goal("tet4 with averaged pressure, 20 k tets, per tet-step", measured, unit, "<=", 75.0);
     if let Some(bare) = &bare {
         let extra = 100.0 * (needle_over_bare(gpu.as_ref())? - 1.0);
         goal("needle, contact and tip law on top, 20 k cells", extra, "%", "<=", 25.0);

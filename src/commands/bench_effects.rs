@@ -7,6 +7,7 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::sync::Arc;
 
 use glam::DVec3;
 use serde::Serialize;
@@ -17,6 +18,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::compose::{compose, compose_without_effects};
 use crate::gpu::engine::{Features, defines, stages};
+use crate::model::Model;
 use crate::scene::Scene;
 use crate::solver::simulation::EngineChoice;
 
@@ -93,7 +95,7 @@ fn subject(keys: &[&str], low: bool, gpu: Option<&Gpu>) -> Result<Subject> {
     }
     with_effects(&mut scene.effects, keys, low);
     let mesh = uniform_mesh(CELLS, scene.tissue.cell_size);
-    let mut subject = Subject::of(scene, mesh, gpu, STEPS)?;
+    let mut subject = Subject::of_model(Arc::new(Model::new(scene, mesh)), gpu, STEPS)?;
     if needle {
         subject.puncture(STEPS)?;
     }
@@ -192,7 +194,7 @@ pub fn bench_effects(engine: EngineChoice) -> Result<EffectReport> {
         costs.push(cost(keys, beside, low, gpu)?);
     }
     let all = costs.iter().find(|c| c.load == "rest" && c.effects == CONSTITUTIVE.join(" + "));
-    let info = Subject::of(scene([2, 2, 2], false), uniform_mesh([2, 2, 2], 0.8e-3), gpu, 1)?;
+    let info = Subject::of_model(Arc::new(Model::new(scene([2; 3], false), uniform_mesh([2; 3], 0.8e-3))), gpu, 1)?;
     Ok(EffectReport {
         engine: info.engine.info().engine.clone(),
         adapter: info.engine.info().adapter.clone(),

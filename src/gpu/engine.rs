@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::kernel::{Kernel, Reflected, STEP_INPUT, reflect};
+use super::layout::Layout;
 use super::structs::*;
 use crate::effects::EffectSet;
 use crate::error::{Error, Result};
@@ -70,9 +71,13 @@ pub const LAWS: [(&str, &str); 5] = [
     ("demiray", "DEMIRAY"),
 ];
 
+/// Effects of tools, which work on the block only.
+const BLOCK_EFFECTS: [&str; 3] = ["puncture", "indentation", "friction"];
+
 /// Names that are defined for the shaders.
 pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
-    let mut defines: BTreeSet<&'static str> = effects.active().map(|e| e.define).collect();
+    let works = |key: &str| !features.tetrahedra || !BLOCK_EFFECTS.contains(&key);
+    let mut defines: BTreeSet<&'static str> = effects.active().filter(|e| works(e.key)).map(|e| e.define).collect();
     let mut define = |name: &'static str, wanted: bool| {
         if wanted {
             defines.insert(name);
@@ -85,6 +90,8 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     define("NODE_WORK", loaded || driven);
     define("REGIONS", features.regions);
     define("TETRAHEDRA", features.tetrahedra);
+    // The bulk stiffness of a cell is not that of all others.
+    define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || effects.damage.is_some()));
     define("HISTORY", effects.plasticity.is_some() || effects.viscoelastic.is_some() || effects.damage.is_some());
     for (key, name) in LAWS {
         define(name, features.laws.contains(key));
@@ -96,49 +103,19 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
 
 /// The stages that a set of effects needs, in the order of the step.
 pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
+    let (block, tetrahedra) = (!features.tetrahedra, features.tetrahedra);
+    let puncture = block && effects.puncture.is_some();
+    let indentation = block && effects.indentation.is_some();
     let wanted = |stage: &Stage| match stage {
-        Stage::AdvanceTip | Stage::SoftenPath | Stage::NeedleContact => effects.puncture.is_some(),
-        Stage::IndenterContact => effects.indentation.is_some(),
-        Stage::MeasureContact => effects.puncture.is_some() || effects.indentation.is_some(),
+        Stage::AdvanceTip | Stage::SoftenPath | Stage::NeedleContact => puncture,
+        Stage::IndenterContact => indentation,
+        Stage::MeasureContact => puncture || indentation,
+        Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
+        Stage::ElementForces => block,
         Stage::MeasureFaces => features.driven_faces,
         _ => true,
     };
     Stage::ALL.into_iter().filter(wanted).collect()
-}
-
-/// Layout of strips and columns (see shaders/shared/corner_force.wgsl).
-#[derive(Debug, Clone, Copy)]
-struct Strips {
-    layers: u32,
-    count: u32,
-    columns: u32,
-    padded_columns: u32,
-    cells_x: u32,
-}
-
-impl Strips {
-    fn new(cells: [usize; 3], layers: u32) -> Self {
-        let [x, y, z] = cells.map(|c| c as u32);
-        let layers = layers.clamp(1, z);
-        Strips { layers, count: z.div_ceil(layers), columns: x * y, padded_columns: (x + 2) * (y + 2), cells_x: x }
-    }
-
-    fn slots(&self) -> u64 {
-        u64::from(self.count) * u64::from(self.layers + 1) * 4 * u64::from(self.padded_columns)
-    }
-
-    /// Slot of corner `corner` of the column (i, j) on the node plane k, in the strip `strip`.
-    fn slot(&self, strip: u32, k: u32, corner: u32, i: u32, j: u32) -> u32 {
-        let column = (j + 1) * (self.cells_x + 2) + i + 1;
-        ((strip * (self.layers + 1) + k - strip * self.layers) * 4 + corner) * self.padded_columns + column
-    }
-
-    /// A slot of node (i, j, k) that the element stage writes in every step.
-    fn owned_slot(&self, [i, j, k]: [usize; 3], cells: [usize; 3]) -> u32 {
-        let strip = ((k as u32) / self.layers).min(self.count - 1);
-        let (right, back) = (u32::from(i == cells[0]), u32::from(j == cells[1]));
-        self.slot(strip, k as u32, right + 2 * back, i as u32 - right, j as u32 - back)
-    }
 }
 
 /// Results of one frame on their way to the host.
@@ -164,7 +141,7 @@ pub struct GpuEngine {
     model: Arc<Model>,
     gpu: Gpu,
     info: EngineInfo,
-    strips: Strips,
+    layout: Layout,
     dt: f64,
     kernels: Vec<Kernel>,
     buffers: BTreeMap<&'static str, wgpu::Buffer>,
@@ -184,7 +161,7 @@ impl GpuEngine {
     pub fn new(model: Arc<Model>, gpu: Gpu, dt: f64, max_steps: usize) -> Result<Self> {
         // Software adapters pay per buffer access: long strips share most planes. Hardware wants many threads.
         let layers = if gpu.is_software() { 8 } else { 4 };
-        let strips = Strips::new(model.mesh.block().cells(), layers);
+        let layout = Layout::new(&model.mesh, layers);
         let features = Features::of(&model);
         let defines = defines(&model.effects, &features);
         // Composing, validating and compiling go side by side: they are most of the time to the first step.
@@ -206,7 +183,7 @@ impl GpuEngine {
             if buffers.contains_key(name) {
                 continue;
             }
-            let contents = contents(name, &model, &strips, dt, measure_threads, max_steps);
+            let contents = contents(name, &model, &layout, dt, measure_threads, max_steps);
             let buffer = create_buffer(&gpu, name, &contents, binding.uniform)?;
             bytes += buffer.size();
             buffers.insert(*name, buffer);
@@ -214,7 +191,7 @@ impl GpuEngine {
         let kernels = reflected
             .into_par_iter()
             .map(|r| {
-                let threads = threads(r.stage, &model, &strips, measure_threads);
+                let threads = threads(r.stage, &model, &layout, measure_threads);
                 Kernel::new(&gpu.device, r, &buffers, size_of::<StepInput>() as u64, threads)
             })
             .collect::<Result<Vec<Kernel>>>()?;
@@ -254,7 +231,7 @@ impl GpuEngine {
             model,
             gpu,
             info,
-            strips,
+            layout,
             dt,
             kernels,
             buffers,
@@ -491,11 +468,13 @@ fn measure_threads(model: &Model) -> u32 {
 }
 
 /// Threads that a stage needs.
-fn threads(stage: Stage, model: &Model, strips: &Strips, measure_threads: u32) -> u32 {
+fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -> u32 {
     match stage {
         Stage::AdvanceTip => 32,
         Stage::SoftenPath => model.puncture.as_ref().map_or(1, |p| p.cells.len() as u32),
-        Stage::ElementForces => strips.columns * strips.count,
+        Stage::MeasureDilatation | Stage::TetrahedronForces => model.mesh.cell_count() as u32,
+        Stage::AveragePressure => model.mesh.node_count() as u32,
+        Stage::ElementForces => layout.strips().columns * layout.strips().count,
         Stage::NeedleContact | Stage::IndenterContact => model.contact_nodes.len() as u32,
         Stage::IntegrateNodes => model.mesh.node_count() as u32,
         Stage::MeasureCells | Stage::MeasureNodes => measure_threads,
@@ -505,7 +484,7 @@ fn threads(stage: Stage, model: &Model, strips: &Strips, measure_threads: u32) -
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 38] = [
+const BUFFERS: [&str; 45] = [
     "params",
     STEP_INPUT,
     "gravity",
@@ -544,6 +523,13 @@ const BUFFERS: [&str; 38] = [
     "damage",
     "contact_totals",
     "tip_result",
+    "tetrahedra",
+    "mesh_nodes",
+    "node_cells",
+    "cell_dilatation",
+    "cell_bulk_stiffness",
+    "pressed_nodes",
+    "node_dilatation",
 ];
 
 /// What a buffer holds at the start: bytes, or zeros of a size.
@@ -560,13 +546,13 @@ fn vec4(v: DVec3) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
 }
 
-fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads: u32, max_steps: usize) -> Contents {
+fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads: u32, max_steps: usize) -> Contents {
     let nodes = model.mesh.node_count() as u64;
     let contacts = model.contact_nodes.len().max(1) as u64;
     let cells = model.mesh.cell_count() as u64;
     let zeros = |count: u64, size: usize| Contents::Zeros(count * size as u64);
     match name {
-        "params" => bytes_of(&[params(model, strips, dt, measure_threads)]),
+        "params" => bytes_of(&[params(model, layout, dt, measure_threads)]),
         STEP_INPUT => zeros(max_steps.max(1) as u64, size_of::<StepInput>()),
         "gravity" => {
             let g = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration);
@@ -602,7 +588,7 @@ fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads
         "node_mass" => bytes_of(&model.node_mass.iter().map(|m| *m as f32).collect::<Vec<_>>()),
         "node_load" => bytes_of(&model.node_load.iter().map(|f| vec4(*f)).collect::<Vec<_>>()),
         "grid_lines" => bytes_of(&model.mesh.block().lines.iter().flatten().map(|x| *x as f32).collect::<Vec<_>>()),
-        "contact_nodes" => bytes_of(&contact_nodes(model, strips)),
+        "contact_nodes" => bytes_of(&contact_nodes(model, layout)),
         "tip_anchors" => {
             let plan = model.puncture.as_ref();
             let anchors = plan.map_or(&[][..], |p| &p.anchors);
@@ -626,7 +612,13 @@ fn contents(name: &str, model: &Model, strips: &Strips, dt: f64, measure_threads
             bytes_of(&cells)
         }
         "node_displacement" | "node_velocity" => zeros(nodes, 16),
-        "corner_force" => zeros(strips.slots(), 16),
+        "corner_force" => zeros(layout.slot_count(), 16),
+        "tetrahedra" => bytes_of(&tetrahedra(model, layout)),
+        "mesh_nodes" => bytes_of(&mesh_nodes(model, layout)),
+        "node_cells" => bytes_of(&layout.fours().cells),
+        "cell_dilatation" | "cell_bulk_stiffness" => zeros(cells + 1, 4),
+        "pressed_nodes" => zeros(nodes, 16),
+        "node_dilatation" => zeros(nodes, 4),
         "clamped_nodes" => zeros(1, 4),
         "node_work" => zeros(nodes, 4),
         "cell_sums" => zeros(measure_threads.into(), size_of::<CellSums>()),
@@ -704,21 +696,68 @@ fn create_buffer(gpu: &Gpu, name: &str, contents: &Contents, uniform: bool) -> R
     Ok(buffer)
 }
 
-fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Params {
-    let [cx, cy, cz] = model.mesh.block().cells().map(|c| c as u32);
+/// Cells at rest with the slots of their forces.
+fn tetrahedra(model: &Model, layout: &Layout) -> Vec<Tetrahedron> {
+    let Some(mesh) = model.mesh.as_tets() else { return Vec::new() };
+    let with = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
+    (0..mesh.tets.len())
+        .map(|cell| {
+            let [_, b, c, d] = mesh.gradients(cell);
+            let volume = mesh.volume(cell);
+            Tetrahedron {
+                nodes: mesh.tets[cell],
+                slots: layout.fours().slots[cell],
+                gradient_b_and_volume: with(b, volume),
+                gradient_c_and_edge: with(c, volume.cbrt()),
+                gradient_d_and_material: with(d, model.material_index(cell) as f64),
+            }
+        })
+        .collect()
+}
+
+fn mesh_nodes(model: &Model, layout: &Layout) -> Vec<MeshNode> {
+    let Some(mesh) = model.mesh.as_tets() else { return Vec::new() };
+    let mut volume = vec![0.0; mesh.positions.len()];
+    for (cell, tet) in mesh.tets.iter().enumerate() {
+        let share = 0.25 * mesh.volume(cell);
+        tet.iter().for_each(|n| volume[*n as usize] += share);
+    }
+    let (low, high) = mesh.bounds();
+    let first = &layout.fours().first;
+    (0..mesh.positions.len())
+        .map(|node| MeshNode {
+            arm: vec4(mesh.positions[node] - 0.5 * (low + high)),
+            first_four: first[node],
+            end_four: first[node + 1],
+            flags: model.node_flags[node],
+            inverse_volume: (1.0 / volume[node]) as f32,
+        })
+        .collect()
+}
+
+fn params(model: &Model, layout: &Layout, dt: f64, measure_threads: u32) -> Params {
+    let block = match layout {
+        Layout::Strips(strips) => {
+            let [x, y, z] = model.mesh.block().cells().map(|c| c as u32);
+            Params {
+                cells_x: x,
+                cells_y: y,
+                cells_z: z,
+                nodes_x: x + 1,
+                nodes_y: y + 1,
+                nodes_z: z + 1,
+                column_count: strips.columns,
+                strip_layers: strips.layers,
+                strip_count: strips.count,
+                padded_columns: strips.padded_columns,
+                ..Zeroable::zeroed()
+            }
+        }
+        Layout::Fours(_) => Params::zeroed(),
+    };
     let solver = &model.scene.solver;
     let fixed: Vec<u32> = model.faces().iter().map(|f| (0..3).map(|a| u32::from(f.fixed[a]) << a).sum()).collect();
     Params {
-        cells_x: cx,
-        cells_y: cy,
-        cells_z: cz,
-        nodes_x: cx + 1,
-        nodes_y: cy + 1,
-        nodes_z: cz + 1,
-        column_count: strips.columns,
-        strip_layers: strips.layers,
-        strip_count: strips.count,
-        padded_columns: strips.padded_columns,
         measure_threads,
         fixed_x_min: fixed[0],
         fixed_x_max: fixed[1],
@@ -730,7 +769,9 @@ fn params(model: &Model, strips: &Strips, dt: f64, measure_threads: u32) -> Para
         dt: dt as f32,
         mass_damping: solver.mass_damping as f32,
         speed_limit: model.speed_limit(dt) as f32,
-        _pad0: 0,
+        cell_count: model.mesh.cell_count() as u32,
+        node_count: model.mesh.node_count() as u32,
+        ..block
     }
 }
 
@@ -856,7 +897,7 @@ fn indentation_params(model: &Model) -> IndentationParams {
     }
 }
 
-fn contact_nodes(model: &Model, strips: &Strips) -> Vec<ContactNode> {
+fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
     let cells = model.mesh.block().cells();
     let mut nodes: Vec<ContactNode> = model
         .contact_nodes
@@ -868,7 +909,7 @@ fn contact_nodes(model: &Model, strips: &Strips) -> Vec<ContactNode> {
                 rest: vec4(model.mesh.rest_position(node)),
                 grid: [i as u32, j as u32, k as u32, 0],
                 node: c.node,
-                slot: strips.owned_slot([i, j, k], cells),
+                slot: layout.strips().owned_slot([i, j, k], cells),
                 pushed: c.pushed.into(),
                 rest_radius: c.rest_radius as f32,
                 rest_axial: c.rest_axial as f32,
@@ -945,7 +986,7 @@ impl Engine for GpuEngine {
                 self.encode_step(&mut pass, step);
             }
             let last = (plan.steps.len().saturating_sub(1) * size_of::<StepInput>()) as u32;
-            for kernel in self.kernels.iter().filter(|k| k.stage.once_per_frame()) {
+            for kernel in self.kernels.iter().filter(|k| k.stage.averages() || k.stage.once_per_frame()) {
                 kernel.encode(&mut pass, last);
             }
         }
@@ -1098,7 +1139,7 @@ impl Engine for GpuEngine {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            for kernel in self.kernels.iter().filter(|k| k.stage == Stage::ElementForces) {
+            for kernel in self.kernels.iter().filter(|k| k.stage.gives_forces()) {
                 kernel.encode(&mut pass, 0);
             }
         }
@@ -1108,23 +1149,6 @@ impl Engine for GpuEngine {
             self.write_state(&state)?;
         }
         let slots: Vec<[f32; 4]> = read_all(&bytes[0]).collect();
-        let strips = &self.strips;
-        let [nx, ny, nz] = self.model.mesh.block().cells();
-        let mut force = vec![DVec3::ZERO; self.model.mesh.node_count()];
-        for strip in 0..strips.count {
-            let first = strip * strips.layers;
-            for k in first..=(first + strips.layers).min(nz as u32) {
-                for (j, i, corner) in (0..ny).flat_map(|j| (0..nx).flat_map(move |i| (0..4).map(move |c| (j, i, c)))) {
-                    let f = slots[strips.slot(strip, k, corner, i as u32, j as u32) as usize];
-                    let node = self.model.mesh.block().node_index(
-                        i + (corner & 1) as usize,
-                        j + (corner >> 1) as usize,
-                        k as usize,
-                    );
-                    force[node] -= DVec3::new(f[0].into(), f[1].into(), f[2].into());
-                }
-            }
-        }
-        Ok(force)
+        Ok(self.layout.internal_forces(&self.model.mesh, &slots))
     }
 }

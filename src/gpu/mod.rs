@@ -4,6 +4,7 @@ pub mod compose;
 pub mod device;
 pub mod engine;
 pub mod kernel;
+mod layout;
 pub mod structs;
 
 pub use device::Gpu;

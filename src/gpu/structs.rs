@@ -47,6 +47,8 @@ shared_structs! {
         dt: f32,
         mass_damping: f32,
         speed_limit: f32,
+        cell_count: u32,
+        node_count: u32,
         _pad0: u32,
     }
     /// shaders/shared/elastic.wgsl
@@ -146,6 +148,22 @@ shared_structs! {
         cube_root: f32,
         quarter_inverse: f32,
         _pad: f32,
+    }
+    /// shaders/shared/tetrahedron.wgsl
+    struct Tetrahedron {
+        nodes: [u32; 4],
+        slots: [u32; 4],
+        gradient_b_and_volume: [f32; 4],
+        gradient_c_and_edge: [f32; 4],
+        gradient_d_and_material: [f32; 4],
+    }
+    /// shaders/shared/mesh_node.wgsl
+    struct MeshNode {
+        arm: [f32; 4],
+        first_four: u32,
+        end_four: u32,
+        flags: u32,
+        inverse_volume: f32,
     }
     /// shaders/effects/gravity.wgsl
     struct GravityParams {

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use super::BlockMesh;
+
 /// Tetrahedra with positive volume, sorted so that neighbours in space are neighbours in memory.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TetMesh {
@@ -19,7 +21,43 @@ pub struct TetMesh {
     pub node_sets: BTreeMap<String, Vec<u32>>,
 }
 
+/// Paths along the edges of a hexahedron from its low to its high corner, as axes; each is the edge of one tetrahedron
+/// that is right-handed as it stands, or after a swap.
+const PATHS: [([usize; 3], bool); 6] = [
+    ([0, 1, 2], false),
+    ([1, 2, 0], false),
+    ([2, 0, 1], false),
+    ([0, 2, 1], true),
+    ([2, 1, 0], true),
+    ([1, 0, 2], true),
+];
+
 impl TetMesh {
+    /// The block with every hexahedron cut into six tetrahedra around the diagonal from its low to its high corner.
+    pub fn from_block(block: &BlockMesh) -> TetMesh {
+        let tet = |cell: usize, (path, swapped): ([usize; 3], bool)| {
+            let mut corner = block.cell_coordinates(cell);
+            let index = |c: [usize; 3]| block.node_index(c[0], c[1], c[2]) as u32;
+            let mut tet = [index(corner); 4];
+            for (node, axis) in tet[1..].iter_mut().zip(path) {
+                corner[axis] += 1;
+                *node = index(corner);
+            }
+            if swapped {
+                tet.swap(1, 2);
+            }
+            tet
+        };
+        let tets: Vec<[u32; 4]> = (0..block.cell_count()).flat_map(|cell| PATHS.map(|path| tet(cell, path))).collect();
+        TetMesh {
+            positions: (0..block.node_count()).map(|node| block.rest_position(node)).collect(),
+            tags: vec![0; tets.len()],
+            tets,
+            regions: vec!["tissue".into()],
+            node_sets: BTreeMap::new(),
+        }
+    }
+
     /// Rest volume of a tetrahedron [m^3].
     pub fn volume(&self, tet: usize) -> f64 {
         let [a, b, c, d] = self.corners(tet);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::elements::{CORNERS, CellForces, CellMeasure, CellStates, Elements};
+use super::elements::{CORNERS, CellForces, CellInput, CellMeasure, CellStates, Elements};
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
@@ -208,9 +208,9 @@ impl CpuEngine {
         let averaged = elements.averaged_volumetrics(model, displacement, states);
         let forces = |cell: usize, point: Option<&mut PointState>| {
             let remaining = stiffness.get(cell).copied().unwrap_or(1.0);
-            let volumetric = averaged.as_ref().map(|a| a[cell]);
-            let advance = Some((dt, input.step));
-            elements.corner_forces(model, cell, displacement, volumetric, remaining, point, advance)
+            let averaged = averaged.as_ref().map(|a| a[cell]);
+            let input = CellInput { averaged, remaining, point, advance: Some((dt, input.step)) };
+            elements.corner_forces(model, cell, displacement, input)
         };
         if points.is_empty() {
             self.cells.par_iter_mut().with_min_len(256).enumerate().for_each(|(cell, out)| *out = forces(cell, None).0);

@@ -155,6 +155,18 @@ impl<'a> CellStates<'a> {
     }
 }
 
+/// What the forces of one cell depend on beside the displacement.
+#[derive(Debug)]
+pub struct CellInput<'a> {
+    /// Averaged volumetric answer of a tetrahedron; `None` for a hexahedron.
+    pub averaged: Option<Volumetric>,
+    /// Stiffness that the path left.
+    pub remaining: f64,
+    pub point: Option<&'a mut PointState>,
+    /// Time step [s] and number of the step to which the history is brought first; `None`: it stays as it is.
+    pub advance: Option<(f64, u64)>,
+}
+
 /// What one cell tells about itself.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CellMeasure {
@@ -265,18 +277,9 @@ impl Elements {
         Some((0..tets.tets.len()).into_par_iter().map(answer).collect())
     }
 
-    /// Forces of one cell; with `advance` (time step [s], step number) the history is brought to this step first.
-    /// The flag tells whether the return mapping met the yield condition.
-    pub fn corner_forces(
-        &self,
-        model: &Model,
-        cell: usize,
-        u: &[DVec3],
-        averaged: Option<Volumetric>,
-        remaining: f64,
-        point: Option<&mut PointState>,
-        advance: Option<(f64, u64)>,
-    ) -> (CellForces, bool) {
+    /// Forces of one cell. The flag tells whether the return mapping met the yield condition.
+    pub fn corner_forces(&self, model: &Model, cell: usize, u: &[DVec3], input: CellInput) -> (CellForces, bool) {
+        let CellInput { averaged, remaining, point, advance } = input;
         let shape = CellShape::new(&model.mesh, cell);
         let material = model.material(cell);
         let u = shape.gather(u);
@@ -406,7 +409,9 @@ impl Elements {
             .map(|cell| {
                 let volumetric = averaged.as_ref().map(|a| a[cell]);
                 let mut point = states.point(cell).cloned();
-                self.corner_forces(model, cell, u, volumetric, states.remaining(cell), point.as_mut(), None).0
+                let remaining = states.remaining(cell);
+                let input = CellInput { averaged: volumetric, remaining, point: point.as_mut(), advance: None };
+                self.corner_forces(model, cell, u, input).0
             })
             .collect();
         self.nodal_forces(&model.mesh, &cells)

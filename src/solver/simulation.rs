@@ -267,8 +267,8 @@ impl Simulation {
                             x.x, x.y, x.z, state.displacement[n]
                         )
                     }
-                    None => "a displacement, a velocity or the stretch of a cell (corners more than 7.8 mm apart from their \
-                             rest distance) was out of range"
+                    None => "a displacement, a velocity or the stretch of a cell (corners moved apart by more than 7.8 mm, in \
+                             tetrahedra 15.6 mm) was out of range"
                         .into(),
                 }
             }

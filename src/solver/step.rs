@@ -7,7 +7,13 @@ pub enum Stage {
     AdvanceTip,
     /// Cells that the tip has passed lose stiffness; their energy is booked as cutting.
     SoftenPath,
-    /// Stress, hourglass force and stiffness bound of every cell, as forces on its corners.
+    /// J and volumetric stiffness of every tetrahedron.
+    MeasureDilatation,
+    /// Dilatation and pressure of every node of a tetrahedral mesh.
+    AveragePressure,
+    /// Stress and stiffness bound of every tetrahedron, as forces on its corners.
+    TetrahedronForces,
+    /// Stress, hourglass force and stiffness bound of every hexahedron, as forces on its corners.
     ElementForces,
     /// Contact of cone and shaft with the opened path, friction, and tip springs on the nodes.
     NeedleContact,
@@ -27,9 +33,12 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 10] = [
+    pub const ALL: [Stage; 13] = [
         Stage::AdvanceTip,
         Stage::SoftenPath,
+        Stage::MeasureDilatation,
+        Stage::AveragePressure,
+        Stage::TetrahedronForces,
         Stage::ElementForces,
         Stage::NeedleContact,
         Stage::IndenterContact,
@@ -45,6 +54,9 @@ impl Stage {
         match self {
             Stage::AdvanceTip => "advance_tip",
             Stage::SoftenPath => "soften_path",
+            Stage::MeasureDilatation => "measure_dilatation",
+            Stage::AveragePressure => "average_pressure",
+            Stage::TetrahedronForces => "tetrahedron_forces",
             Stage::ElementForces => "element_forces",
             Stage::NeedleContact => "needle_contact",
             Stage::IndenterContact => "indenter_contact",
@@ -54,6 +66,17 @@ impl Stage {
             Stage::MeasureContact => "measure_contact",
             Stage::MeasureFaces => "measure_faces",
         }
+    }
+
+    /// True for the stages that give forces for a displacement.
+    pub fn gives_forces(self) -> bool {
+        self.averages() || matches!(self, Stage::TetrahedronForces | Stage::ElementForces)
+    }
+
+    /// True for the stages that average the pressure of tetrahedra. They run once more at the end of a frame: energies
+    /// belong to the displacement after its last step.
+    pub fn averages(self) -> bool {
+        matches!(self, Stage::MeasureDilatation | Stage::AveragePressure)
     }
 
     /// True for the stages that run once per frame, after its last step.

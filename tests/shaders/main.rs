@@ -18,10 +18,16 @@ fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
     Features { loaded_faces, driven_faces, regions: false, tetrahedra: false, laws }
 }
 
-/// Scenes that differ in what is no effect: loads, driven faces, regions.
+/// Features of a mesh of tetrahedra, whose faces cannot be loaded yet.
+fn tetrahedra(driven_faces: bool, regions: bool) -> Features {
+    Features { tetrahedra: true, regions, ..scene(false, driven_faces) }
+}
+
+/// Scenes that differ in what is no effect: loads, driven faces, regions, element.
 fn scenes() -> Vec<Features> {
     let mut scenes = vec![scene(false, false), scene(true, false), scene(false, true), scene(true, true)];
     scenes.push(Features { regions: true, ..scene(false, false) });
+    scenes.extend([tetrahedra(false, false), tetrahedra(true, false), tetrahedra(false, true)]);
     scenes
 }
 
@@ -31,7 +37,13 @@ fn scenes_of_laws() -> Vec<Features> {
     let mut sets: Vec<BTreeSet<&'static str>> = keys.iter().map(|k| BTreeSet::from([*k])).collect();
     sets.extend(keys.iter().flat_map(|k| [BTreeSet::from([*k, "ogden"]), BTreeSet::from([*k, "mooney_rivlin"])]));
     sets.push(keys.into_iter().collect());
-    sets.into_iter().map(|laws| Features { regions: laws.len() > 1, laws, ..scene(false, false) }).collect()
+    let of = |laws: &BTreeSet<&'static str>, tetrahedra: bool| Features {
+        regions: laws.len() > 1,
+        laws: laws.clone(),
+        tetrahedra,
+        ..scene(false, false)
+    };
+    sets.iter().flat_map(|laws| [of(laws, false), of(laws, true)]).collect()
 }
 
 /// The set with the effects of which `wanted` is true, in the order of [`EFFECTS`].
@@ -175,7 +187,9 @@ type ShaderStruct = (u32, Vec<(String, u32)>);
 /// All structs of all stages with all effects.
 fn shader_structs() -> BTreeMap<String, ShaderStruct> {
     let mut found: BTreeMap<String, ShaderStruct> = BTreeMap::new();
-    for r in reflected(&effect_set(|_| true), &Features { regions: true, ..scene(true, true) }) {
+    let block = Features { regions: true, ..scene(true, true) };
+    let every = effect_set(|_| true);
+    for r in [block, tetrahedra(true, true)].iter().flat_map(|features| reflected(&every, features)) {
         for (_, ty) in r.module.types.iter() {
             let (naga::TypeInner::Struct { members, span }, Some(name)) = (&ty.inner, &ty.name) else {
                 continue;
@@ -233,6 +247,8 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "PlasticAnswer",
         "MandelStress",
         "FibreStress",
+        "NodePlace",
+        "MeasuredCell",
     ];
     for name in shader.keys().filter(|n| !local.contains(&n.as_str())) {
         assert!(host.contains(name.as_str()), "struct {name} of the shaders is unknown to the host");
@@ -320,7 +336,8 @@ fn an_absent_effect_leaves_no_trace() {
     for (absent, (key, traces)) in TRACES.iter().enumerate() {
         assert_eq!(EFFECTS[absent].key, *key);
         // The stages of the effect are gone, and so are its blocks in the others.
-        for (stage, text) in text_of(&effect_set(|i| i != absent), &scene(true, true)) {
+        let others = effect_set(|i| i != absent);
+        for (stage, text) in [scene(true, true), tetrahedra(true, true)].iter().flat_map(|f| text_of(&others, f)) {
             for word in *traces {
                 let shared = ["shared/step_input", "shared/contact_node"];
                 let known: BTreeSet<String> = SOURCES
@@ -359,7 +376,8 @@ fn every_file_and_every_define_is_used() {
 }
 
 /// Files in which effects have blocks of code: their order is physics.
-const BODIES: [&str; 3] = ["shared/material_point", "stages/element_forces", "stages/integrate_nodes"];
+const BODIES: [&str; 4] =
+    ["shared/material_point", "stages/element_forces", "stages/integrate_nodes", "stages/tetrahedron_forces"];
 
 #[test]
 fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
@@ -394,6 +412,17 @@ fn the_readme_lists_the_stages_of_the_step() {
         .collect();
     let names: Vec<&str> = Stage::ALL.iter().map(|s| s.name()).collect();
     assert_eq!(listed, names, "{path}: list of stages");
+}
+
+#[test]
+fn tools_leave_no_trace_in_tetrahedra() {
+    let tools: Vec<usize> = (6..9).collect();
+    let (with, without) = (effect_set(|_| true), effect_set(|i| !tools.contains(&i)));
+    let features = tetrahedra(true, true);
+    assert_eq!(stages(&with, &features), stages(&without, &features));
+    assert_eq!(text_of(&with, &features), text_of(&without, &features));
+    assert!(!stages(&with, &features).contains(&Stage::ElementForces));
+    assert!(!stages(&with, &scene(true, true)).contains(&Stage::TetrahedronForces));
 }
 
 #[test]

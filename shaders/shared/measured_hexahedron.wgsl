@@ -1,0 +1,29 @@
+// A hexahedron at the end of a frame.
+#import shared/hexahedron_energy
+#ifdef PUNCTURE
+#import effects/puncture
+#endif
+
+fn measured_cell(index: u32) -> MeasuredCell {
+    let layer = params.cells_x * params.cells_y;
+    let k = quotient(index, layer);
+    let j = quotient(index - k * layer, params.cells_x);
+    let cell = vec3<u32>(index - k * layer - j * params.cells_x, j, k);
+    var out: MeasuredCell;
+    var u: array<vec3<f32>, 8>;
+    // Relative to the first corner in integers: differences stay exact.
+    let origin = node_displacement[corner_node(cell, 0u)].xyz;
+    for (var corner = 0u; corner < 8u; corner++) {
+        u[corner] = vec3<f32>(node_displacement[corner_node(cell, corner)].xyz - origin) * DISPLACEMENT_UNIT;
+        out.apart = max(out.apart, largest_component(u[corner]));
+    }
+    out.kept = 1.0;
+#ifdef PUNCTURE
+    out.kept = cell_stiffness[index];
+#endif
+    out.energy = cell_energy(cell, material_of(index), out.kept, &u);
+    out.volume = cell_edges[cell.x].length
+        * cell_edges[params.cells_x + cell.y].length
+        * cell_edges[params.cells_x + params.cells_y + cell.z].length;
+    return out;
+}
