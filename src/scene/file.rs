@@ -507,6 +507,9 @@ pub struct DamageTable {
     pub d_max: Option<f64>,
     /// Delete a cell that has reached d_max; default false.
     pub deletion: Option<bool>,
+    /// Accept cells that are too large for the failure displacement: their softening branch snaps back, the break is
+    /// dynamic. Default false: such a scene is refused. Read from the scene and from regions, not from presets.
+    pub allow_brittle: Option<bool>,
 }
 
 /// Numbers of the time integration.
