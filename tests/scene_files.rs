@@ -672,6 +672,33 @@ fn what_a_refusal_of_damage_offers_is_accepted() {
 }
 
 #[test]
+fn a_brittle_break_is_accepted_on_request() {
+    let effects = "\"plasticity\", \"damage\"";
+    let with = |text: &str| load_block(effects, &format!("{MATERIAL}{text}\n"));
+    let scene = with("[damage]\nfailure_displacement_mm = 0.5\nallow_brittle = true").unwrap();
+    assert!((scene.effects.damage.unwrap().failure_displacement - 0.5e-3).abs() < 1e-12);
+    let notices = scene.notices.join(" ");
+    assert!(notices.contains("breaks brittly") && notices.contains("the softening branch snaps back"), "{notices}");
+    // A cell that is small enough breaks with any answer, and silently.
+    let scene = with("[damage]\nfailure_displacement_mm = 4\nallow_brittle = true").unwrap();
+    assert!(!scene.notices.join(" ").contains("brittly"));
+    let refused = "[damage]\nfailure_displacement_mm = 0.5\nallow_brittle = false";
+    let message = with(refused).expect_err("must be refused");
+    assert!(message.contains("REFUSED damage") && message.contains("allow_brittle = true"), "{message}");
+    // A region takes the word of the scene unless it has its own.
+    let region = |own: &str| {
+        format!(
+            "[damage]\nfailure_displacement_mm = 4\nallow_brittle = true\n[[region]]\nname = \"a\"\nlayer_mm = [0, 2]\n\
+             material = {{ preset = \"fat\" }}\ndamage = {{ failure_displacement_mm = 0.5{own} }}"
+        )
+    };
+    let notices = with(&region("")).unwrap().notices.join(" ");
+    assert!(notices.contains("Damage in region `a` breaks brittly"), "{notices}");
+    let message = with(&region(", allow_brittle = false")).expect_err("must be refused");
+    assert!(message.contains("REFUSED damage in region `a`"), "{message}");
+}
+
+#[test]
 fn tables_without_their_effect_give_notices() {
     let text = "[plasticity]\n[fibres]\n[viscoelastic]\n[damage]\n[[region]]\nname = \"top\"\nlayer_mm = [0, 4]\n\
                 material = { preset = \"fat\", cutting_force_n = 1 }\nfibres = { k2 = 1 }\n";
