@@ -125,5 +125,9 @@ fn cycles_dissipate_less_and_less() {
     assert!(first > second && second > 0.0);
     assert!(stress(at(2.0)) > stress(at(6.0)) && stress(at(4.0)) < 0.0);
     let (energy, volume) = (run.last().energy, 2e-6);
-    assert_near("dissipated by the Prony terms over the loops", energy.viscous / volume, first + second, 0.05);
+    assert_near("work of the face over the loops [J/m^3]", energy.external / volume, first + second, 0.02);
+    // What the slow terms still hold at the end is not dissipated yet.
+    let part = energy.viscous / energy.external;
+    println!("{part:.3} of the work is dissipated by the Prony terms");
+    assert!((0.8..1.0).contains(&part), "{part}");
 }
