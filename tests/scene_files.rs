@@ -649,7 +649,7 @@ fn wrong_effect_tables() {
         ),
         ("[damage]\nfailure_displacement_mm = 1", "failure_displacement_mm", "of at least 1.122"),
         ("[damage]\nfracture_energy_j_m2 = 1", "fracture_energy_j_m2", "write fracture_energy_j_m2 of at least 24.15"),
-        ("", "effects =", "REFUSED damage: failure displacement 1 mm"),
+        ("", "effects =", "REFUSED damage: failure displacement 0.07 mm"),
     ] {
         assert_block_refused(effects, &format!("{MATERIAL}{text}\n"), marker, &[expected]);
     }

@@ -497,9 +497,9 @@ pub struct ViscoelasticTable {
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DamageTable {
-    /// Equivalent plastic strain at which damage begins; default 0.0625.
+    /// Equivalent plastic strain at which damage begins; default 0.0652.
     pub onset: Option<f64>,
-    /// Plastic displacement at which nothing would be left [mm]; default 1.
+    /// Plastic displacement at which nothing would be left [mm]; default 0.07, for cells of 1 mm.
     pub failure_displacement_mm: Option<f64>,
     /// Energy per area from onset to failure, instead of the displacement [J/m^2].
     pub fracture_energy_j_m2: Option<f64>,

@@ -256,7 +256,7 @@ impl Simulation {
         self.return_failures += u64::from(record.health.return_failures);
         // Against a whole frame at least: the first one is a single step.
         let cell_steps = record.step.max(self.steps_per_frame) as f64 * self.model.mesh.cell_count() as f64;
-        if self.return_failures as f64 > RETURN_FAILURE_PART * cell_steps {
+        if too_many_return_failures(self.return_failures, cell_steps) {
             return Err(self.flow_lost(&record, self.return_failures as f64 / cell_steps));
         }
         if self.watch_stretch {
@@ -389,6 +389,10 @@ impl Simulation {
     }
 }
 
+fn too_many_return_failures(failures: u64, cell_steps: f64) -> bool {
+    failures as f64 > RETURN_FAILURE_PART * cell_steps
+}
+
 /// H = F - I at the centre of every cell.
 fn displacement_gradients(mesh: &Mesh, state: &State) -> Vec<glam::DMat3> {
     (0..mesh.cell_count())
@@ -463,4 +467,16 @@ pub fn snapshot(model: &Model, record: &FrameRecord, state: State) -> FieldSnaps
     fields.displacement = state.displacement;
     fields.stiffness = state.stiffness;
     fields
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thousandth_of_the_return_mappings_may_fail() {
+        assert!(!too_many_return_failures(0, 0.0));
+        assert!(!too_many_return_failures(100, 1e5));
+        assert!(too_many_return_failures(101, 1e5));
+    }
 }
