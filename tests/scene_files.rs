@@ -71,7 +71,10 @@ fn every_scene_loads_and_meshes() {
             continue;
         }
         let scene = Scene::load(&path, &[]).unwrap_or_else(|e| panic!("{}\n{e}", path.display()));
-        assert!(scene.notices.is_empty(), "{}: {:?}", path.display(), scene.notices);
+        // The specimens that break say so; nothing else is said of any scene.
+        let brittle = ["tension_across.toml", "tension_along.toml"].iter().any(|name| path.ends_with(name));
+        let expected = |notice: &String| brittle && notice.contains("softening branch snaps back");
+        assert!(scene.notices.iter().all(expected), "{}: {:?}", path.display(), scene.notices);
         assert!(!scene.title.is_empty());
         let mesh = BlockMesh::for_scene(&scene);
         assert!((20..200_000).contains(&mesh.cell_count()), "{}", path.display());
