@@ -9,15 +9,18 @@ use glam::{DVec2, DVec3};
 use stylet::effects::EffectSet;
 use stylet::material::ElasticLaw;
 use stylet::mesh::{BlockMesh, Mesh};
-use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord};
-use stylet::output::folder::{ENERGY_TABLE, FORCE_CHART, FORCE_TABLE, SUMMARY};
+use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord, Health};
+use stylet::output::folder::{ENERGY_TABLE, FORCE_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY};
+use stylet::output::sample::{Motion as FaceMotion, SAMPLE_COLUMNS};
 use stylet::output::tables::{ENERGY_COLUMNS, FORCE_COLUMNS};
 use stylet::output::{
-    CurveFigures, FieldFiles, OutputFolder, PictureMoment, Status, Summary, Tables, write_force_chart,
+    CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Status, Summary, Tables, write_force_chart,
+    write_sample_chart,
 };
 use stylet::render::{self, Image, Picture, offscreen, raster};
 use stylet::scene::{
-    FaceCondition, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool,
+    Face, FaceCondition, FaceDrive, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial,
+    Tool,
 };
 use stylet::{Error, Result};
 
@@ -70,9 +73,12 @@ fn records() -> Vec<FrameRecord> {
                     kinetic: 1e-6,
                     hourglass: 2e-5 * time,
                     cutting: 1.7e-4 * time,
+                    plastic: 3e-6,
+                    viscous: 4e-6,
                     external_max: 1e-3 * time,
                     ..Default::default()
                 },
+                health: Health { return_failures: 2, ..Default::default() },
                 ..Default::default()
             }
         })
@@ -218,6 +224,8 @@ fn a_named_folder_is_made_and_not_reused() {
         "energy.csv",
         "summary.json",
         "force.svg",
+        "sample.csv",
+        "sample.svg",
         "frames.pvd",
         "stress_06.00mm.png",
         "frames/frame_00001.vtu",
@@ -288,7 +296,8 @@ fn pictures_are_named_by_their_moment() {
 fn tables_grow_row_by_row_and_survive_without_being_closed() {
     let base = tempfile::tempdir().unwrap();
     let folder = OutputFolder::create(Some(base.path()), "scene", false).unwrap();
-    let mut tables = Tables::create(&folder).unwrap();
+    let mut tables = Tables::create(&folder, &[]).unwrap();
+    assert!(!folder.file(SAMPLE_TABLE).exists());
     let records = records();
     for (rows, record) in records.iter().take(5).enumerate() {
         tables.append(record).unwrap();
@@ -315,6 +324,9 @@ fn tables_grow_row_by_row_and_survive_without_being_closed() {
             assert!((ratio - 2.0 / 82.0).abs() < 1e-8, "{ratio}");
             let imbalance = rows[4][column("imbalance")];
             assert!((imbalance - records[4].energy.imbalance()).abs() < 1e-9);
+            assert_eq!(rows[4][column("plastic_j")], 3e-6);
+            assert_eq!(rows[4][column("viscous_j")], 4e-6);
+            assert_eq!(rows[4][column("return_failures")], 2.0);
         }
     }
 }
@@ -357,7 +369,8 @@ fn a_summary_is_written_whole_and_read_back() {
                 wall_s real_time_factor cell_steps_per_s cpu_ns_per_cell_step first_step_ms host_peak_bytes \
                 device_bytes peak_force_n puncture_force_n puncture_depth_m force_after_puncture_n \
                 force_at_max_depth_n slope_after_puncture_n_per_m energy_imbalance kinetic_to_internal \
-                hourglass_to_internal hourglass_to_internal_max clamped_nodes inverted_cells status linear_fit_r2"
+                hourglass_to_internal hourglass_to_internal_max clamped_nodes inverted_cells status linear_fit_r2 \
+                return_failures face peak_nominal_stress_pa stretch_at_peak"
         .split_whitespace()
     {
         assert!(text.contains(&format!("\"{key}\":")), "{key}");
@@ -550,6 +563,132 @@ fn charts_are_well_formed() {
             let label = format!("puncture {:.2} N at", figures.puncture_force.unwrap());
             assert!(text.contains(&label));
         }
+    }
+}
+
+// Sample
+
+/// The block of the tests with a face that is driven.
+fn driven(face: Face, displacement_mm: [f64; 3], duration: f64) -> [FaceCondition; 6] {
+    let mut faces: [FaceCondition; 6] = Default::default();
+    let drive = FaceDrive { displacement: DVec3::from(displacement_mm) * 1e-3, rotation: 0.0, duration, cycles: 0 };
+    faces[face as usize] = FaceCondition { fixed: [true; 3], drive: Some(drive), ..Default::default() };
+    faces
+}
+
+/// A pull over 2 s whose reaction (along the displacement) rises to `largest` [N] at 1.5 s and falls to half of it.
+fn pulled(face: Face, along: DVec3, largest: f64) -> Vec<FrameRecord> {
+    (0..=60)
+        .map(|frame| {
+            let time = frame as f64 / 30.0;
+            let force = largest * if time <= 1.5 { time / 1.5 } else { 1.0 - (time - 1.5) };
+            let mut record = FrameRecord { frame, time, ..Default::default() };
+            record.reactions[face as usize] = along * force;
+            record
+        })
+        .collect()
+}
+
+#[test]
+fn a_sample_is_written_per_driven_face() {
+    let base = tempfile::tempdir().unwrap();
+    let folder = OutputFolder::create(Some(base.path()), "scene", false).unwrap();
+    let mesh = mesh(2e-3);
+    // 16 mm between the faces, 20 x 20 mm: pulled to a stretch of 1.5, 40 N are 100 kPa.
+    let faces = DrivenFace::of_scene(&driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &mesh);
+    let records = pulled(Face::ZMax, DVec3::Z, 40.0);
+    let mut tables = Tables::create(&folder, &faces).unwrap();
+    for (rows, record) in records.iter().enumerate() {
+        tables.append(record).unwrap();
+        let text = fs::read_to_string(folder.file(SAMPLE_TABLE)).unwrap();
+        assert_eq!((text.lines().count(), text.ends_with('\n')), (rows + 2, true));
+    }
+    let mut reader = csv::Reader::from_path(folder.file(SAMPLE_TABLE)).unwrap();
+    assert_eq!(reader.headers().unwrap(), &SAMPLE_COLUMNS[..]);
+    let row = reader.records().nth(45).unwrap().unwrap();
+    assert_eq!(
+        row.iter().collect::<Vec<_>>(),
+        ["1.5", "z_max", "0", "0", "0.006", "0", "0", "0", "40", "1.375", "100000", ""]
+    );
+
+    let mut summary = Summary::default();
+    summary.take_sample(&faces, &records);
+    assert_eq!(summary.face.as_deref(), Some("z_max"));
+    assert!((summary.peak_nominal_stress_pa.unwrap() - 1e5).abs() < 1e-6);
+    assert!((summary.stretch_at_peak.unwrap() - 1.375).abs() < 1e-12);
+    summary.take_sample(&[], &records);
+    assert_eq!((summary.face, summary.peak_nominal_stress_pa, summary.stretch_at_peak), (None, None, None));
+}
+
+#[test]
+fn signs_of_a_sample_are_those_of_the_outward_normal() {
+    let mesh = mesh(2e-3);
+    let one = |face, mm, reaction| {
+        let faces = DrivenFace::of_scene(&driven(face, mm, 1.0), &mesh);
+        let mut record = FrameRecord { time: 1.0, ..Default::default() };
+        record.reactions[face as usize] = reaction;
+        (faces[0].motion(), faces[0].point(&record))
+    };
+    // Pushed in at x_min: the reaction points inwards, 16 x 20 mm.
+    let (motion, squeezed) = one(Face::XMin, [2.0, 0.0, 0.0], DVec3::new(3.2, 0.0, 0.0));
+    assert_eq!(motion, FaceMotion::Normal);
+    assert!((squeezed.stretch - 0.9).abs() < 1e-12 && (squeezed.nominal_stress.unwrap() + 1e4).abs() < 1e-6);
+    // Sheared along -y at z_max, 20 x 20 mm: the stress counts along the drive.
+    let (motion, sheared) = one(Face::ZMax, [0.0, -4.0, 0.0], DVec3::new(0.0, -4.0, 2.0));
+    assert_eq!(motion, FaceMotion::Tangential);
+    assert!((sheared.shear - 0.25).abs() < 1e-12 && (sheared.shear_stress.unwrap() - 1e4).abs() < 1e-6);
+    assert!((sheared.nominal_stress.unwrap() - 5e3).abs() < 1e-6 && sheared.stretch == 1.0);
+    // Both ends driven apart: the stretch counts what lies between them.
+    let mut both = driven(Face::ZMax, [0.0, 0.0, 4.0], 1.0);
+    both[Face::ZMin as usize] = driven(Face::ZMin, [0.0, 0.0, -4.0], 1.0)[Face::ZMin as usize].clone();
+    let faces = DrivenFace::of_scene(&both, &mesh);
+    let record = FrameRecord { time: 2.0, ..Default::default() };
+    assert_eq!(faces.iter().map(|f| f.point(&record).stretch).collect::<Vec<_>>(), [1.5, 1.5]);
+}
+
+#[test]
+fn a_tetrahedral_face_has_a_stretch_and_no_stress() {
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|x| x * 1e-2);
+    let tets = stylet::mesh::TetMesh { positions: corners.to_vec(), tets: vec![[0, 1, 2, 3]], ..Default::default() };
+    let mesh = Mesh::Tets(std::sync::Arc::new(tets));
+    let faces = DrivenFace::of_scene(&driven(Face::ZMax, [0.0, 0.0, 1.0], 2.0), &mesh);
+    let records = pulled(Face::ZMax, DVec3::Z, 1.0);
+    let point = faces[0].point(records.last().unwrap());
+    assert!((point.stretch - 1.1).abs() < 1e-12);
+    assert_eq!((point.nominal_stress, point.shear_stress), (None, None));
+    let mut summary = Summary::default();
+    summary.take_sample(&faces, &records);
+    assert_eq!((summary.face.as_deref(), summary.peak_nominal_stress_pa), (Some("z_max"), None));
+}
+
+#[test]
+fn sample_charts_are_well_formed() {
+    let base = kept("charts");
+    fs::create_dir_all(&base).unwrap();
+    let mesh = mesh(2e-3);
+    let pull = pulled(Face::ZMax, DVec3::Z, 40.0);
+    let squeeze = pulled(Face::ZMax, DVec3::NEG_Z, 40.0);
+    let shear = pulled(Face::ZMax, DVec3::X, 40.0);
+    let mut broken = pull.clone();
+    broken[20].reactions[Face::ZMax as usize].z = f64::NAN;
+    let mut twist = driven(Face::ZMax, [0.0; 3], 2.0);
+    twist[Face::ZMax as usize].drive.as_mut().unwrap().rotation = 0.5;
+    for (name, faces, records, expected) in [
+        (SAMPLE_CHART, driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &pull[..], "100.00 kPa at 1.375"),
+        ("sample_squeezed.svg", driven(Face::ZMax, [0.0, 0.0, -4.0], 2.0), &squeeze[..], "-100.00 kPa at 0.812"),
+        ("sample_sheared.svg", driven(Face::ZMax, [4.0, 0.0, 0.0], 2.0), &shear[..], "amount of shear"),
+        ("sample_twisted.svg", twist, &squeeze[..], "rotation [deg]"),
+        ("sample_held.svg", driven(Face::ZMax, [0.0, 0.0, 8.0], 0.5), &pull[..], "time [s]"),
+        ("sample_broken.svg", driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &broken[..], "100.00 kPa"),
+        ("sample_empty.svg", driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &[], "stretch"),
+        ("sample_one.svg", driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &pull[..1], "stretch"),
+    ] {
+        let path = base.join(name);
+        write_sample_chart(&path, "A <specimen> & its curve", &DrivenFace::of_scene(&faces, &mesh), records).unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        assert_well_formed(&text);
+        assert!(!text.contains("NaN"), "{name}");
+        assert!(text.contains(expected), "{name}: {expected}");
     }
 }
 

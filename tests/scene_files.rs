@@ -71,7 +71,10 @@ fn every_scene_loads_and_meshes() {
             continue;
         }
         let scene = Scene::load(&path, &[]).unwrap_or_else(|e| panic!("{}\n{e}", path.display()));
-        assert!(scene.notices.is_empty(), "{}: {:?}", path.display(), scene.notices);
+        // The specimens that break say so; nothing else is said of any scene.
+        let brittle = ["tension_across.toml", "tension_along.toml"].iter().any(|name| path.ends_with(name));
+        let expected = |notice: &String| brittle && notice.contains("softening branch snaps back");
+        assert!(scene.notices.iter().all(expected), "{}: {:?}", path.display(), scene.notices);
         assert!(!scene.title.is_empty());
         let mesh = BlockMesh::for_scene(&scene);
         assert!((20..200_000).contains(&mesh.cell_count()), "{}", path.display());
@@ -649,7 +652,7 @@ fn wrong_effect_tables() {
         ),
         ("[damage]\nfailure_displacement_mm = 1", "failure_displacement_mm", "of at least 1.122"),
         ("[damage]\nfracture_energy_j_m2 = 1", "fracture_energy_j_m2", "write fracture_energy_j_m2 of at least 24.15"),
-        ("", "effects =", "REFUSED damage: failure displacement 1 mm"),
+        ("", "effects =", "REFUSED damage: failure displacement 0.07 mm"),
     ] {
         assert_block_refused(effects, &format!("{MATERIAL}{text}\n"), marker, &[expected]);
     }
@@ -669,6 +672,33 @@ fn what_a_refusal_of_damage_offers_is_accepted() {
         let offered = message.split(&format!("{key} of at least ")).nth(1).unwrap().split(',').next().unwrap();
         with(&format!("{key} = {offered}")).unwrap_or_else(|message| panic!("{message}"));
     }
+}
+
+#[test]
+fn a_brittle_break_is_accepted_on_request() {
+    let effects = "\"plasticity\", \"damage\"";
+    let with = |text: &str| load_block(effects, &format!("{MATERIAL}{text}\n"));
+    let scene = with("[damage]\nfailure_displacement_mm = 0.5\nallow_brittle = true").unwrap();
+    assert!((scene.effects.damage.unwrap().failure_displacement - 0.5e-3).abs() < 1e-12);
+    let notices = scene.notices.join(" ");
+    assert!(notices.contains("breaks brittly") && notices.contains("the softening branch snaps back"), "{notices}");
+    // A cell that is small enough breaks with any answer, and silently.
+    let scene = with("[damage]\nfailure_displacement_mm = 4\nallow_brittle = true").unwrap();
+    assert!(!scene.notices.join(" ").contains("brittly"));
+    let refused = "[damage]\nfailure_displacement_mm = 0.5\nallow_brittle = false";
+    let message = with(refused).expect_err("must be refused");
+    assert!(message.contains("REFUSED damage") && message.contains("allow_brittle = true"), "{message}");
+    // A region takes the word of the scene unless it has its own.
+    let region = |own: &str| {
+        format!(
+            "[damage]\nfailure_displacement_mm = 4\nallow_brittle = true\n[[region]]\nname = \"a\"\nlayer_mm = [0, 2]\n\
+             material = {{ preset = \"fat\" }}\ndamage = {{ failure_displacement_mm = 0.5{own} }}"
+        )
+    };
+    let notices = with(&region("")).unwrap().notices.join(" ");
+    assert!(notices.contains("Damage in region `a` breaks brittly"), "{notices}");
+    let message = with(&region(", allow_brittle = false")).expect_err("must be refused");
+    assert!(message.contains("REFUSED damage in region `a`"), "{message}");
 }
 
 #[test]

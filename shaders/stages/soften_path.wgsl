@@ -34,7 +34,8 @@ fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
                 - node_velocity[node].xyz * (0.5 * params.dt);
         }
         let energy = cell_energy(cell, path.material, 1.0, &u);
-        path_cells[index].dissipation += (old - remaining) * (energy.elastic + energy.hourglass);
+        // What Prony terms hold is booked with their work, which the softening does not touch.
+        path_cells[index].dissipation += (old - remaining) * (energy.elastic - energy.held + energy.hourglass);
         cell_stiffness[path.cell] = remaining;
     }
 }

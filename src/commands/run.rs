@@ -8,7 +8,8 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::{
-    CurveFigures, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables, folder, write_force_chart,
+    CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables, folder,
+    write_force_chart, write_sample_chart,
 };
 use crate::process;
 use crate::render;
@@ -62,7 +63,8 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     for moment in &moments {
         simulation.stop_after(moment.frame);
     }
-    let mut tables = Tables::create(&output)?;
+    let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
+    let mut tables = Tables::create(&output, &driven)?;
     let mut fields = FieldFiles::new(&output);
     let progress = Progress::new(simulation.duration());
     let device = simulation.device().cloned();
@@ -143,9 +145,13 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         ..Default::default()
     };
     summary.take_frames(&records);
+    summary.take_sample(&driven, &records);
     if !records.is_empty() {
         let figures = CurveFigures::from_records(&records);
         write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, &records, &figures)?;
+        if !driven.is_empty() {
+            write_sample_chart(&output.file(folder::SAMPLE_CHART), &scene.title, &driven, &records)?;
+        }
     }
     summary.write(&output.file(folder::SUMMARY))?;
     if summary.raised_mass_share > 0.2 {
@@ -153,6 +159,14 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
             "note: {:.0} % of all node steps had their mass raised to keep the step stable: inertia is not what \
              mass_scaling says; lower solver.time_step_us or raise solver.mass_scaling",
             100.0 * summary.raised_mass_share
+        );
+    }
+    if summary.return_failures > 0 {
+        eprintln!(
+            "warning: the return mapping of the effect plasticity missed the yield condition in {} of {cell_steps:.0} cell \
+             steps; the first frame is marked in the column return_failures of {}",
+            summary.return_failures,
+            folder::ENERGY_TABLE
         );
     }
     match failure {
@@ -232,6 +246,14 @@ pub fn describe(summary: &Summary) -> String {
             newton(summary.force_at_max_depth_n),
             mm(summary.max_depth_m),
             newton(summary.peak_force_n),
+        );
+    }
+    if let (Some(face), Some(stress), Some(stretch)) =
+        (&summary.face, summary.peak_nominal_stress_pa, summary.stretch_at_peak)
+    {
+        text += &format!(
+            "sample: largest nominal stress {:.2} kPa at a stretch of {stretch:.3} on {face}\n",
+            stress * 1e-3
         );
     }
     text += &format!(

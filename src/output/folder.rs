@@ -12,11 +12,15 @@ pub const FORCE_TABLE: &str = "force.csv";
 pub const ENERGY_TABLE: &str = "energy.csv";
 pub const SUMMARY: &str = "summary.json";
 pub const FORCE_CHART: &str = "force.svg";
+/// Written where faces are driven.
+pub const SAMPLE_TABLE: &str = "sample.csv";
+pub const SAMPLE_CHART: &str = "sample.svg";
 pub const FIELD_COLLECTION: &str = "frames.pvd";
 /// Folder of the VTU files `frame_00012.vtu`.
 pub const FIELD_FOLDER: &str = "frames";
 
-const SINGLE_FILES: [&str; 5] = [FORCE_TABLE, ENERGY_TABLE, SUMMARY, FORCE_CHART, FIELD_COLLECTION];
+const SINGLE_FILES: [&str; 7] =
+    [FORCE_TABLE, ENERGY_TABLE, SUMMARY, FORCE_CHART, SAMPLE_TABLE, SAMPLE_CHART, FIELD_COLLECTION];
 
 /// Where numbered folders go when the user names none.
 const DEFAULT_BASE: &str = "out";
@@ -230,6 +234,8 @@ mod tests {
             "summary.json",
             "summary.json.part",
             "force.svg",
+            "sample.csv",
+            "sample.svg",
             "frames.pvd",
             "stress_06.00mm.png",
             "stress_12.50mm_2.png",

@@ -94,7 +94,9 @@ fn over_deformation(area: &DrawingArea<SVGBackend, Shift>, curves: &[(Mode, Vec<
             start = end;
         }
         if let Some((control, stress)) = peak(rows) {
-            marks.push((*mode, (control - mode.rest(), stress * 1e-3), control));
+            let at = (control - mode.rest(), stress * 1e-3);
+            let label = format!("{:.1} kPa at {control:.2}", at.1);
+            marks.push(Mark { at, colour: colour(*mode), label });
         }
     }
     let only = match curves {
@@ -102,7 +104,7 @@ fn over_deformation(area: &DrawingArea<SVGBackend, Shift>, curves: &[(Mode, Vec<
         modes if modes.iter().all(|(m, _)| *m != Mode::Shear) => "stretch - 1",
         _ => "stretch - 1, amount of shear",
     };
-    panel(area, only, &lines, &marks)
+    Panel { abscissa: only, ordinate: "nominal stress [kPa]", rest: 0.0, lines, marks }.draw(area)
 }
 
 /// Nominal stress [kPa] against time.
@@ -110,64 +112,93 @@ fn over_time(area: &DrawingArea<SVGBackend, Shift>, curves: &[(Mode, Vec<Row>)])
     let line = |(mode, rows): &(Mode, Vec<Row>)| {
         curve("", *mode, None, rows.iter().map(|r| (r.time, r.nominal * 1e-3)).collect())
     };
-    panel(area, "time [s]", &curves.iter().map(line).collect::<Vec<_>>(), &[])
+    let lines = curves.iter().map(line).collect();
+    Panel { abscissa: "time [s]", ordinate: "nominal stress [kPa]", rest: 0.0, lines, marks: Vec::new() }.draw(area)
 }
 
-fn panel(
-    area: &DrawingArea<SVGBackend, Shift>,
-    abscissa: &str,
-    lines: &[Curve],
-    marks: &[(Mode, (f64, f64), f64)],
-) -> Drawn {
-    let (x_min, x_max) = range(lines.iter().flat_map(|c| c.points.iter().map(|p| p.0))).unwrap_or((0.0, 1.0));
-    let (y_min, y_max) = range(lines.iter().flat_map(|c| c.points.iter().map(|p| p.1))).unwrap_or((0.0, 1.0));
-    // Squeezed samples stand left of the axis.
-    let (x_min, x_max) =
-        if x_max <= 0.0 { (1.02 * x_min, 0.02 * -x_min) } else { widened(x_min.min(0.0), x_max, 0.02) };
-    let (y_min, y_max) =
-        if y_max <= 0.0 { (1.08 * y_min, 0.04 * -y_min) } else { widened(y_min.min(0.0), y_max, 0.08) };
-    let (width, _) = area.dim_in_pixel();
-    let mut chart = ChartBuilder::on(area)
-        .margin_left(fine(10))
-        .margin_right(fine(24))
-        .margin_bottom(fine(10))
-        .x_label_area_size(fine(48))
-        .y_label_area_size(fine(68))
-        .build_cartesian_2d(x_min..x_max, y_min..y_max)?;
-    chart
-        .configure_mesh()
-        .x_desc(abscissa)
-        .y_desc("nominal stress [kPa]")
-        .axis_desc_style(("sans-serif", fine(17)))
-        .label_style(("sans-serif", fine(15)))
-        .x_labels((width / fine(90)) as usize)
-        .y_labels(9)
-        .x_label_formatter(&|v| tick(*v, x_max - x_min))
-        .y_label_formatter(&|v| tick(*v, y_max - y_min))
-        .bold_line_style(BLACK.mix(0.14).stroke_width(fine(1)))
-        .light_line_style(BLACK.mix(0.05).stroke_width(fine(1)))
-        .axis_style(BLACK.mix(0.6).stroke_width(fine(1)))
-        .set_all_tick_mark_size(fine(5))
-        .max_light_lines(5)
-        .draw()?;
-    let zero = BLACK.mix(0.6).stroke_width(fine(1));
-    chart.draw_series(LineSeries::new([(x_min, 0.0), (x_max, 0.0)], zero))?;
-    chart.draw_series(LineSeries::new([(0.0, y_min), (0.0, y_max)], zero))?;
-    for line in lines {
-        let style = line.colour.stroke_width(line.width);
-        let points = line.points.iter().copied();
-        match line.dash {
-            None => chart.draw_series(LineSeries::new(points, style)).map(drop)?,
-            Some((dash, gap)) => {
-                chart.draw_series(DashedLineSeries::new(points, fine(dash), fine(gap), style)).map(drop)?;
+/// A point of a curve that is named.
+pub(super) struct Mark {
+    pub at: (f64, f64),
+    pub colour: RGBColor,
+    pub label: String,
+}
+
+/// Curves of stress over one abscissa.
+pub(super) struct Panel {
+    pub abscissa: &'static str,
+    pub ordinate: &'static str,
+    /// Where the abscissa is at rest: always in view, with a line.
+    pub rest: f64,
+    pub lines: Vec<Curve>,
+    pub marks: Vec<Mark>,
+}
+
+impl Panel {
+    pub(super) fn draw(&self, area: &DrawingArea<SVGBackend, Shift>) -> Drawn {
+        let rest = self.rest;
+        let values = |pick: fn(&(f64, f64)) -> f64| range(self.lines.iter().flat_map(|c| c.points.iter().map(pick)));
+        let (x_min, x_max) = values(|p| p.0).map_or((0.0, 1.0), |(low, high)| (low - rest, high - rest));
+        let (y_min, y_max) = values(|p| p.1).unwrap_or((0.0, 1.0));
+        // Squeezed samples stand left of the axis.
+        let (x_min, x_max) = if x_max <= 0.0 && x_min < 0.0 {
+            (1.02 * x_min, 0.02 * -x_min)
+        } else {
+            widened(x_min.min(0.0), x_max, 0.02)
+        };
+        let (x_min, x_max) = (x_min + rest, x_max + rest);
+        let (y_min, y_max) = if y_max <= 0.0 && y_min < 0.0 {
+            (1.08 * y_min, 0.04 * -y_min)
+        } else {
+            widened(y_min.min(0.0), y_max, 0.08)
+        };
+        let (width, _) = area.dim_in_pixel();
+        let mut chart = ChartBuilder::on(area)
+            .margin_left(fine(10))
+            .margin_right(fine(24))
+            .margin_bottom(fine(10))
+            .x_label_area_size(fine(48))
+            .y_label_area_size(fine(68))
+            .build_cartesian_2d(x_min..x_max, y_min..y_max)?;
+        chart
+            .configure_mesh()
+            .x_desc(self.abscissa)
+            .y_desc(self.ordinate)
+            .axis_desc_style(("sans-serif", fine(17)))
+            .label_style(("sans-serif", fine(15)))
+            .x_labels((width / fine(90)) as usize)
+            .y_labels(9)
+            .x_label_formatter(&|v| tick(*v, x_max - x_min))
+            .y_label_formatter(&|v| tick(*v, y_max - y_min))
+            .bold_line_style(BLACK.mix(0.14).stroke_width(fine(1)))
+            .light_line_style(BLACK.mix(0.05).stroke_width(fine(1)))
+            .axis_style(BLACK.mix(0.6).stroke_width(fine(1)))
+            .set_all_tick_mark_size(fine(5))
+            .max_light_lines(5)
+            .draw()?;
+        let zero = BLACK.mix(0.6).stroke_width(fine(1));
+        chart.draw_series(LineSeries::new([(x_min, 0.0), (x_max, 0.0)], zero))?;
+        chart.draw_series(LineSeries::new([(rest, y_min), (rest, y_max)], zero))?;
+        for line in &self.lines {
+            let style = line.colour.stroke_width(line.width);
+            let points = line.points.iter().copied();
+            match line.dash {
+                None => chart.draw_series(LineSeries::new(points, style)).map(drop)?,
+                Some((dash, gap)) => {
+                    chart.draw_series(DashedLineSeries::new(points, fine(dash), fine(gap), style)).map(drop)?;
+                }
             }
         }
+        for mark in &self.marks {
+            let (x, _) = mark.at;
+            chart.draw_series([Circle::new(mark.at, fine(4), mark.colour.filled())])?;
+            // Left of a peak the stress is still below it; near the left edge there is no room.
+            let near_edge = (x - x_min) < 0.35 * (x_max - x_min);
+            let (anchor, shift) =
+                if near_edge { (HPos::Left, 8 * FINER as i32) } else { (HPos::Right, -8 * FINER as i32) };
+            let style = ("sans-serif", fine(15)).into_font().color(&BLACK).pos(Pos::new(anchor, VPos::Bottom));
+            let text = Text::new(mark.label.clone(), (shift, -4 * FINER as i32), style);
+            chart.draw_series([EmptyElement::at(mark.at) + text])?;
+        }
+        Ok(())
     }
-    for (mode, at, control) in marks {
-        chart.draw_series([Circle::new(*at, fine(4), colour(*mode).filled())])?;
-        let style = ("sans-serif", fine(15)).into_font().color(&BLACK).pos(Pos::new(HPos::Right, VPos::Bottom));
-        let label = format!("{:.1} kPa at {control:.2}", at.1);
-        chart.draw_series([EmptyElement::at(*at) + Text::new(label, (-8 * FINER as i32, -4 * FINER as i32), style)])?;
-    }
-    Ok(())
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::curve::{CurveFigures, frames_on_the_way_in};
+use super::sample::{DrivenFace, SamplePoint};
 use super::tables::{hourglass_to_internal, kinetic_to_internal};
 use super::whole_file;
 use crate::observables::FrameRecord;
@@ -95,6 +96,11 @@ pub struct Summary {
     /// Coefficient of determination of the straight line from 5 mm to the deepest point.
     pub linear_fit_r2: Option<f64>,
 
+    /// Driven face with the largest nominal stress, that stress (tension positive) and the stretch at which it came.
+    pub face: Option<String>,
+    pub peak_nominal_stress_pa: Option<f64>,
+    pub stretch_at_peak: Option<f64>,
+
     /// Largest |external work - accounted energy| of a frame over the largest external work of the run; not a number
     /// (`null`) if any frame had none.
     #[serde(deserialize_with = "null_is_nan")]
@@ -113,6 +119,8 @@ pub struct Summary {
     pub inverted_cells: u64,
     /// Share of all node steps in which selective mass scaling raised the mass of a node.
     pub raised_mass_share: f64,
+    /// Cell steps whose return mapping did not meet the yield condition.
+    pub return_failures: u64,
 }
 
 /// JSON has no NaN; it is written as `null`.
@@ -155,7 +163,18 @@ impl Summary {
         let raised: u64 = records.iter().map(|r| u64::from(r.health.raised_mass)).sum();
         let node_steps = self.nodes * records.last().map_or(0, |r| r.step);
         self.raised_mass_share = if node_steps > 0 { raised as f64 / node_steps as f64 } else { 0.0 };
+        self.return_failures = records.iter().map(|r| u64::from(r.health.return_failures)).sum();
         self.inverted_cells = records.iter().map(|r| u64::from(r.health.inverted_cells)).max().unwrap_or(0);
+    }
+
+    /// Fills in the peak of the specimen between the driven faces.
+    pub fn take_sample(&mut self, faces: &[DrivenFace], records: &[FrameRecord]) {
+        let peaks = faces.iter().filter_map(|f| Some((f, f.peak(records)?)));
+        let stress = |p: &SamplePoint| p.nominal_stress.map_or(0.0, f64::abs);
+        let largest = peaks.reduce(|a, b| if stress(&b.1) > stress(&a.1) { b } else { a });
+        self.face = largest.map(|(face, _)| face.face.key().into()).or(faces.first().map(|f| f.face.key().into()));
+        self.peak_nominal_stress_pa = largest.and_then(|(_, point)| point.nominal_stress);
+        self.stretch_at_peak = largest.map(|(_, point)| point.stretch);
     }
 
     /// Writes `summary.json`, whole or not at all.

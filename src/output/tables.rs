@@ -1,11 +1,13 @@
-//! `force.csv` and `energy.csv`: one row per display frame, units in the column names.
+//! `force.csv` and `energy.csv`: one row per display frame, `sample.csv`: one per frame and driven face; units in the
+//! column names.
 //!
-//! Both are flushed after every row: whatever stops the program, the rows of all finished frames are on the disk.
+//! All are flushed after every row: whatever stops the program, the rows of all finished frames are on the disk.
 
 use std::fs::File;
 use std::path::PathBuf;
 
-use super::folder::{ENERGY_TABLE, FORCE_TABLE, OutputFolder};
+use super::folder::{ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE};
+use super::sample::{DrivenFace, SAMPLE_COLUMNS, SamplePoint};
 use crate::observables::{EnergyAccount, FrameRecord};
 use crate::{Error, Result};
 
@@ -28,7 +30,7 @@ pub const FORCE_COLUMNS: [&str; 14] = [
 ];
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 19] = [
+pub const ENERGY_COLUMNS: [&str; 25] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -38,6 +40,9 @@ pub const ENERGY_COLUMNS: [&str; 19] = [
     "damping_j",
     "friction_j",
     "cutting_j",
+    "plastic_j",
+    "damage_j",
+    "viscous_j",
     "contact_j",
     "imbalance",
     "kinetic_to_internal",
@@ -48,6 +53,9 @@ pub const ENERGY_COLUMNS: [&str; 19] = [
     "inverted_cells",
     "max_speed_m_per_s",
     "raised_mass",
+    "largest_damage",
+    "deleted_cells",
+    "return_failures",
 ];
 
 /// Kinetic over internal energy, internal = elastic + hourglass; 0 where nothing is stored.
@@ -67,11 +75,13 @@ fn ratio(part: f64, whole: f64) -> f64 {
     if whole <= NOTHING { 0.0 } else { part / whole }
 }
 
-/// The two open tables of a run.
+/// The open tables of a run.
 #[derive(Debug)]
 pub struct Tables {
     force: Table,
     energy: Table,
+    /// Where faces are driven.
+    sample: Option<(Vec<DrivenFace>, Table)>,
 }
 
 #[derive(Debug)]
@@ -98,18 +108,29 @@ impl Table {
 }
 
 impl Tables {
-    /// Creates both files with their header rows.
-    pub fn create(folder: &OutputFolder) -> Result<Self> {
+    /// Creates the files with their header rows; that of the sample only where faces are driven.
+    pub fn create(folder: &OutputFolder, driven: &[DrivenFace]) -> Result<Self> {
+        let sample = match driven {
+            [] => None,
+            driven => Some((driven.to_vec(), Table::create(folder.file(SAMPLE_TABLE), &SAMPLE_COLUMNS)?)),
+        };
         Ok(Self {
+            sample,
             force: Table::create(folder.file(FORCE_TABLE), &FORCE_COLUMNS)?,
             energy: Table::create(folder.file(ENERGY_TABLE), &ENERGY_COLUMNS)?,
         })
     }
 
-    /// Appends one row to each file and flushes both.
+    /// Appends one row to each file, to that of the sample one per driven face, and flushes them.
     pub fn append(&mut self, record: &FrameRecord) -> Result<()> {
         self.force.write_row(&force_row(record))?;
-        self.energy.write_row(&energy_row(record))
+        self.energy.write_row(&energy_row(record))?;
+        if let Some((faces, table)) = &mut self.sample {
+            for face in faces {
+                table.write_row(&sample_row(face, &face.point(record)))?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -146,6 +167,9 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(e.damping),
         number(e.friction),
         number(e.cutting),
+        number(e.plastic),
+        number(e.damage),
+        number(e.viscous),
         number(e.contact),
         number(e.imbalance()),
         number(kinetic_to_internal(e)),
@@ -156,6 +180,27 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         h.inverted_cells.to_string(),
         number(h.max_speed),
         h.raised_mass.to_string(),
+        number(h.largest_damage),
+        h.deleted_cells.to_string(),
+        h.return_failures.to_string(),
+    ]
+}
+
+fn sample_row(face: &DrivenFace, p: &SamplePoint) -> [String; SAMPLE_COLUMNS.len()] {
+    let known = |value: Option<f64>| value.map_or(String::new(), number);
+    [
+        number(p.time),
+        face.face.key().into(),
+        number(p.displacement.x),
+        number(p.displacement.y),
+        number(p.displacement.z),
+        number(p.rotation),
+        number(p.reaction.x),
+        number(p.reaction.y),
+        number(p.reaction.z),
+        number(p.stretch),
+        known(p.nominal_stress),
+        known(p.shear_stress),
     ]
 }
 

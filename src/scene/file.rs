@@ -497,9 +497,9 @@ pub struct ViscoelasticTable {
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DamageTable {
-    /// Equivalent plastic strain at which damage begins; default 0.0625.
+    /// Equivalent plastic strain at which damage begins; default 0.0652.
     pub onset: Option<f64>,
-    /// Plastic displacement at which nothing would be left [mm]; default 1.
+    /// Plastic displacement at which nothing would be left [mm]; default 0.07, for cells of 1 mm.
     pub failure_displacement_mm: Option<f64>,
     /// Energy per area from onset to failure, instead of the displacement [J/m^2].
     pub fracture_energy_j_m2: Option<f64>,
@@ -507,6 +507,9 @@ pub struct DamageTable {
     pub d_max: Option<f64>,
     /// Delete a cell that has reached d_max; default false.
     pub deletion: Option<bool>,
+    /// Accept cells that are too large for the failure displacement: their softening branch snaps back, the break is
+    /// dynamic. Default false: such a scene is refused. Read from the scene and from regions, not from presets.
+    pub allow_brittle: Option<bool>,
 }
 
 /// Numbers of the time integration.

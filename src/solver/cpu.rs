@@ -194,7 +194,8 @@ impl CpuEngine {
                 }
                 let intact = CellStates { points: &self.state.points, stiffness: &[] };
                 let m = self.elements.measure_corners(&self.model, cell, &u, None, intact);
-                self.sums.softening_dissipation += (old - factor) * (m.elastic + m.hourglass);
+                // What Prony terms hold is booked with their work, which the softening does not touch.
+                self.sums.softening_dissipation += (old - factor) * (m.elastic - m.held + m.hourglass);
                 self.state.stiffness[cell] = factor;
             }
         }

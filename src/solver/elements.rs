@@ -173,8 +173,9 @@ pub struct CellMeasure {
     /// Stored energies [J], path and damage included.
     pub elastic: f64,
     pub hourglass: f64,
-    /// Dissipated by the viscous terms since t = 0 [J].
+    /// Dissipated by the viscous terms since t = 0, and the part of `elastic` that they hold [J].
     pub viscous: f64,
+    pub held: f64,
     pub jacobian: f64,
     pub corner_jacobian: f64,
     /// Degradation d.
@@ -359,6 +360,7 @@ impl Elements {
             elastic: shape.volume * energy.stored,
             hourglass: intact * self.hourglass_energy(model, cell, edge, q2),
             viscous: shape.volume * (point.viscous_work - energy.viscous_stored),
+            held: shape.volume * energy.viscous_stored,
             jacobian,
             corner_jacobian: shape.size.map_or(jacobian, |size| smallest_corner_jacobian(u, size)),
             damage,

@@ -50,6 +50,10 @@ const AHEAD: u64 = 2;
 /// out of range.
 const RUNAWAY_PART: f64 = 0.05;
 
+/// Part of all cell steps so far whose return mapping may fail before the run counts as broken: a few points that are
+/// turned inside out for a step are counted and reported, more make the stress and the dissipation meaningless.
+const RETURN_FAILURE_PART: f64 = 1e-3;
+
 /// A simulation that is advanced frame by frame.
 pub struct Simulation {
     pub model: Arc<Model>,
@@ -65,6 +69,8 @@ pub struct Simulation {
     frames: u64,
     started: u64,
     collected: u64,
+    /// Cell steps whose return mapping failed, since t = 0.
+    return_failures: u64,
     /// Frames after which the state is read, so that no later frame may have been started.
     stops: BTreeSet<u64>,
     watch_stretch: bool,
@@ -161,6 +167,7 @@ impl Simulation {
             frames,
             started: 0,
             collected: 0,
+            return_failures: 0,
             stops: BTreeSet::new(),
             watch_stretch,
             notices,
@@ -246,6 +253,12 @@ impl Simulation {
         if f64::from(sums.clamped_nodes) > RUNAWAY_PART * node_steps {
             return Err(self.runaway(&record, f64::from(sums.clamped_nodes) / node_steps));
         }
+        self.return_failures += u64::from(record.health.return_failures);
+        // Against a whole frame at least: the first one is a single step.
+        let cell_steps = record.step.max(self.steps_per_frame) as f64 * self.model.mesh.cell_count() as f64;
+        if too_many_return_failures(self.return_failures, cell_steps) {
+            return Err(self.flow_lost(&record, self.return_failures as f64 / cell_steps));
+        }
         if self.watch_stretch {
             self.check_stretch(&record)?;
         }
@@ -313,6 +326,34 @@ impl Simulation {
         }
     }
 
+    /// Where the plastic flow is largest in a run whose return mapping fails.
+    fn flow_lost(&mut self, record: &FrameRecord, part: f64) -> Error {
+        let place = match self.engine.read_state() {
+            Ok(state) => {
+                let strains = state.points.iter().map(|p| p.plastic.alpha).enumerate();
+                let (cell, alpha) = strains.fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+                let x = self.model.mesh.cell_centre(cell) * 1e3;
+                format!(
+                    "the largest plastic strain is {alpha:.3} in cell {cell} at ({:.2}, {:.2}, {:.2}) mm",
+                    x.x, x.y, x.z
+                )
+            }
+            Err(error) => error.to_string(),
+        };
+        Error::Diverged {
+            frame: record.frame,
+            step: record.step,
+            time_s: record.time,
+            message: format!(
+                "stage element_forces: the return mapping of the effect plasticity missed the yield condition in {:.2} % of \
+                 all cell steps (at most {:.1} %); {place}\n  way out: lower solver.safety or the speed of what moves, raise \
+                 yield_stress_kpa or hardening_kpa, or raise solver.hourglass_stiffness where cells fold",
+                100.0 * part,
+                100.0 * RETURN_FAILURE_PART
+            ),
+        }
+    }
+
     /// Stops when an element leaves the stretch range in which the material is stable.
     fn check_stretch(&mut self, record: &FrameRecord) -> Result<()> {
         let verdicts: Vec<Verdict> = self.model.materials.iter().map(|m| m.law.verdict()).collect();
@@ -346,6 +387,10 @@ impl Simulation {
         let state = self.engine.read_state()?;
         Ok(snapshot(&self.model, record, state))
     }
+}
+
+fn too_many_return_failures(failures: u64, cell_steps: f64) -> bool {
+    failures as f64 > RETURN_FAILURE_PART * cell_steps
 }
 
 /// H = F - I at the centre of every cell.
@@ -422,4 +467,16 @@ pub fn snapshot(model: &Model, record: &FrameRecord, state: State) -> FieldSnaps
     fields.displacement = state.displacement;
     fields.stiffness = state.stiffness;
     fields
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thousandth_of_the_return_mappings_may_fail() {
+        assert!(!too_many_return_failures(0, 0.0));
+        assert!(!too_many_return_failures(100, 1e5));
+        assert!(too_many_return_failures(101, 1e5));
+    }
 }

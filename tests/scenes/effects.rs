@@ -76,3 +76,42 @@ fn indentation_comes_back_to_zero() {
     assert!(run.last().depth < 0.0);
     assert!(run.last().force.axial.abs() < 0.01 * largest, "{} N outside", run.last().force.axial);
 }
+
+#[test]
+fn the_constitutive_scenes_run_soundly() {
+    for (name, overrides) in [
+        ("effects/plasticity.toml", &[][..]),
+        ("effects/fibres.toml", &[]),
+        ("effects/viscoelastic.toml", &["solver.duration_s=0.6", "outputs.pictures_at_s=[]"]),
+        ("effects/damage.toml", &[]),
+    ] {
+        let run = run(name, overrides, best_engine());
+        run.assert_sound();
+        let (energy, health) = (run.last().energy, run.last().health);
+        match name {
+            "effects/plasticity.toml" => assert!(energy.plastic > 0.1 * energy.external_max, "{energy:?}"),
+            "effects/viscoelastic.toml" => assert!(energy.viscous > 0.05 * energy.external_max, "{energy:?}"),
+            "effects/damage.toml" => {
+                assert!((health.largest_damage - 0.95).abs() < 1e-3, "damage {}", health.largest_damage);
+                assert_eq!(health.return_failures, 0);
+            }
+            // Slanted fibres pull sideways on a face that moves straight up.
+            _ => {
+                let force = run.last().reactions[Face::ZMax as usize];
+                assert!(force.x.abs() > 0.05 * force.z, "{force}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_insertion_with_every_effect_keeps_its_energy() {
+    let all = "effects=[\"mass_scaling\",\"gravity\",\"plasticity\",\"fibres\",\"viscoelastic\",\"damage\",\"puncture\",\"friction\"]";
+    let overrides =
+        [all, "damage.failure_displacement_mm=0.5", "motion.phase.0.depth_mm=4.0", "motion.phase.2.depth_mm=3.0"];
+    let run = run("muscle_biopsy.toml", &overrides, best_engine());
+    run.assert_sound();
+    let energy = run.last().energy;
+    assert!(energy.plastic > 0.0 && energy.viscous > 0.0, "{energy:?}");
+    assert_eq!(run.records.iter().map(|r| r.health.return_failures).sum::<u32>(), 0);
+}

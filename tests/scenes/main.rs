@@ -14,6 +14,7 @@ use stylet::solver::simulation::{EngineChoice, Simulation};
 
 mod effects;
 mod muscle_biopsy;
+mod samples;
 mod validation;
 
 fn load(name: &str, overrides: &[&str]) -> Scene {

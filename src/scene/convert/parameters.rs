@@ -260,11 +260,24 @@ impl Check<'_> {
             _ => format!("effects.{}", file.effects.iter().position(|key| key == "damage").unwrap_or(0)),
         };
         let table = index.and_then(|i| file.region[i].damage.as_ref()).or(file.damage.as_ref());
+        let own_word = index.and_then(|i| file.region[i].damage.as_ref()).and_then(|t| t.allow_brittle);
+        let whose = index.map(|i| format!(" in region `{}`", file.region[i].name)).unwrap_or_default();
+        let u_f = damage.failure_displacement;
+        if own_word.or(file.damage.as_ref().and_then(|t| t.allow_brittle)) == Some(true) {
+            self.notices.push(format!(
+                "Damage{whose} breaks brittly: with {} mm cells and a failure displacement of {} mm (limit {:.2e} m) the \
+                 softening branch snaps back, the break is dynamic and its dissipation is what the kinetic energy and \
+                 damping take.",
+                four_digits(cell / MM),
+                four_digits(u_f / MM),
+                limit
+            ));
+            return;
+        }
         let by_energy = table.is_some_and(|t| t.fracture_energy_j_m2.is_some());
         let key = if by_energy { "fracture_energy_j_m2" } else { "failure_displacement_mm" };
         let enough = 1.05 * sigma * cell / material.law.youngs_modulus();
         let value = if by_energy { 0.5 * sigma * enough } else { enough / MM };
-        let u_f = damage.failure_displacement;
         let printed = if (u_f / PRINTED_FAILURE_DISPLACEMENT - 1.0).abs() < 0.01 {
             " Lv et al. 2022 print 4e-6 without a unit."
         } else {
@@ -275,7 +288,6 @@ impl Check<'_> {
             limit if limit < 0.1 => String::new(),
             limit => format!(", or a cell_size_mm below {limit}"),
         };
-        let whose = index.map(|i| format!(" in region `{}`", file.region[i].name)).unwrap_or_default();
         self.problems.report(
             &format!("{place}.{key}"),
             format!(
@@ -288,7 +300,10 @@ impl Check<'_> {
                 limit
             ),
             "a cell must be smaller than E u_f/sigma",
-            format!("write {key} of at least {}{finer}", four_digits(value)),
+            format!(
+                "write {key} of at least {}{finer}, or allow_brittle = true for a dynamic break",
+                four_digits(value)
+            ),
         );
     }
 
