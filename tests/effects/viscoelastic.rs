@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DMat3;
 use stylet::effects::{mass_scaling, viscoelastic};
 use stylet::model::Model;
+use stylet::scene::{Face, FaceCondition, FaceDrive};
 use stylet::solver::engine::Engine;
 
 use crate::common::*;
@@ -136,5 +137,63 @@ fn relaxation_dissipates_and_the_account_closes() {
         // Held at the end: about half of the stress is left.
         let peak = samples.iter().map(|s| s.nominal).fold(0.0, f64::max);
         assert!(samples.last().unwrap().nominal < 0.75 * peak);
+    }
+}
+
+#[test]
+fn a_sheared_column_follows_ramp_and_hold() {
+    let file = reference("10_prony_linear.json");
+    let terms: Vec<viscoelastic::Term> = file["prony_g_tau_s"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|t| viscoelastic::Term { ratio: number(&t[0]), time: number(&t[1]) })
+        .collect();
+    let (ramp, modulus) = (&file["ramp"], number(&file["E0_Pa"]));
+    // The file strains a bar of modulus E0; a column that can only slip has the same kernel with mu0. A tenth of the strain
+    // keeps the shear small.
+    let part = 0.1;
+    let slip = part * number(&ramp["rate_per_s"]) * number(&ramp["t_ramp_s"]);
+    let mut scene = block([2.0, 2.0, 4.0], 2.0);
+    for face in [Face::XMin, Face::XMax, Face::YMin, Face::YMax] {
+        scene.faces[face as usize] = held(false, true, true);
+    }
+    scene.faces[Face::ZMin as usize] = held(true, true, true);
+    scene.faces[Face::ZMax as usize] = FaceCondition {
+        drive: Some(FaceDrive {
+            displacement: glam::DVec3::X * (slip * 4e-3),
+            rotation: 0.0,
+            duration: number(&ramp["t_ramp_s"]),
+            cycles: 0,
+        }),
+        ..held(true, true, true)
+    };
+    scene.solver.mass_damping = 60.0;
+    scene.effects.viscoelastic = Some(viscoelastic::Params { terms });
+    scene.effects.mass_scaling = Some(mass_scaling::Params { factor: 40.0 });
+    let model = model(scene);
+    let dt = 2e-4;
+    assert!(dt < stylet::solver::stable_dt::wave_speed_bound(&model));
+    let times: Vec<f64> =
+        ramp["t_s"].as_array().unwrap().iter().map(number).filter(|t| (0.4..11.0).contains(t)).collect();
+    let stress = |t: f64| {
+        let at = ramp["t_s"].as_array().unwrap().iter().position(|x| number(x) == t).unwrap();
+        number(&ramp["stress_Pa"][at]) / modulus
+    };
+    for (name, mut engine) in engines(&model, dt, 1000) {
+        let (mut step, mut worst) = (0, 0.0f64);
+        for t in &times {
+            let target = (t / dt).round() as u64;
+            let mut sums = Default::default();
+            while step < target {
+                let steps = (target - step).min(1000) as usize;
+                sums = advance(engine.as_mut(), &model, dt, &mut step, steps);
+            }
+            let sums: stylet::solver::engine::FrameSums = sums;
+            let found = sums.reactions[Face::ZMax as usize].x / 4e-6 / (model.materials[0].law.shear_modulus() * part);
+            worst = worst.max((found / stress(*t) - 1.0).abs());
+        }
+        // Mass damping drags at the column while the face moves: 1.6e-3 of the stress.
+        at_most(&format!("{name}: ramp and hold up to {} s", times[times.len() - 1]), worst, 2e-3);
     }
 }
