@@ -87,8 +87,9 @@ fn material_point(place: PointPlace, H: mat3x3<f32>) -> PointAnswer {
 #endif
 #ifdef VISCOELASTIC
     // Relaxes what matrix and fibres hold together.
-    history.relaxation_work = relax(place.material, place.cell, H, out.P, out.cof, out.dj);
-    out.P -= deformation_gradient(H) * viscous_sum(place.cell);
+    let relaxation = relax(place.material, place.cell, H, out.P, out.cof, out.dj);
+    history.relaxation_work = relaxation.work;
+    out.P -= deformation_gradient(H) * relaxation.sum;
 #endif
 #ifdef DAMAGE
     // Last: what has failed carries nothing of the sum.

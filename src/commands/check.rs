@@ -27,7 +27,7 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     let law = scene.material.law;
     line(format!("scene        {} ({})", scene.name, scene.path.display()));
     line(format!("             {}", scene.title));
-    let size = scene.tissue.size * 1e3;
+    let size = (scene.tissue.size * 1e3).to_array().map(four_digits);
     let kind = match &model.mesh {
         Mesh::Block(block) => {
             let [nx, ny, nz] = block.cells();
@@ -37,9 +37,9 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     };
     line(format!(
         "tissue       {} x {} x {} mm, {kind}{} cells, {} nodes, smallest edge {:.3} mm",
-        size.x,
-        size.y,
-        size.z,
+        size[0],
+        size[1],
+        size[2],
         model.mesh.cell_count(),
         model.mesh.node_count(),
         model.mesh.smallest_edge() * 1e3

@@ -349,7 +349,7 @@ fn from_preset(name: &str) -> Result<Subject> {
             format!("{near}Presets: {}", names.join(", ")),
         ));
     };
-    Ok(Subject { name: preset.name.clone(), material: Material { density: preset.density, ..elastic(preset.law) } })
+    Ok(Subject { name: preset.name.clone(), material: preset.material() })
 }
 
 fn from_scene(args: &MaterialArgs, path: &std::path::Path) -> Result<Subject> {

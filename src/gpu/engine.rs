@@ -830,15 +830,10 @@ fn viscous_state(model: &Model, dt: f64, points: &[PointState]) -> Vec<ViscousSt
             [0, 4].map(|i| u32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]))
         })
         .collect();
-    let entries = |q: DMat3, [first_intervals, last_intervals]: [u32; 2]| ViscousStress {
-        xx: q.x_axis.x as f32,
-        yy: q.y_axis.y as f32,
-        zz: q.z_axis.z as f32,
-        first_intervals,
-        xy: q.y_axis.x as f32,
-        yz: q.z_axis.y as f32,
-        zx: q.x_axis.z as f32,
-        last_intervals,
+    let bits = |x: f64, y: f64, z: f64, w: u32| [(x as f32).to_bits(), (y as f32).to_bits(), (z as f32).to_bits(), w];
+    let entries = |q: DMat3, [first, last]: [u32; 2]| ViscousStress {
+        normal: bits(q.x_axis.x, q.y_axis.y, q.z_axis.z, first),
+        shear: bits(q.y_axis.x, q.z_axis.y, q.x_axis.z, last),
     };
     let mut state = Vec::with_capacity(points.len() * (count + 1));
     for (cell, point) in points.iter().enumerate() {
@@ -925,7 +920,8 @@ fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
 
 /// The tensor of an entry.
 fn symmetric(q: &ViscousStress) -> DMat3 {
-    let [xx, yy, zz, xy, yz, zx] = [q.xx, q.yy, q.zz, q.xy, q.yz, q.zx].map(f64::from);
+    let number = |bits: u32| f64::from(f32::from_bits(bits));
+    let ([xx, yy, zz, _], [xy, yz, zx, _]) = (q.normal.map(number), q.shear.map(number));
     DMat3::from_cols(DVec3::new(xx, xy, zx), DVec3::new(xy, yy, yz), DVec3::new(zx, yz, zz))
 }
 

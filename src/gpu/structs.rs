@@ -107,14 +107,8 @@ shared_structs! {
     }
     /// shaders/effects/viscoelastic.wgsl
     struct ViscousStress {
-        xx: f32,
-        yy: f32,
-        zz: f32,
-        first_intervals: u32,
-        xy: f32,
-        yz: f32,
-        zx: f32,
-        last_intervals: u32,
+        normal: [u32; 4],
+        shear: [u32; 4],
     }
     /// shaders/effects/damage.wgsl
     struct DamageParams {

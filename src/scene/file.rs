@@ -477,9 +477,9 @@ pub struct PlasticityTable {
 pub struct FibresTable {
     /// Direction of the fibres at rest, any length; default [1, 0, 0].
     pub direction: Option<[f64; 3]>,
-    /// Stiffness k1 [kPa]; default 4.26; 0: no fibres in this material.
+    /// Stiffness k1 [kPa]; default 8.78; 0: no fibres in this material.
     pub k1_kpa: Option<f64>,
-    /// Exponent k2; default 0.3.
+    /// Exponent k2; default 0.05.
     pub k2: Option<f64>,
 }
 

@@ -5,9 +5,11 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::convert::library;
+use super::convert::{library, parameters};
 use super::file::{CuttingTable, DamageTable, FibresTable, PlasticityTable, ViscoelasticTable};
+use crate::effects;
 use crate::material::ElasticLaw;
+use crate::material_point::Material;
 
 /// A tissue material with its origin and range of validity.
 #[derive(Debug, Clone)]
@@ -29,6 +31,23 @@ pub struct TissuePreset {
     pub damage: Option<DamageTable>,
     /// Tip forces as written: a cutting energy becomes a force with the needle of the scene.
     pub cutting: Option<CuttingTable>,
+}
+
+impl TissuePreset {
+    /// The preset as a material point of its own: what it states for effects, the rest by default; no effect that it
+    /// does not mention.
+    pub fn material(&self) -> Material {
+        let plasticity = self.plasticity.as_ref().map(|t| parameters::plasticity_over(t, Default::default()));
+        let flow: effects::plasticity::Params = plasticity.unwrap_or_default();
+        Material {
+            law: self.law,
+            density: self.density,
+            plasticity,
+            fibres: self.fibres.as_ref().map(|t| parameters::fibres_over(t, Default::default())),
+            viscoelastic: self.viscoelastic.as_ref().map(|t| parameters::viscoelastic_over(t, Default::default())),
+            damage: self.damage.as_ref().map(|t| parameters::damage_over(t, Default::default(), flow)),
+        }
+    }
 }
 
 /// A needle size.

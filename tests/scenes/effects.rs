@@ -94,6 +94,10 @@ fn the_constitutive_scenes_run_soundly() {
             "effects/damage.toml" => {
                 assert!((health.largest_damage - 0.95).abs() < 1e-3, "damage {}", health.largest_damage);
                 assert_eq!(health.return_failures, 0);
+                assert!(run.summary.hourglass_to_internal < 0.02);
+                // Flow before the onset, softening, and a little at a twentieth of the strength.
+                let expected = (0.05 * 4800.0 * 1e-3 + 0.9975 * 0.5 * 4800.0 * 0.4e-3) * 16e-6;
+                assert_near("energy of the failed layer [J]", energy.plastic, expected, 0.1);
             }
             // Slanted fibres pull sideways on a face that moves straight up.
             _ => {

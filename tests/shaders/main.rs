@@ -247,6 +247,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "PlasticAnswer",
         "MandelStress",
         "FibreStress",
+        "Relaxation",
         "NodePlace",
         "MeasuredCell",
     ];

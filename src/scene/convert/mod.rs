@@ -7,7 +7,7 @@ mod effects;
 pub(super) mod library;
 mod material;
 mod mesh;
-mod parameters;
+pub(super) mod parameters;
 mod regions;
 mod tool;
 
