@@ -647,11 +647,11 @@ fn wrong_effect_tables() {
         (
             "[damage]\nfailure_displacement_mm = 4e-6",
             "failure_displacement_mm",
-            "REFUSED damage: failure displacement 0.000004 mm dissipates 8.61e-5 J/m^2 at 43.02 kPa; with 2 mm cells the \
-             softening branch snaps back (limit 7.48e-9 m). Lv et al. 2022 print 4e-6 without a unit.",
+            "REFUSED damage: failure displacement 0.000004 mm dissipates 8.77e-5 J/m^2 at 43.87 kPa; with 2 mm cells the \
+             softening branch snaps back (limit 7.34e-9 m). Lv et al. 2022 print 4e-6 without a unit.",
         ),
-        ("[damage]\nfailure_displacement_mm = 1", "failure_displacement_mm", "of at least 1.122"),
-        ("[damage]\nfracture_energy_j_m2 = 1", "fracture_energy_j_m2", "write fracture_energy_j_m2 of at least 24.15"),
+        ("[damage]\nfailure_displacement_mm = 1", "failure_displacement_mm", "of at least 1.145"),
+        ("[damage]\nfracture_energy_j_m2 = 1", "fracture_energy_j_m2", "write fracture_energy_j_m2 of at least 25.11"),
         ("", "effects =", "REFUSED damage: failure displacement 0.07 mm"),
     ] {
         assert_block_refused(effects, &format!("{MATERIAL}{text}\n"), marker, &[expected]);

@@ -107,10 +107,12 @@ fn material_point(place: PointPlace, H: mat3x3<f32>) -> PointAnswer {
 #ifdef HISTORY
     let happened = history.flow != 0.0 || history.relaxation_work != 0.0 || history.failures != 0.0;
     for (var once = select(1u, 0u, happened || history.degradation != 0.0); once == 0u; once++) {
-        point_history[place.cell].flow += place.kept * history.flow;
-        point_history[place.cell].degradation += place.kept * history.degradation;
-        point_history[place.cell].relaxation_work += place.kept * history.relaxation_work;
-        point_history[place.cell].failures += history.failures;
+        var booked = read_history(place.cell);
+        booked.flow += place.kept * history.flow;
+        booked.degradation += place.kept * history.degradation;
+        booked.relaxation_work += place.kept * history.relaxation_work;
+        booked.failures += history.failures;
+        write_history(place.cell, booked);
     }
 #endif
     return out;

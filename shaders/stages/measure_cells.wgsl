@@ -15,12 +15,12 @@
 #ifdef HISTORY
 // Adds what the cell reported in this frame and clears it. The work of relaxation is kept: it belongs to the state.
 fn book_history(sums: ptr<function, CellSums>, cell: u32, volume: f32, held: f32) {
-    let history = point_history[cell];
+    let history = read_history(cell);
     (*sums).flow += volume * history.flow;
     (*sums).degradation += volume * history.degradation;
     (*sums).relaxation += volume * history.relaxation_work - held;
     (*sums).failures += history.failures;
-    point_history[cell] = PointHistory(0.0, 0.0, history.relaxation_work, 0.0);
+    write_history(cell, PointHistory(0.0, 0.0, history.relaxation_work, 0.0));
 }
 #endif
 
