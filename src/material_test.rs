@@ -14,64 +14,13 @@
 //! its end: the midpoint rule of `effects/viscoelastic.rs` with the terms brought to full steps, of second order for
 //! steps that change.
 
-use glam::{DMat3, DVec3};
+use glam::DMat3;
 
 use crate::effects::viscoelastic;
+use crate::material::Mode;
 use crate::material::kinematics::{double_dot, jacobian_minus_one};
 use crate::material_point::{Material, PointEnergy, PointState, Surroundings};
 use crate::{Error, Result};
-
-/// How a sample is loaded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mode {
-    Uniaxial,
-    Equibiaxial,
-    Planar,
-    Shear,
-}
-
-impl Mode {
-    pub const ALL: [Mode; 4] = [Mode::Uniaxial, Mode::Equibiaxial, Mode::Planar, Mode::Shear];
-
-    /// Name on the command line and in outputs.
-    pub fn key(self) -> &'static str {
-        match self {
-            Mode::Uniaxial => "uniaxial",
-            Mode::Equibiaxial => "equibiaxial",
-            Mode::Planar => "planar",
-            Mode::Shear => "shear",
-        }
-    }
-
-    /// Control value at rest: a stretch of 1, no shear.
-    pub fn rest(self) -> f64 {
-        if self == Mode::Shear { 0.0 } else { 1.0 }
-    }
-
-    /// Axes whose stretch is free.
-    pub fn free_axes(self) -> &'static [usize] {
-        match self {
-            Mode::Uniaxial => &[1, 2],
-            Mode::Equibiaxial | Mode::Planar => &[2],
-            Mode::Shear => &[],
-        }
-    }
-
-    /// H = F - I with free stretches of 1.
-    pub fn displacement_gradient(self, control: f64) -> DMat3 {
-        let e = control - self.rest();
-        match self {
-            Mode::Uniaxial | Mode::Planar => DMat3::from_diagonal(DVec3::new(e, 0.0, 0.0)),
-            Mode::Equibiaxial => DMat3::from_diagonal(DVec3::new(e, e, 0.0)),
-            Mode::Shear => DMat3::from_cols(DVec3::ZERO, DVec3::new(e, 0.0, 0.0), DVec3::ZERO),
-        }
-    }
-
-    /// The component that the mode measures, of P or of the Cauchy stress: 11, or 12 in shear.
-    pub fn component(self, stress: DMat3) -> f64 {
-        if self == Mode::Shear { stress.y_axis.x } else { stress.x_axis.x }
-    }
-}
 
 /// One material point under a prescribed deformation with free axes.
 #[derive(Debug, Clone)]
@@ -336,7 +285,7 @@ pub fn run(material: &Material, mode: Mode, protocol: &Protocol) -> Result<Vec<R
     let points = protocol.points.max(2);
     let at = |from: f64, to: f64, i: usize| from + (to - from) * i as f64 / (points - 1) as f64;
     for cycle in 0..protocol.cycles.max(1) {
-        let begin = if cycle == 0 { mode.rest() } else { protocol.from };
+        let begin = if cycle == 0 { mode.at_rest() } else { protocol.from };
         test.go(begin, protocol.from, protocol.rate)?;
         test.record(cycle, Leg::Loading, protocol.from);
         for i in 1..points {

@@ -204,9 +204,10 @@ impl Subject {
         Ok(())
     }
 
-    /// Brings the needle 6 mm in, ten times as fast as later: the tip has punctured and the shaft rubs when it counts.
-    pub(super) fn puncture(&mut self, steps: usize) -> Result<()> {
-        while (self.step as f64) * self.dt * 10.0 * 2e-3 < 6e-3 {
+    /// Brings the tool `depth` [m] in, ten times as fast as later: a needle of which 6 mm are in has punctured, and its
+    /// shaft rubs.
+    pub(super) fn advance_tool(&mut self, depth: f64, steps: usize) -> Result<()> {
+        while (self.step as f64) * self.dt * 10.0 * 2e-3 < depth {
             self.frame(steps, 10.0)?;
         }
         self.step *= 10;
@@ -241,7 +242,7 @@ fn measure(cells: [usize; 3], needle: bool, gpu: Option<&Gpu>) -> Result<Row> {
     const STEPS: usize = 100;
     let mut subject = Subject::new(cells, needle, gpu, STEPS)?;
     if needle {
-        subject.puncture(STEPS)?;
+        subject.advance_tool(6e-3, STEPS)?;
     } else {
         subject.frame(STEPS, 1.0)?;
     }
@@ -271,7 +272,7 @@ fn needle_over_bare(gpu: Option<&Gpu>) -> Result<f64> {
     const STEPS: usize = 100;
     let mut bare = Subject::new(SIZES[1], false, gpu, STEPS)?;
     let mut needle = Subject::new(SIZES[1], true, gpu, STEPS)?;
-    needle.puncture(STEPS)?;
+    needle.advance_tool(6e-3, STEPS)?;
     bare.frame(STEPS, 1.0)?;
     let mut ratios = Vec::new();
     for _ in 0..7 {

@@ -19,7 +19,7 @@ use crate::gpu::Gpu;
 use crate::gpu::compose::{compose, compose_without_effects};
 use crate::gpu::engine::{Features, defines, stages};
 use crate::model::Model;
-use crate::scene::Scene;
+use crate::scene::{Motion, Phase, Scene, Tool};
 use crate::solver::simulation::EngineChoice;
 
 /// Cells per axis of the block: 20 k.
@@ -75,7 +75,7 @@ fn with_effects(effects: &mut EffectSet, keys: &[&str], low: bool) {
                 let onset = if low { 1e-4 } else { 0.0652 };
                 effects.damage = Some(damage::Params { onset, failure_displacement: 1.0, ..Default::default() });
             }
-            "mass_scaling" => {}
+            // Those of the bench scene itself: mass scaling and what a tool brings.
             _ => {}
         }
     }
@@ -94,10 +94,20 @@ fn subject(keys: &[&str], low: bool, gpu: Option<&Gpu>) -> Result<Subject> {
         scene.effects.friction = None;
     }
     with_effects(&mut scene.effects, keys, low);
+    let indents = keys.contains(&"indentation");
+    if indents {
+        let speed = 2e-3;
+        scene.tool = Some(Tool::Sphere { radius: 4e-3 });
+        scene.motion =
+            Motion { entry: DVec3::ZERO, direction: DVec3::NEG_Z, phases: vec![Phase::Insert { speed, depth: 3e-3 }] };
+        scene.effects.indentation = Some(Default::default());
+    }
     let mesh = uniform_mesh(CELLS, scene.tissue.cell_size);
     let mut subject = Subject::of_model(Arc::new(Model::new(scene, mesh)), gpu, STEPS)?;
     if needle {
-        subject.puncture(STEPS)?;
+        subject.advance_tool(6e-3, STEPS)?;
+    } else if indents {
+        subject.advance_tool(1e-3, STEPS)?;
     }
     if low {
         // A swing of all nodes, different from node to node.
@@ -174,7 +184,7 @@ pub fn bench_effects(engine: EngineChoice) -> Result<EffectReport> {
     let gpu = gpu.as_ref();
     const CONSTITUTIVE: [&str; 4] = ["plasticity", "fibres", "viscoelastic", "damage"];
     let mut costs = Vec::new();
-    let plan: [(&[&str], &[&str], bool); 13] = [
+    let plan: [(&[&str], &[&str], bool); 14] = [
         (&["mass_scaling"], &[], false),
         (&["gravity"], &[], false),
         (&["plasticity"], &[], false),
@@ -186,6 +196,7 @@ pub fn bench_effects(engine: EngineChoice) -> Result<EffectReport> {
         (&["fibres"], &[], true),
         (&["viscoelastic"], &[], true),
         (&CONSTITUTIVE, &[], true),
+        (&["mass_scaling", "indentation"], &["mass_scaling"], false),
         (&["mass_scaling", "puncture"], &["mass_scaling"], false),
         (&["mass_scaling", "puncture", "friction"], &["mass_scaling", "puncture"], false),
     ];

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::material::fit::{Fit, LawFit, Mode, Point, best_stable, fit_all, nominal_stress};
+use crate::material::Mode;
+use crate::material::fit::{Fit, LawFit, Point, best_stable, fit_all, nominal_stress};
 use crate::material::{ElasticLaw, Isochoric, Verdict, describe_verdict};
 use crate::output::fit_chart::fit_chart;
 use crate::output::whole_file;

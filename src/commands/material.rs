@@ -10,11 +10,12 @@ use serde::Serialize;
 use crate::effects::viscoelastic::{LARGEST_TERM_COUNT, Term};
 use crate::effects::{damage, fibres, plasticity, viscoelastic};
 use crate::error::{Error, Result};
+use crate::material::Mode;
 use crate::material::{
     Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict, four_digits,
 };
 use crate::material_point::Material;
-use crate::material_test::{self, Leg, Mode, Protocol, Row};
+use crate::material_test::{self, Leg, Protocol, Row};
 use crate::output::{material_chart::material_chart, whole_file};
 use crate::scene::document::closest;
 use crate::scene::{Scene, presets};
@@ -267,7 +268,7 @@ fn modes(args: &MaterialArgs) -> Vec<Mode> {
 fn range(args: &MaterialArgs, mode: Mode, alone: bool) -> Result<(f64, f64)> {
     let shift = if mode == Mode::Shear && !alone { 1.0 } else { 0.0 };
     let default = if mode == Mode::Shear { 0.5 } else { 1.5 };
-    let from = args.from.map_or(mode.rest(), |v| v - shift);
+    let from = args.from.map_or(mode.at_rest(), |v| v - shift);
     let to = args.to.map_or(default, |v| v - shift);
     let (quantity, low, high) = if mode == Mode::Shear { ("shear", -10.0, 10.0) } else { ("stretch", 0.05, 10.0) };
     for (option, value) in [("--from", from), ("--to", to)] {

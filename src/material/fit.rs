@@ -22,7 +22,7 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn, Matrix, U2, Vector2};
 
-use super::{Demiray, Isochoric, MooneyRivlin, NeoHookean, Ogden, Verdict, Yeoh};
+use super::{Demiray, Isochoric, Mode, MooneyRivlin, NeoHookean, Ogden, Verdict, Yeoh};
 
 /// Smallest exponent b of a stable Demiray fit: below it the law is neo-Hookean to 1e-3 at stretches that samples reach.
 pub const LEAST_DEMIRAY_B: f64 = 1e-3;
@@ -35,50 +35,6 @@ const DEMIRAY_STARTS: [f64; 6] = [-1.0, 0.1, 1.0, 5.0, 20.0, 80.0];
 /// many times larger than the least one, plus a remainder. Half a per cent of an error tells nothing about a tissue.
 const EQUALLY_GOOD: f64 = 1.005;
 const EXACT: f64 = 1e-6;
-
-/// How a sample is loaded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Mode {
-    /// Tension or compression along one axis.
-    Uniaxial,
-    /// Equal stretch along two axes.
-    Equibiaxial,
-    /// Stretch along one axis, a second one held: pure shear.
-    Planar,
-    /// Simple shear.
-    Shear,
-}
-
-impl Mode {
-    pub const ALL: [Mode; 4] = [Mode::Uniaxial, Mode::Equibiaxial, Mode::Planar, Mode::Shear];
-
-    pub fn key(self) -> &'static str {
-        match self {
-            Mode::Uniaxial => "uniaxial",
-            Mode::Equibiaxial => "equibiaxial",
-            Mode::Planar => "planar",
-            Mode::Shear => "shear",
-        }
-    }
-
-    /// Principal stretches of an incompressible sample at the stretch, or amount of shear, `x`.
-    pub fn principal_stretches(self, x: f64) -> [f64; 3] {
-        match self {
-            Mode::Uniaxial => [x, x.powf(-0.5), x.powf(-0.5)],
-            Mode::Equibiaxial => [x, x, x.powi(-2)],
-            Mode::Planar => [x, 1.0, 1.0 / x],
-            Mode::Shear => {
-                let l = 0.5 * x + (1.0 + 0.25 * x * x).sqrt();
-                [l, 1.0, 1.0 / l]
-            }
-        }
-    }
-
-    /// The value of `x` at rest.
-    pub fn at_rest(self) -> f64 {
-        if self == Mode::Shear { 0.0 } else { 1.0 }
-    }
-}
 
 /// One measured point.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -13,12 +13,14 @@
 pub mod demiray;
 pub mod fit;
 pub mod kinematics;
+pub mod mode;
 pub mod mooney_rivlin;
 pub mod neo_hookean;
 pub mod ogden;
 pub mod yeoh;
 
 pub use demiray::Demiray;
+pub use mode::Mode;
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
 pub use ogden::Ogden;

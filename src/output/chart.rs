@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use plotters::chart::MeshStyle;
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -78,21 +80,13 @@ pub fn force_chart(
             .x_label_area_size(fine(48))
             .y_label_area_size(fine(68))
             .build_cartesian_2d(x_min..x_max, y_min..y_max)?;
-        chart
-            .configure_mesh()
+        house_style(&mut chart.configure_mesh())
             .x_desc(if over_depth { "depth of the tip [mm]" } else { "time [s]" })
             .y_desc("force on the tissue [N]")
-            .axis_desc_style(("sans-serif", fine(17)))
-            .label_style(("sans-serif", fine(15)))
             .x_labels(12)
             .y_labels(9)
             .x_label_formatter(&|v| tick(*v, x_max - x_min))
             .y_label_formatter(&|v| tick(*v, y_max - y_min))
-            .bold_line_style(BLACK.mix(0.14).stroke_width(fine(1)))
-            .light_line_style(BLACK.mix(0.05).stroke_width(fine(1)))
-            .axis_style(BLACK.mix(0.6).stroke_width(fine(1)))
-            .set_all_tick_mark_size(fine(5))
-            .max_light_lines(5)
             .draw()?;
         chart.draw_series(LineSeries::new([(x_min, 0.0), (x_max, 0.0)], BLACK.mix(0.6).stroke_width(fine(1))))?;
         for curve in &curves {
@@ -221,6 +215,19 @@ pub(super) fn widened(low: f64, high: f64, fraction: f64) -> (f64, f64) {
     let span = if high > low { high - low } else { 1.0 };
     let below = if low < 0.0 { fraction * span } else { 0.0 };
     (low - below, low.max(high).max(low + span) + fraction * span)
+}
+
+/// Fonts, grid and axes of every chart of the program.
+pub(super) fn house_style<'m, 'a, 'b, DB: DrawingBackend>(
+    mesh: &'m mut MeshStyle<'a, 'b, RangedCoordf64, RangedCoordf64, DB>,
+) -> &'m mut MeshStyle<'a, 'b, RangedCoordf64, RangedCoordf64, DB> {
+    mesh.axis_desc_style(("sans-serif", fine(17)))
+        .label_style(("sans-serif", fine(15)))
+        .bold_line_style(BLACK.mix(0.14).stroke_width(fine(1)))
+        .light_line_style(BLACK.mix(0.05).stroke_width(fine(1)))
+        .axis_style(BLACK.mix(0.6).stroke_width(fine(1)))
+        .set_all_tick_mark_size(fine(5))
+        .max_light_lines(5)
 }
 
 /// A tick label with as many decimals as the span needs.

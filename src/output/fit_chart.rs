@@ -4,9 +4,9 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::chart::{FINER, fine, range, tick};
-use crate::material::fit::{LawFit, Mode, Point, nominal_stress};
-use crate::material::{Isochoric, Verdict};
+use super::chart::{FINER, fine, house_style, range, tick};
+use crate::material::fit::{LawFit, Point, nominal_stress};
+use crate::material::{Isochoric, Mode, Verdict};
 
 /// Size of one panel [px]; a single one is drawn larger.
 const PANEL: (u32, u32) = (600, 420);
@@ -182,21 +182,13 @@ fn draw_panel<DB: DrawingBackend>(
         Mode::Planar => ("stretch, planar", "nominal stress [kPa]"),
         Mode::Shear => ("amount of shear", "shear stress [kPa]"),
     };
-    chart
-        .configure_mesh()
+    house_style(&mut chart.configure_mesh())
         .x_desc(x_name)
         .y_desc(y_name)
-        .axis_desc_style(("sans-serif", fine(17)))
-        .label_style(("sans-serif", fine(15)))
         .x_labels(8)
         .y_labels(8)
         .x_label_formatter(&|v| tick(*v, x_max - x_min))
         .y_label_formatter(&|v| tick(*v, y_max - y_min))
-        .bold_line_style(BLACK.mix(0.14).stroke_width(fine(1)))
-        .light_line_style(BLACK.mix(0.05).stroke_width(fine(1)))
-        .axis_style(BLACK.mix(0.6).stroke_width(fine(1)))
-        .set_all_tick_mark_size(fine(5))
-        .max_light_lines(5)
         .draw()?;
     let rule = BLACK.mix(0.6).stroke_width(fine(1));
     chart.draw_series(LineSeries::new([(x_min, 0.0), (x_max, 0.0)], rule))?;

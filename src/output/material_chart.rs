@@ -6,9 +6,10 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::chart::{
-    CUTTING, Curve, FINER, HEAD, INWARD, OUTWARD, SIZE, SPREADING, draw_head, fine, range, tick, widened,
+    CUTTING, Curve, FINER, HEAD, INWARD, OUTWARD, SIZE, SPREADING, draw_head, fine, house_style, range, tick, widened,
 };
-use crate::material_test::{Leg, Mode, Row, peak};
+use crate::material::Mode;
+use crate::material_test::{Leg, Row, peak};
 
 type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
 
@@ -77,7 +78,7 @@ fn over_deformation(area: &DrawingArea<SVGBackend, Shift>, curves: &[(Mode, Vec<
     let mut lines = Vec::new();
     let mut marks = Vec::new();
     for (mode, rows) in curves {
-        let point = |r: &Row| (r.control - mode.rest(), r.nominal * 1e-3);
+        let point = |r: &Row| (r.control - mode.at_rest(), r.nominal * 1e-3);
         let back = differs_on_the_way_back(rows);
         let mut start = 0;
         while start < rows.len() {
@@ -94,7 +95,7 @@ fn over_deformation(area: &DrawingArea<SVGBackend, Shift>, curves: &[(Mode, Vec<
             start = end;
         }
         if let Some((control, stress)) = peak(rows) {
-            let at = (control - mode.rest(), stress * 1e-3);
+            let at = (control - mode.at_rest(), stress * 1e-3);
             let label = format!("{:.1} kPa at {control:.2}", at.1);
             marks.push(Mark { at, colour: colour(*mode), label });
         }
@@ -159,21 +160,13 @@ impl Panel {
             .x_label_area_size(fine(48))
             .y_label_area_size(fine(68))
             .build_cartesian_2d(x_min..x_max, y_min..y_max)?;
-        chart
-            .configure_mesh()
+        house_style(&mut chart.configure_mesh())
             .x_desc(self.abscissa)
             .y_desc(self.ordinate)
-            .axis_desc_style(("sans-serif", fine(17)))
-            .label_style(("sans-serif", fine(15)))
             .x_labels((width / fine(90)) as usize)
             .y_labels(9)
             .x_label_formatter(&|v| tick(*v, x_max - x_min))
             .y_label_formatter(&|v| tick(*v, y_max - y_min))
-            .bold_line_style(BLACK.mix(0.14).stroke_width(fine(1)))
-            .light_line_style(BLACK.mix(0.05).stroke_width(fine(1)))
-            .axis_style(BLACK.mix(0.6).stroke_width(fine(1)))
-            .set_all_tick_mark_size(fine(5))
-            .max_light_lines(5)
             .draw()?;
         let zero = BLACK.mix(0.6).stroke_width(fine(1));
         chart.draw_series(LineSeries::new([(x_min, 0.0), (x_max, 0.0)], zero))?;

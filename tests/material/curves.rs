@@ -5,7 +5,8 @@
 use std::path::PathBuf;
 
 use stylet::material::Isochoric;
-use stylet::material::fit::{Mode, nominal_stress};
+use stylet::material::Mode;
+use stylet::material::fit::nominal_stress;
 
 use crate::*;
 

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use stylet::commands::fit::{FitOptions, Volumetric, fit, read_curves};
-use stylet::material::fit::{Mode, Point};
+use stylet::material::Mode;
+use stylet::material::fit::Point;
 
 use crate::*;
 

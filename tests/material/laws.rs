@@ -1,7 +1,8 @@
 //! Stress against energy, rotations, limits of the laws, closed forms.
 
 use glam::{DMat3, DVec3};
-use stylet::material::fit::{Mode, nominal_stress};
+use stylet::material::Mode;
+use stylet::material::fit::nominal_stress;
 use stylet::material::kinematics::J_CONTINUATION;
 use stylet::material::{ElasticLaw, Isochoric};
 

@@ -1,7 +1,8 @@
 //! The homogeneous sample: reference states, protocol, calibration of the defaults.
 
 use stylet::effects::{damage, fibres, plasticity, viscoelastic};
-use stylet::material_test::{Leg, Mode, Protocol, Row, Sample, peak, run};
+use stylet::material::Mode;
+use stylet::material_test::{Leg, Protocol, Row, Sample, peak, run};
 
 use crate::*;
 

@@ -1,7 +1,8 @@
 //! Specimens in a testing machine: strengths, yield, closed forms, relaxation, hysteresis.
 
 use super::*;
-use stylet::material_test::{self, Mode, Protocol};
+use stylet::material::Mode;
+use stylet::material_test::{self, Protocol};
 use stylet::output::sample::{DrivenFace, SamplePoint};
 
 /// The curve of the driven face z_max.
