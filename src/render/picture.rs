@@ -14,7 +14,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec2;
 
-use super::slice::{self, Plane, Slice};
+use super::slice::{self, EdgeKind, Plane, Slice};
 use super::stroke_font;
 use crate::mesh::Mesh;
 use crate::observables::FieldSnapshot;
@@ -356,8 +356,12 @@ fn draw_tissue(canvas: &mut Canvas, layout: &Layout, slice: &Slice, scale: &Stre
     // Cell edges fade out where cells are only a few pixels wide.
     let cell_pixels = cell_size * layout.pixels_per_metre / layout.unit;
     let alpha = 0.07 * ((cell_pixels - 3.0) / 9.0).clamp(0.0, 1.0) as f32;
-    for (border, width, colour) in [(false, 1.0, WHITE.linear(alpha)), (true, 2.0, INK.linear(1.0))] {
-        for l in slice.lines.iter().filter(|l| l.border == border) {
+    for (kind, width, colour) in [
+        (EdgeKind::Cells, 1.0, WHITE.linear(alpha)),
+        (EdgeKind::Materials, 1.5, WHITE.linear(0.6)),
+        (EdgeKind::Surface, 2.0, INK.linear(1.0)),
+    ] {
+        for l in slice.lines.iter().filter(|l| l.kind == kind) {
             canvas.line(l.points.map(|p| layout.place(p)), width * layout.unit, colour);
         }
     }

@@ -3,7 +3,7 @@
 //! Every hexahedron is split into the six tetrahedra around its diagonal 0-6 (Kuhn subdivision): neighbours of a
 //! structured block then share the diagonals of their common face, and the cut has no cracks.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
@@ -87,13 +87,23 @@ pub struct SliceTriangle {
     pub opened: bool,
 }
 
+/// What an edge in the cut separates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EdgeKind {
+    /// Two cells of one material.
+    Cells,
+    /// Two materials.
+    Materials,
+    /// Tissue and air.
+    Surface,
+}
+
 /// A piece of a cell edge in the cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SliceLine {
     /// Ends in the plane [m].
     pub points: [DVec2; 2],
-    /// True on the surface of the block.
-    pub border: bool,
+    pub kind: EdgeKind,
 }
 
 /// What the plane shows of the tissue.
@@ -112,9 +122,9 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
     let von_mises = smoothed_to_nodes(mesh, &snapshot.von_mises, &snapshot.stiffness);
     let (low, high) = mesh.bounds();
     let farthest = FARTHEST_MOVE * (high - low).max_element();
-    let borders = match mesh {
-        Mesh::Block(_) => HashSet::new(),
-        Mesh::Tets(tets) => border_faces(tets),
+    let kinds = match mesh {
+        Mesh::Block(_) => HashMap::new(),
+        Mesh::Tets(tets) => face_kinds(tets, &snapshot.material),
     };
     let mut slice = Slice::default();
     for cell in 0..mesh.cell_count() {
@@ -162,14 +172,14 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
                 _ => {}
             }
         }
-        let mut edge = |triangle: [usize; 3], border: bool| {
+        let mut edge = |triangle: [usize; 3], kind: EdgeKind| {
             let ends: Vec<DVec2> = (0..3)
                 .map(|e| (triangle[e], triangle[(e + 1) % 3]))
                 .filter(|&(a, b)| (height[a] >= 0.0) != (height[b] >= 0.0))
                 .map(|(a, b)| crossing(a, b).0)
                 .collect();
             if let &[a, b] = ends.as_slice() {
-                slice.lines.push(SliceLine { points: [a, b], border });
+                slice.lines.push(SliceLine { points: [a, b], kind });
             }
         };
         match mesh {
@@ -181,14 +191,21 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
                     if at_max && !last {
                         continue;
                     }
-                    let border = if at_max { last } else { at[axis] == 0 };
-                    triangles.into_iter().for_each(|triangle| edge(triangle, border));
+                    let kind = if at_max || at[axis] == 0 {
+                        EdgeKind::Surface
+                    } else {
+                        let mut below = at;
+                        below[axis] -= 1;
+                        let other = block.cell_index(below[0], below[1], below[2]);
+                        between(&snapshot.material, cell, other)
+                    };
+                    triangles.into_iter().for_each(|triangle| edge(triangle, kind));
                 }
             }
             Mesh::Tets(_) => {
                 for triangle in TETRAHEDRON_FACES {
                     let face = sorted(triangle.map(|c| nodes[c] as u32));
-                    edge(triangle, borders.contains(&face));
+                    edge(triangle, kinds.get(&face).map_or(EdgeKind::Cells, |k| k.0));
                 }
             }
         }
@@ -204,18 +221,24 @@ fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face
 }
 
-/// Faces that belong to one tetrahedron only.
-fn border_faces(mesh: &TetMesh) -> HashSet<[u32; 3]> {
-    let mut border = HashSet::new();
-    for tet in &mesh.tets {
+/// What lies between two cells; `material` per cell, empty where there is one only.
+fn between(material: &[f64], cell: usize, other: usize) -> EdgeKind {
+    if material.get(cell) == material.get(other) { EdgeKind::Cells } else { EdgeKind::Materials }
+}
+
+/// What every face of the mesh separates, and the tetrahedron that showed it first.
+fn face_kinds(mesh: &TetMesh, material: &[f64]) -> HashMap<[u32; 3], (EdgeKind, usize)> {
+    let mut kinds = HashMap::new();
+    for (cell, tet) in mesh.tets.iter().enumerate() {
         for face in TETRAHEDRON_FACES.map(|f| sorted(f.map(|c| tet[c]))) {
-            // The second of two takes out what the first put in.
-            if !border.insert(face) {
-                border.remove(&face);
-            }
+            // A face is on the surface until a second tetrahedron shows it.
+            kinds
+                .entry(face)
+                .and_modify(|kind: &mut (EdgeKind, usize)| kind.0 = between(material, cell, kind.1))
+                .or_insert((EdgeKind::Surface, cell));
         }
     }
-    border
+    kinds
 }
 
 /// Cell values at the nodes, the mean of the cells around weighted with their rest volumes. Opened cells and values
@@ -289,12 +312,12 @@ mod tests {
                 assert!((value - 7.0).abs() < 1e-9);
             }
         }
-        let length = |border: bool| -> f64 {
-            slice.lines.iter().filter(|l| l.border == border).map(|l| l.points[0].distance(l.points[1])).sum()
+        let length = |kind: EdgeKind| -> f64 {
+            slice.lines.iter().filter(|l| l.kind == kind).map(|l| l.points[0].distance(l.points[1])).sum()
         };
-        assert!((length(true) - 2.0 * 0.036).abs() < 1e-9);
+        assert!((length(EdgeKind::Surface) - 2.0 * 0.036).abs() < 1e-9);
         // Four inner grid lines upright, three lying.
-        assert!((length(false) - (4.0 * 0.016 + 3.0 * 0.02)).abs() < 1e-9);
+        assert!((length(EdgeKind::Cells) - (4.0 * 0.016 + 3.0 * 0.02)).abs() < 1e-9);
     }
 
     #[test]
@@ -322,5 +345,29 @@ mod tests {
         let slice = cut(&mesh, &snapshot, &plane(DVec3::Z), 4e-3);
         assert_eq!(slice.cells_left_out, 2);
         assert!(slice.triangles.iter().all(|t| t.points.iter().all(|p| p.is_finite())));
+    }
+
+    #[test]
+    fn borders_of_materials_are_told_from_edges_of_cells() {
+        // The block is 20 mm wide and 16 mm deep in four layers; the upper two are another material.
+        let mesh = mesh();
+        let mut fields = snapshot(&mesh, |_| DVec3::ZERO);
+        fields.material =
+            (0..mesh.cell_count()).map(|c| if mesh.cell_centre(c).z > -0.008 { 1.0 } else { 0.0 }).collect();
+        let plane = Plane { origin: DVec3::ZERO, right: DVec3::X, up: DVec3::Z, normal: DVec3::NEG_Y };
+        let length = |mesh: &Mesh, fields: &FieldSnapshot| -> f64 {
+            let slice = cut(mesh, fields, &plane, 0.004);
+            let borders = slice.lines.iter().filter(|l| l.kind == EdgeKind::Materials);
+            borders.map(|l| l.points[0].distance(l.points[1])).sum()
+        };
+        assert!((length(&mesh, &fields) - 0.02).abs() < 1e-9);
+        // The same block cut into tetrahedra: both neighbours of a face draw it.
+        let tets = Mesh::Tets(std::sync::Arc::new(TetMesh::from_block(mesh.block())));
+        let mut fields = snapshot(&tets, |_| DVec3::ZERO);
+        fields.material =
+            (0..tets.cell_count()).map(|c| if tets.cell_centre(c).z > -0.008 { 1.0 } else { 0.0 }).collect();
+        assert!((length(&tets, &fields) - 0.04).abs() < 1e-9);
+        fields.material.clear();
+        assert_eq!(length(&tets, &fields), 0.0);
     }
 }
