@@ -63,7 +63,9 @@ impl CurveFigures {
             force_at_max_depth: Some(at_end.iter().sum::<f64>() / at_end.len() as f64),
             ..Self::default()
         };
-        if let Some(puncture) = find_drops(&curve, DROP_FRACTION, 1).first() {
+        if let Some(puncture) =
+            find_drops(&curve, &median_of_three(&curve), DROP_FRACTION, NOISE_FACTOR * frame_noise(&curve), 1).first()
+        {
             figures.puncture_force = Some(puncture.force);
             figures.puncture_depth = Some(puncture.depth);
             figures.force_after_puncture = Some(puncture.force_after);
@@ -106,7 +108,7 @@ impl ForceDrop {
 }
 
 /// All falls by at least `fraction` within [`DROP_TRAVEL`], from the depths [m] and axial forces [N] of a run in order of
-/// time.
+/// time. Every frame counts as it is, unlike in the search for the puncture.
 pub fn sudden_drops(curve: &[(f64, f64)], fraction: f64) -> Vec<ForceDrop> {
     let mut deepest = f64::NEG_INFINITY;
     let mut points = Vec::new();
@@ -116,7 +118,7 @@ pub fn sudden_drops(curve: &[(f64, f64)], fraction: f64) -> Vec<ForceDrop> {
             points.push(Point { depth, force });
         }
     }
-    find_drops(&points, fraction, usize::MAX)
+    find_drops(&points, &points, fraction, 0.0, usize::MAX)
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -146,26 +148,29 @@ fn window_after(curve: &[Point], i: usize) -> &[Point] {
     &rest[..within.max(1).min(rest.len())]
 }
 
-/// The first `at_most` peaks after which the force falls by `fraction` within [`DROP_TRAVEL`], before it rises above the
-/// peak again. Sought on the median of three frames, so that one stray frame is no peak.
-fn find_drops(curve: &[Point], fraction: f64, at_most: usize) -> Vec<ForceDrop> {
-    let mut drops = Vec::new();
-    if curve.len() < 3 {
-        return drops;
-    }
-    let noise = frame_noise(curve);
-    let largest = curve.iter().map(|p| p.force).fold(f64::NEG_INFINITY, f64::max);
-    let smooth: Vec<Point> = (0..curve.len())
+/// The median of each frame and its neighbours, so that one stray frame is no peak.
+fn median_of_three(curve: &[Point]) -> Vec<Point> {
+    (0..curve.len())
         .map(|i| {
             let mut force = match i {
-                0 => [curve[0].force; 3],
-                _ if i + 1 == curve.len() => [curve[i].force; 3],
+                _ if i == 0 || i + 1 == curve.len() => [curve[i].force; 3],
                 _ => [curve[i - 1].force, curve[i].force, curve[i + 1].force],
             };
             force.sort_by(f64::total_cmp);
             Point { depth: curve[i].depth, force: force[1] }
         })
-        .collect();
+        .collect()
+}
+
+/// The first `at_most` peaks after which the force falls by `fraction`, and by at least `least` [N], within
+/// [`DROP_TRAVEL`], before it rises above the peak again. Sought on `smooth`, which has the points of `curve`; read off
+/// the curve.
+fn find_drops(curve: &[Point], smooth: &[Point], fraction: f64, least: f64, at_most: usize) -> Vec<ForceDrop> {
+    let mut drops = Vec::new();
+    if curve.len() < 3 {
+        return drops;
+    }
+    let largest = curve.iter().map(|p| p.force).fold(f64::NEG_INFINITY, f64::max);
     // The bottom of the last drop: what lies before it belongs to that drop.
     let mut from = 0;
     while drops.len() < at_most {
@@ -178,8 +183,8 @@ fn find_drops(curve: &[Point], fraction: f64, at_most: usize) -> Vec<ForceDrop> 
             if before.map(|p| p.force).any(|force| force > here.force) {
                 return false;
             }
-            let drop = (fraction * here.force).max(NOISE_FACTOR * noise);
-            window_after(&smooth, i).iter().take_while(|p| p.force <= here.force).any(|p| p.force <= here.force - drop)
+            let drop = (fraction * here.force).max(least);
+            window_after(smooth, i).iter().take_while(|p| p.force <= here.force).any(|p| p.force <= here.force - drop)
         };
         let Some(candidate) = (from..smooth.len()).find(falls_after) else { break };
         // The median flattens a sharp peak: take the largest of the three frames themselves.
@@ -200,6 +205,9 @@ fn find_drops(curve: &[Point], fraction: f64, at_most: usize) -> Vec<ForceDrop> 
 /// Standard deviation of the frame-to-frame noise [N], from the median size of the second differences: a smooth curve
 /// contributes little to them, and the few frames around a puncture do not move a median.
 fn frame_noise(curve: &[Point]) -> f64 {
+    if curve.len() < 3 {
+        return 0.0;
+    }
     let mut second: Vec<f64> = curve.windows(3).map(|w| (w[0].force - 2.0 * w[1].force + w[2].force).abs()).collect();
     second.sort_by(f64::total_cmp);
     // 1.4826: median of |x| to standard deviation; the second difference of white noise has variance 6.

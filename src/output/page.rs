@@ -17,21 +17,25 @@ li { margin: 0.3rem 0; }
 a { color: var(--link); }
 nav { columns: 16rem; font-size: 0.95rem; }
 nav a { display: block; padding: 0.15rem 0; }
-.soft, figcaption, caption { color: var(--soft); font-size: 0.92rem; }
+.soft, figcaption { color: var(--soft); font-size: 0.92rem; }
 .good { color: var(--good); font-weight: 600; }
 .bad { color: var(--bad); font-weight: 600; }
 .notice { border-left: 0.3rem solid var(--bad); background: var(--card); padding: 0.6rem 0.9rem; max-width: 46rem; }
 .scroll { overflow-x: auto; margin: 0.8rem 0; }
 table { border-collapse: collapse; font-size: 0.95rem; font-variant-numeric: tabular-nums; }
-caption { text-align: left; padding-bottom: 0.3rem; }
+p.caption { margin: 0.8rem 0 -0.4rem; }
 th, td { padding: 0.35rem 0.7rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
 th { font-weight: 600; background: var(--card); }
-td.number, th.number { text-align: right; white-space: nowrap; }
+td.number, th.number { text-align: right; }
+td.number { white-space: nowrap; }
+td:not(.number):not(:first-child) { min-width: 7rem; }
+th { vertical-align: bottom; }
 .raw { font-size: 0.82rem; }
 .raw td { overflow-wrap: anywhere; min-width: 7rem; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 26rem), 1fr)); gap: 1rem; }
 figure { margin: 0; padding: 0.7rem; background: var(--card); border: 1px solid var(--line); border-radius: 0.4rem; }
-figure svg { display: block; width: 100%; height: auto; max-width: 46rem; }
+figure > svg { display: block; width: 100%; height: auto; }
+section > figure { max-width: 38rem; }
 figcaption { margin-top: 0.4rem; }
 .legend { display: flex; flex-wrap: wrap; gap: 0.2rem 1rem; margin: 0.2rem 0; font-size: 0.92rem; color: var(--ink); }
 .legend span { white-space: nowrap; }
@@ -41,11 +45,16 @@ figcaption { margin-top: 0.4rem; }
 .pictures img { display: block; width: 100%; height: auto; border-radius: 0.2rem; }
 .pictures .head { font-weight: 600; align-self: end; }
 @media (prefers-color-scheme: dark) { img { filter: brightness(0.88); } }
+@media screen and (max-width: 40rem) {
+  .words thead { display: none; } .words tr { display: block; padding: 0.5rem 0; border-bottom: 1px solid var(--line); }
+  .words td { display: block; border: 0; padding: 0.1rem 0; } .words td:first-child { font-weight: 600; }
+  .words td:not(:first-child)::before { content: attr(data-head) ': '; color: var(--soft); } }
 @media print { :root { color-scheme: light; --ink: #000000; --soft: #333333; --paper: #ffffff; --card: #ffffff;
   --line: #999999; --good: #006b4c; --bad: #a8420a; --link: #000000; }
   body { max-width: none; padding: 0; font-size: 10pt; } nav { display: none; } .scroll { overflow: visible; }
   .pictures { min-width: 0; } .charts { grid-template-columns: 1fr 1fr; } img { filter: none; }
-  figure, tr { break-inside: avoid; } h2, caption { break-after: avoid; } .raw { font-size: 6.5pt; }
+  table { font-size: 8.5pt; } th, td { padding: 0.2rem 0.35rem; }
+  figure, tr { break-inside: avoid; } h2, .caption { break-after: avoid; } .raw { font-size: 6.5pt; }
   .raw th, .raw td { padding: 0.1rem 0.3rem; min-width: 0; } }
 ";
 
@@ -94,19 +103,26 @@ pub fn numbers(head: &str) -> Column {
     Column { head: head.into(), number: true }
 }
 
-/// A table with its caption; cells are markup.
+/// A table with its caption; cells are markup. The class `words` stands the cells of a row below one another where the
+/// screen is narrow, each with the head of its column; `raw` is small print.
 pub fn table(class: &str, caption: &str, columns: &[Column], rows: &[Vec<String>]) -> String {
     let class_of = |column: &Column| if column.number { " class=\"number\"" } else { "" };
-    let mut text = format!("<div class=\"scroll\"><table class=\"{class}\">\n");
+    let head_of = |column: &Column| match class {
+        "words" => format!(" data-head=\"{}\"", escape(&column.head)),
+        _ => String::new(),
+    };
+    let mut text = String::new();
     if !caption.is_empty() {
-        text += &format!("<caption>{}</caption>\n", escape(caption));
+        // Not a caption of the table's own: that would scroll away with a wide table.
+        text += &format!("<p class=\"soft caption\">{}</p>\n", escape(caption));
     }
+    text += &format!("<div class=\"scroll\"><table class=\"{class}\">\n");
     let head: String =
         columns.iter().map(|c| format!("<th scope=\"col\"{}>{}</th>", class_of(c), escape(&c.head))).collect();
     text += &format!("<thead><tr>{head}</tr></thead>\n<tbody>\n");
     for row in rows {
         let cells: String =
-            row.iter().zip(columns).map(|(cell, c)| format!("<td{}>{cell}</td>", class_of(c))).collect();
+            row.iter().zip(columns).map(|(cell, c)| format!("<td{}{}>{cell}</td>", class_of(c), head_of(c))).collect();
         text += &format!("<tr>{cells}</tr>\n");
     }
     text + "</tbody></table></div>\n"

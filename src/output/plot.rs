@@ -9,7 +9,7 @@ use super::chart::{Curve, FINER, HEAD, SIZE, draw_head, fine, house_style, range
 pub(super) type PlotResult = std::result::Result<String, Box<dyn std::error::Error>>;
 
 /// Size of a chart inside a page, where several stand beside one another and a phone shows one [px].
-const PAGE_SIZE: (u32, u32) = (540, 370);
+const PAGE_SIZE: (u32, u32) = (440, 320);
 
 /// A filled area; corners in units of the axes.
 pub(super) struct Area {
@@ -19,7 +19,7 @@ pub(super) struct Area {
     pub corners: Vec<(f64, f64)>,
 }
 
-/// A point with an optional text beside it.
+/// A point; one with a text beside it is drawn larger.
 pub(super) struct Mark {
     pub at: (f64, f64),
     pub colour: RGBColor,
@@ -54,7 +54,7 @@ impl Plot {
             });
             let lines = self.curves.iter().map(|curve| Curve { points: Vec::new(), ..*curve });
             draw_head(&head, title, &swatches.chain(lines).collect::<Vec<_>>())?;
-            self.draw(&body)?;
+            self.draw(&body, 12, 9)?;
             root.present()?;
         }
         let drawn = format!("width=\"{width}\" height=\"{height}\"");
@@ -67,7 +67,7 @@ impl Plot {
         let mut text = String::new();
         {
             let root = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
-            self.draw(&root)?;
+            self.draw(&root, 7, 9)?;
             root.present()?;
         }
         let body = text.find('>').map_or("", |end| &text[end + 1..]);
@@ -78,9 +78,12 @@ impl Plot {
         ))
     }
 
+    /// Draws the axes with about as many ticks as asked for, and what lies between them.
     fn draw<DB: DrawingBackend>(
         &self,
         area: &DrawingArea<DB, plotters::coord::Shift>,
+        x_ticks: usize,
+        y_ticks: usize,
     ) -> std::result::Result<(), Box<dyn std::error::Error>>
     where
         DB::ErrorType: 'static,
@@ -105,8 +108,8 @@ impl Plot {
         house_style(&mut chart.configure_mesh())
             .x_desc(self.x_label)
             .y_desc(self.y_label)
-            .x_labels(9)
-            .y_labels(8)
+            .x_labels(x_ticks)
+            .y_labels(y_ticks)
             .x_label_formatter(&|v| tick(*v, x_max - x_min))
             .y_label_formatter(&|v| tick(*v, y_max - y_min))
             .draw()?;
@@ -124,8 +127,9 @@ impl Plot {
             };
         }
         for mark in &self.marks {
-            chart.draw_series([Circle::new(mark.at, fine(5), mark.colour.filled())])?;
-            chart.draw_series([Circle::new(mark.at, fine(5), BLACK.stroke_width(fine(1)))])?;
+            let radius = if mark.text.is_some() { fine(5) } else { fine(3) };
+            chart.draw_series([Circle::new(mark.at, radius, mark.colour.filled())])?;
+            chart.draw_series([Circle::new(mark.at, radius, BLACK.stroke_width(fine(1)))])?;
             if let Some(text) = &mark.text {
                 // Left of a peak the force is still below it: the text stands free there, unless the peak is near the axis.
                 let near_axis = (mark.at.0 - x_min) < 0.4 * (x_max - x_min);

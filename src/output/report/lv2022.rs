@@ -65,8 +65,7 @@ const MET: f64 = 0.10;
 /// Depths of Fig. 11 [m].
 const SPEED_PICTURES: [f64; 4] = [3e-3, 6e-3, 9e-3, 12e-3];
 /// Stages of Fig. 9 and the depths at which they are drawn here [m].
-const STAGES: [(f64, &str); 3] =
-    [(0.5e-3, "first contact"), (3e-3, "tip inside the tissue"), (5e-3, "5 mm inside the tissue")];
+const STAGES: [(f64, &str); 3] = [(0.5e-3, "first contact"), (3e-3, "tip inside the tissue"), (5e-3, "needle inside")];
 /// Smallest fall of the force that is listed beside the drops.
 const RIPPLE: f64 = 0.01;
 /// Difference between the spacing of falls and the edge of the cells below which they are the ripple of the mesh.
@@ -176,8 +175,16 @@ impl Report {
         };
         let wall: f64 = self.cases.iter().map(|(_, c)| c.summary.wall_s).sum();
         let list: Vec<String> = speeds.iter().map(|c| trimmed(c.speed())).collect();
+        let hollow = if self.of(Role::Hollow).next().is_some() { "; a hollow needle" } else { "" };
         let rows = [
-            ("runs", format!("{} insertions at {} mm/s; the same constants in all of them", speeds.len(), and(&list))),
+            (
+                "runs",
+                format!(
+                    "{} insertions at {} mm/s, the same constants in all of them{hollow}",
+                    speeds.len(),
+                    and(&list)
+                ),
+            ),
             ("engine", same(&|c| c.summary.engine.clone())),
             (
                 "adapter",
@@ -185,7 +192,12 @@ impl Report {
             ),
             ("driver", same(&|c| if c.summary.driver.is_empty() { "none".into() } else { c.summary.driver.clone() })),
             ("Stylet", same(&|c| c.summary.version.clone())),
-            ("cells", same(&|c| format!("{} of {} mm", c.summary.cells, trimmed(c.scene.tissue.cell_size * 1e3)))),
+            (
+                "cells",
+                same(&|c| {
+                    format!("{}, edge at the path {} mm", c.summary.cells, trimmed(c.scene.tissue.cell_size * 1e3))
+                }),
+            ),
             ("runs finished", same(&|c| c.finished.clone())),
             ("page written", escape(&self.written)),
             ("time of all steps", format!("{wall:.1} s")),
@@ -206,7 +218,7 @@ impl Report {
         let (mut met, mut compared) = (0, 0);
         for case in self.speeds() {
             let paper = PAPER_FORCES.iter().find(|p| (p.speed - case.speed()).abs() < 1e-6 * p.speed);
-            let speed = format!("{} mm/s", trimmed(case.speed()));
+            let speed = speed_of(case);
             let (Some(paper), Some(force)) = (paper, case.summary.peak_force_n) else {
                 rows.push(vec![speed, "-".into(), "-".into(), "-".into(), "-".into(), "-".into(), "no result".into()]);
                 continue;
@@ -291,7 +303,7 @@ impl Report {
         for ((case, colour), (width, dash)) in speeds.iter().zip(SPEED_COLOURS).zip(styles) {
             let points = case.curve("axial_force_n").into_iter().map(|(d, f)| (d * 1e3, f)).collect();
             plot.curves.push(Curve { label: "", colour, width: width * FINER, dash, points });
-            legend.push(sample(colour, f64::from(width), dash, &format!("{} mm/s", trimmed(case.speed()))));
+            legend.push(sample(colour, f64::from(width), dash, &speed_of(case)));
         }
         let mut caption = legend_row(&legend);
         if let Some(case) = speeds.first() {
@@ -302,7 +314,7 @@ impl Report {
         if let Some(difference) = largest_difference(&speeds) {
             caption += &format!(
                 "Between the speeds the force differs by at most {difference:.3} N at the same depth{}.",
-                if difference < 0.05 { ": the lines lie on one another" } else { "" }
+                if difference < 0.05 { ": the lines lie almost on one another" } else { "" }
             );
         }
         let chart = inline(&plot, "Axial force against depth at the three speeds")?;
@@ -353,7 +365,7 @@ impl Report {
             plot.marks.push(Mark {
                 at: (drop.depth * 1e3, drop.force),
                 colour: OUTWARD,
-                text: Some(format!("{}: {:.2} N at {:.2} mm", number + 1, drop.force, drop.depth * 1e3)),
+                text: Some(format!("{}: {:.2} N", number + 1, drop.force)),
             });
         }
         for fall in ripple(&curve) {
@@ -382,7 +394,7 @@ impl Report {
                 .map(|d| format!("{:.3} to {:.3} N at {:.2} mm", d.force, d.force_after, d.depth * 1e3))
                 .collect();
             rows.push(vec![
-                format!("{} mm/s", trimmed(case.speed())),
+                speed_of(case),
                 drops.len().to_string(),
                 if list.is_empty() { "-".into() } else { list.join("; ") },
                 small.len().to_string(),
@@ -398,13 +410,16 @@ impl Report {
                 numbers(&format!("drops of {:.0} % or more", 100.0 * DROP_FRACTION)),
                 words("where"),
                 numbers(&falls),
-                numbers("their mean spacing, mm"),
+                numbers("their spacing (median), mm"),
                 numbers("cells, mm"),
             ],
             &rows,
         );
-        text += "<p>The first drop is the paper's point X: the tip breaks through the surface, and the force falls. The \
-                 paper sees several drops more and ascribes them to tissue that sticks to the tip and comes off (a \
+        if !drops.is_empty() {
+            text += "<p>The first drop is the paper's point X: the tip breaks through the surface, and the force \
+                     falls.</p>\n";
+        }
+        text += "<p>The paper sees several drops more and ascribes them to tissue that sticks to the tip and comes off (a \
                  \"built-up edge\"); it expects two drops in a homogeneous body, one where the tip enters and one where it \
                  leaves. The body here is homogeneous, and the needle does not leave it.</p>\n";
         if mesh_ripple {
@@ -644,7 +659,7 @@ impl Report {
         let friction = effects.friction.map_or("no friction".into(), |f| {
             format!("friction {} on the shaft, none on the tip", trimmed(f.coefficient))
         });
-        table("", "", &[words("what"), words("the paper"), words("here")], &rows)
+        table("words", "", &[words("what"), words("the paper"), words("here")], &rows)
             + &format!(
                 "<p>As in the paper: the three speeds, the depths, insertion straight down, {}.</p>\n",
                 escape(&friction)
@@ -736,6 +751,11 @@ fn picture_or_gap(case: &CaseResults, depth: f64, caption: &str) -> String {
     }
 }
 
+/// `2 mm/s`, never broken between number and unit.
+fn speed_of(case: &CaseResults) -> String {
+    format!("{}\u{a0}mm/s", trimmed(case.speed()))
+}
+
 /// What holds the block, in words.
 fn held(scene: &Scene) -> String {
     let held: Vec<&str> = scene
@@ -757,10 +777,11 @@ fn ripple(curve: &[(f64, f64)]) -> Vec<ForceDrop> {
     sudden_drops(curve, RIPPLE).into_iter().filter(|fall| fall.fraction() < DROP_FRACTION).collect()
 }
 
-/// Mean distance of neighbouring falls [m].
+/// Median distance of neighbouring falls [m]; a mean would hang on a single one that stays below the threshold.
 fn spacing(falls: &[ForceDrop]) -> Option<f64> {
-    let (first, last) = (falls.first()?, falls.last()?);
-    (falls.len() > 1).then(|| (last.depth - first.depth) / (falls.len() - 1) as f64)
+    let mut distances: Vec<f64> = falls.windows(2).map(|pair| pair[1].depth - pair[0].depth).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.get(distances.len() / 2).copied()
 }
 
 /// Axial force of the frame nearest to a depth [m] on the way in, if the run came that far.
@@ -802,7 +823,8 @@ fn bounds(values: &[f64]) -> (f64, f64) {
 }
 
 fn percent_off(fraction: f64) -> String {
-    format!("{:+.1} %", 100.0 * fraction)
+    let text = format!("{:+.1}", 100.0 * fraction);
+    format!("{} %", if matches!(text.as_str(), "-0.0" | "+0.0") { "0.0" } else { &text })
 }
 
 /// Up to six digits, without those that a conversion of units adds.
