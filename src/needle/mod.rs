@@ -1,5 +1,7 @@
 //! Motion of the rigid tool on the CPU, and the geometry of a planned path.
 
+pub mod gap;
+
 use glam::DVec3;
 
 use crate::scene::{Motion, Phase};
