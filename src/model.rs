@@ -1,13 +1,16 @@
 //! What is constant during a run: mesh, masses, loads, and what the chosen effects prepare once.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
-use crate::effects::{EffectSet, puncture};
+use crate::effects::{EffectSet, cohesive, puncture};
 use crate::material_point::Material;
 use crate::mesh::{BlockMesh, Mesh};
 use crate::needle::gap::Profile;
 use crate::needle::{Kinematics, PlannedPath, lateral_axes};
 use crate::scene::{Cutting, Face, FaceCondition, NeedleShape, RegionShape, Scene, TissueMaterial, Tool};
+use crate::separation::{Cut, FacePair, Separation};
 
 /// A node that the tool may touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,8 +20,24 @@ pub struct ContactNode {
     pub rest_radius: f64,
     /// Rest coordinate s0 along the path, measured from the surface [m].
     pub rest_axial: f64,
-    /// True for the ring a0 < r0 < ring radius that the shaft pushes; the other nodes only carry tip springs.
+    /// True for nodes that the needle pushes: the ring a0 < r0 < ring radius, or the copies of a surface that separates; the
+    /// others only carry tip springs.
     pub pushed: bool,
+    pub surface: ContactSurface,
+}
+
+/// Against what part of the needle a node is held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ContactSurface {
+    /// The volume-preserving wall of the opened path.
+    OpenedPath,
+    /// The face of a slit, pushed to its own side (unit vector across the slit).
+    Slit {
+        side: DVec3,
+    },
+    /// The outer wall of a hollow needle, and its bore.
+    OuterWall,
+    Bore,
 }
 
 /// A cell that the opened path passes through.
@@ -102,6 +121,10 @@ pub struct Model {
     /// Time over which the loads grow [s].
     pub load_ramp: f64,
     pub puncture: Option<PuncturePlan>,
+    /// Faces that may separate, and copies that are tied.
+    pub separation: Separation,
+    /// Their law; `None` without the effect.
+    pub cohesion: Option<cohesive::Law>,
     /// Nodes that a tool may touch, ascending in the node index; empty without contact.
     pub contact_nodes: Vec<ContactNode>,
 }
@@ -109,8 +132,14 @@ pub struct Model {
 /// Reference length of the contact stiffness [m].
 const CONTACT_LENGTH: f64 = 0.6e-3;
 
-/// Number of tip springs: one on the axis, 6 at R/2, 12 at R.
-pub const ANCHOR_COUNT: usize = 19;
+/// Most tip springs: those of a cutting ring.
+pub const LARGEST_ANCHOR_COUNT: usize = 24;
+
+/// Distance of the tip springs of a cutting ring from its edge, on either side [m].
+const CUTTING_RING: f64 = 0.2e-3;
+
+/// How far beyond the needle's sides a slit may tear [m].
+const SLIT_MARGIN: f64 = 1.0e-3;
 
 impl Model {
     /// Prepares a scene. The mesh is built from the scene by `BlockMesh::for_scene`.
@@ -135,10 +164,13 @@ impl Model {
             load_ramp,
             kinematics,
             puncture: None,
+            separation: Separation::default(),
+            cohesion: None,
             contact_nodes: Vec::new(),
             scene,
             mesh,
         };
+        model.plan_separation();
         model.plan_puncture();
         model.plan_indentation();
         model
@@ -198,6 +230,28 @@ impl Model {
         factor * self.scene.material.law.p_wave_modulus() * CONTACT_LENGTH * CONTACT_LENGTH / h
     }
 
+    /// The planned path, if the tool is a needle that cuts.
+    fn planned_path(&self) -> Option<PlannedPath> {
+        let motion = &self.scene.motion;
+        let cuts = self.effects.puncture.is_some() && self.scene.needle().is_some();
+        cuts.then_some(PlannedPath { entry: motion.entry, direction: motion.direction })
+    }
+
+    fn plan_separation(&mut self) {
+        let (Some(params), Some(mesh)) = (&self.effects.cohesive, self.mesh.as_block()) else { return };
+        let h = self.scene.tissue.cell_size;
+        let cut = self.planned_path().zip(self.scene.needle()).map(|(path, needle)| Cut {
+            path,
+            reach: needle.radius + SLIT_MARGIN,
+            driven: 1.05 * needle.radius,
+            deepest: self.scene.motion.deepest() + 2.0 * h,
+            ring: needle.bore.is_some(),
+        });
+        let planes: Vec<(usize, f64)> = params.planes.iter().map(|p| (p.axis, p.at)).collect();
+        self.separation = Separation::new(mesh, &planes, cut.as_ref());
+        self.cohesion = Some(cohesive::Law::new(params, self.scene.material.law.youngs_modulus(), h));
+    }
+
     fn plan_puncture(&mut self) {
         let (Some(params), Some(Tool::Needle(needle))) = (self.effects.puncture, &self.scene.tool) else {
             return;
@@ -206,25 +260,34 @@ impl Model {
         let path = PlannedPath { entry: self.scene.motion.entry, direction: self.scene.motion.direction };
         let deepest = self.scene.motion.deepest();
         let Some(mesh) = self.mesh.as_block() else { return };
-        let cells = path_cells(mesh, &path, params.softened_radius, deepest);
+        // Faces that separate need no softened path.
+        let cells = match self.cohesion {
+            Some(_) => Vec::new(),
+            None => path_cells(mesh, &path, params.softened_radius, deepest),
+        };
+        let surfaces = self.separated_surfaces(&path);
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the needle radius.
         let anchor_reach = needle.radius + self.scene.tissue.cell_size * 1.5;
+        let cohesive = self.cohesion.is_some();
         self.contact_nodes = (0..mesh.node_count())
             .filter_map(|node| {
                 let (r0, s0) = path.material_coordinates(mesh.rest_position(node));
-                let pushed = r0 > params.softened_radius && r0 < params.ring_radius && s0 < deepest;
+                let surface = surfaces.get(&(node as u32)).copied().unwrap_or(ContactSurface::OpenedPath);
+                let in_ring = r0 > params.softened_radius && r0 < params.ring_radius;
+                let pushed = s0 < deepest && if cohesive { surface != ContactSurface::OpenedPath } else { in_ring };
                 let carries = r0 < anchor_reach && s0 < deepest + 2.0 * self.scene.tissue.cell_size;
                 (pushed || carries).then_some(ContactNode {
                     node: node as u32,
                     rest_radius: r0,
                     rest_axial: s0,
                     pushed,
+                    surface,
                 })
             })
             .collect();
         self.puncture = Some(PuncturePlan {
             segments: path_segments(&self.scene, &params, &path, deepest),
-            anchors: tip_anchors(&path, needle.radius),
+            anchors: tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
             cells,
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
             params,
@@ -232,6 +295,33 @@ impl Model {
             needle,
             path,
         });
+    }
+
+    /// What part of the needle the copies of the path's surface face.
+    fn separated_surfaces(&self, path: &PlannedPath) -> HashMap<u32, ContactSurface> {
+        let driven = self.separation.pairs.iter().filter(|p| p.tip_driven.is_some() || self.on_slit(p));
+        let hollow = self.scene.has_bore();
+        let axis_of = |pair: &FacePair| if pair.axis == 0 { DVec3::X } else { DVec3::Y };
+        driven
+            .flat_map(|pair| {
+                let rest = self.mesh.rest_position(pair.nodes[0] as usize) - path.entry;
+                // Of a ring pair the copy on the side of the axis belongs to the core.
+                let core = usize::from(rest.dot(axis_of(pair)) < 0.0);
+                [0, 1].map(|n| {
+                    let surface = match (hollow, n == core) {
+                        (true, true) => ContactSurface::Bore,
+                        (true, false) => ContactSurface::OuterWall,
+                        (false, _) => ContactSurface::Slit { side: axis_of(pair) * if n == 0 { -1.0 } else { 1.0 } },
+                    };
+                    (pair.nodes[n], surface)
+                })
+            })
+            .collect()
+    }
+
+    /// True for the pairs of the slit, driven or not.
+    fn on_slit(&self, pair: &FacePair) -> bool {
+        self.scene.slit_axis() == Some(pair.axis)
     }
 
     fn plan_indentation(&mut self) {
@@ -252,6 +342,7 @@ impl Model {
                     rest_radius: r0,
                     rest_axial: 0.0,
                     pushed: true,
+                    surface: ContactSurface::OpenedPath,
                 })
             })
             .collect();
@@ -390,17 +481,27 @@ fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, d
     segments.into_iter().map(|s| s.1).take(LARGEST_SEGMENT_COUNT).collect()
 }
 
-/// Lines on which the tip springs are anchored.
-fn tip_anchors(path: &PlannedPath, radius: f64) -> Vec<TipAnchor> {
+/// Lines on which the tip springs are anchored: one on the axis, 6 at R/2, 12 at R. Before a slit none lies on its plane,
+/// where it would pull at one side; a cutting ring has 12 on either side of its edge.
+fn tip_anchors(path: &PlannedPath, needle: &NeedleShape, cohesive: bool) -> Vec<TipAnchor> {
     let (e1, e2) = lateral_axes(path.direction);
+    let turn = if cohesive { std::f64::consts::TAU / 24.0 } else { 0.0 };
     let ring = |count: usize, r: f64| {
         (0..count).map(move |i| {
-            let angle = std::f64::consts::TAU * i as f64 / count as f64;
+            let angle = std::f64::consts::TAU * i as f64 / count as f64 + turn;
             (e1 * angle.cos() + e2 * angle.sin()) * r
         })
     };
-    let offsets = std::iter::once(DVec3::ZERO).chain(ring(6, 0.5 * radius)).chain(ring(12, radius));
+    let radius = needle.radius;
+    let offsets: Vec<DVec3> = match needle.bore.filter(|_| cohesive) {
+        Some(bore) => ring(12, bore.edge - CUTTING_RING).chain(ring(12, bore.edge + CUTTING_RING)).collect(),
+        None => {
+            let centre = (!cohesive).then_some(DVec3::ZERO);
+            centre.into_iter().chain(ring(6, 0.5 * radius)).chain(ring(12, radius)).collect()
+        }
+    };
     offsets
+        .into_iter()
         .map(|o| {
             // The line entry + o + t s meets z = 0 at s = -o.z / t.z.
             let axial_offset = -o.z / path.direction.z;

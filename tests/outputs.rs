@@ -109,9 +109,11 @@ fn graded(low: f64, high: f64, cell: f64, fine: f64) -> Vec<f64> {
 }
 
 fn mesh(cell: f64) -> Mesh {
-    Mesh::Block(BlockMesh {
-        lines: [graded(-10e-3, 10e-3, cell, 3e-3), graded(-10e-3, 10e-3, cell, 3e-3), graded(-16e-3, 0.0, cell, 9e-3)],
-    })
+    Mesh::Block(BlockMesh::new([
+        graded(-10e-3, 10e-3, cell, 3e-3),
+        graded(-10e-3, 10e-3, cell, 3e-3),
+        graded(-16e-3, 0.0, cell, 9e-3),
+    ]))
 }
 
 fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {

@@ -1,9 +1,15 @@
+#import shared/params
+#import shared/step_input
+
 // A node that the tool may touch: what is known before the run.
 struct ContactNode {
     // Rest position X [m], w unused.
     rest: vec4<f32>,
     // Grid coordinates of the node, w unused.
     grid: vec4<u32>,
+    // Of a surface that separates: side to which a slit face is pushed (unit vector); w: 1 at the outer wall of a hollow
+    // needle, -1 at its bore.
+    surface: vec4<f32>,
     node: u32,
     // Slot of `corner_force` that takes the force on this node.
     slot: u32,
@@ -26,7 +32,8 @@ struct ContactMemory {
     overlap: f32,
     axial_on: f32,
     touching: f32,
-    _pad: f32,
+    // 1 while pressed by the full shaft.
+    on_shaft: f32,
 }
 
 // Sums over the steps of a frame; forces on the tissue.

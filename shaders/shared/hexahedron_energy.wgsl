@@ -50,7 +50,8 @@ fn cell_energy(cell: vec3<u32>, number: u32, kept: f32, u: ptr<function, array<v
     let point = point_energy(PointPlace(index, number, size, kept, 0.0, 0.0), H);
     e.elastic = volume * point.stored;
     e.held = volume * point.held;
-    e.hourglass = 0.5 * materials[number].hourglass * size * q2 * (1.0 + 0.5 * params.quartic * q2 / (size * size));
+    e.hourglass = 0.5 * materials[number].hourglass * size * q2
+        * (1.0 + 0.5 * params.quartic * q2 / max(size * size, SMALLEST_SQUARE));
     e.hourglass *= point.intact;
     e.intact = point.intact;
     e.jacobian = 1.0 + point.dj;

@@ -84,7 +84,7 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let q_zx = vec3<f32>(upper_x - lower_x) * eighth;
         let q_xy = vec3<f32>(upper_xy + lower_xy) * eighth;
         let q_xyz = vec3<f32>(upper_xy - lower_xy) * eighth;
-        let q2 = (dot(q_yz, q_yz) + dot(q_zx, q_zx) + dot(q_xy, q_xy) + dot(q_xyz, q_xyz)) / (size * size);
+        let q2 = (dot(q_yz, q_yz) + dot(q_zx, q_zx) + dot(q_xy, q_xy) + dot(q_xyz, q_xyz)) / max(size * size, SMALLEST_SQUARE);
         let cell = (k * params.cells_y + j) * params.cells_x + i;
         let number = material_of(cell);
         let modulus = materials[number].hourglass;

@@ -30,6 +30,19 @@ fn tip_share(grid: vec3<u32>, rest_axial: f32) -> f32 {
     return force;
 }
 
+// How deep the node lies in the needle; `less`: what fades out after the entry.
+fn overlap_of(contact: ContactNode, lever: vec3<f32>, d: vec3<f32>, s: f32, less: vec2<f32>) -> Overlap {
+#ifdef BORE
+    return tube_wall(lever, d, s, contact.surface.w, less);
+#else
+#ifdef COHESIVE
+    return slit_face(lever, d, s, contact.surface.xyz, less);
+#else
+    return opened_path(lever, d, s, contact.rest_radius, less);
+#endif
+#endif
+}
+
 @compute @workgroup_size(64)
 fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let index = thread_index(id, groups);
@@ -51,14 +64,14 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         var memory = contact_memory[index];
         if (memory.touching == 0.0) {
             memory.touching = 1.0;
-            memory.overlap = max(0.0, opened_path(lever, d, s, contact.rest_radius, vec2<f32>(0.0)).value);
+            memory.overlap = max(0.0, overlap_of(contact, lever, d, s, vec2<f32>(0.0)).value);
             memory.axial_on = s;
         }
         // An overlap found at activation fades over `entry_fade` of travel, so that the needle does that work.
         let travel = (s - memory.axial_on) / puncture.entry_fade;
         let fading = select(0.0, -memory.overlap / puncture.entry_fade, travel > 0.0 && travel < 1.0);
         let less = vec2<f32>(memory.overlap * clamp(1.0 - travel, 0.0, 1.0), fading);
-        let overlap = opened_path(lever, d, s, contact.rest_radius, less);
+        let overlap = overlap_of(contact, lever, d, s, less);
         let depth = overlap.value;
         let steep = length(overlap.gradient);
         let n = overlap.gradient * (-1.0 / steep);
@@ -72,10 +85,17 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
         contact_sums[index].damping_dissipation +=
             select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
+#ifdef COHESIVE
+        memory.on_shaft = select(0.0, 1.0, depth > 0.0 && s >= puncture.tip_length);
+#endif
 #ifdef FRICTION
         let kt = friction.stiffness_ratio * k;
         let grown = clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);
-        let allowed = friction.coefficient * grown * pressure / kt;
+        var coefficient = friction.coefficient;
+#ifdef BORE
+        coefficient = select(puncture.bore_friction, coefficient, contact.surface.w > 0.0);
+#endif
+        let allowed = coefficient * grown * pressure / kt;
         let trial = stick_trial(memory.stick.xyz, (v - n * vn) * params.dt, n);
         let stretch = stick_return(trial, allowed);
         memory.stick = vec4<f32>(stretch, 0.0);

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 
 /// Every shader file by its path under `shaders/`, without extension.
 pub const SOURCES: &[(&str, &str)] = &[
+    ("effects/cohesive", include_str!("../../shaders/effects/cohesive.wgsl")),
     ("effects/damage", include_str!("../../shaders/effects/damage.wgsl")),
     ("effects/fibres", include_str!("../../shaders/effects/fibres.wgsl")),
     ("effects/friction", include_str!("../../shaders/effects/friction.wgsl")),
@@ -51,9 +52,11 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/step_input", include_str!("../../shaders/shared/step_input.wgsl")),
     ("shared/symmetric_eigen", include_str!("../../shaders/shared/symmetric_eigen.wgsl")),
     ("shared/tetrahedron", include_str!("../../shaders/shared/tetrahedron.wgsl")),
+    ("shared/tied_nodes", include_str!("../../shaders/shared/tied_nodes.wgsl")),
     ("shared/thread_index", include_str!("../../shaders/shared/thread_index.wgsl")),
     ("stages/advance_tip", include_str!("../../shaders/stages/advance_tip.wgsl")),
     ("stages/average_pressure", include_str!("../../shaders/stages/average_pressure.wgsl")),
+    ("stages/cohesive_forces", include_str!("../../shaders/stages/cohesive_forces.wgsl")),
     ("stages/element_forces", include_str!("../../shaders/stages/element_forces.wgsl")),
     ("stages/indenter_contact", include_str!("../../shaders/stages/indenter_contact.wgsl")),
     ("stages/integrate_nodes", include_str!("../../shaders/stages/integrate_nodes.wgsl")),
@@ -62,13 +65,15 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("stages/measure_dilatation", include_str!("../../shaders/stages/measure_dilatation.wgsl")),
     ("stages/measure_faces", include_str!("../../shaders/stages/measure_faces.wgsl")),
     ("stages/measure_nodes", include_str!("../../shaders/stages/measure_nodes.wgsl")),
+    ("stages/measure_separation", include_str!("../../shaders/stages/measure_separation.wgsl")),
     ("stages/needle_contact", include_str!("../../shaders/stages/needle_contact.wgsl")),
     ("stages/soften_path", include_str!("../../shaders/stages/soften_path.wgsl")),
     ("stages/tetrahedron_forces", include_str!("../../shaders/stages/tetrahedron_forces.wgsl")),
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 15] = [
+pub const SCENE_DEFINES: [&str; 16] = [
+    "BORE",
     "STEP_INPUT",
     "LOADED_FACES",
     "DRIVEN_FACES",

@@ -16,8 +16,9 @@ use crate::effects::EffectSet;
 use crate::error::{Error, Result};
 use crate::material::Isochoric;
 use crate::material_point::{Material as Constants, PointState};
-use crate::model::{ANCHOR_COUNT, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model};
+use crate::model::{ContactSurface, LARGEST_ANCHOR_COUNT, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model};
 use crate::scene::Tool;
+use crate::solver::cpu::TORN_REACH;
 use crate::solver::elements::HOURGLASS_MODULUS;
 use crate::solver::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State};
 use crate::solver::step::Stage;
@@ -34,6 +35,9 @@ const MAPPING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(10)
 /// Partial sums per face of `measure_faces`.
 const FACE_PARTS: usize = 64;
 
+/// Partial sums of `measure_separation`.
+const SEPARATION_PARTS: usize = 64;
+
 /// Partial sums of `measure_contact`.
 const CONTACT_PARTS: usize = 64;
 
@@ -46,6 +50,8 @@ pub struct Features {
     pub regions: bool,
     /// Tetrahedra instead of the block.
     pub tetrahedra: bool,
+    /// The tissue separates around a hollow needle.
+    pub bore: bool,
     /// Keys of the elastic laws that occur.
     pub laws: BTreeSet<&'static str>,
 }
@@ -57,6 +63,7 @@ impl Features {
             driven_faces: model.has_driven_faces(),
             regions: !model.cell_material.is_empty(),
             tetrahedra: model.mesh.as_tets().is_some(),
+            bore: model.scene.has_bore(),
             laws: model.materials.iter().map(|m| m.law.isochoric.key()).collect(),
         }
     }
@@ -72,7 +79,7 @@ pub const LAWS: [(&str, &str); 5] = [
 ];
 
 /// Effects of tools, which work on the block only.
-const BLOCK_EFFECTS: [&str; 3] = ["puncture", "indentation", "friction"];
+const BLOCK_EFFECTS: [&str; 4] = ["cohesive", "puncture", "indentation", "friction"];
 
 /// Names that are defined for the shaders.
 pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
@@ -90,6 +97,7 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     define("NODE_WORK", loaded || driven);
     define("REGIONS", features.regions);
     define("TETRAHEDRA", features.tetrahedra);
+    define("BORE", features.bore && !features.tetrahedra && effects.cohesive.is_some() && effects.puncture.is_some());
     // The bulk stiffness of a cell is not that of all others.
     define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || effects.damage.is_some()));
     define("HISTORY", effects.plasticity.is_some() || effects.viscoelastic.is_some() || effects.damage.is_some());
@@ -106,8 +114,12 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     let (block, tetrahedra) = (!features.tetrahedra, features.tetrahedra);
     let puncture = block && effects.puncture.is_some();
     let indentation = block && effects.indentation.is_some();
+    let cohesive = block && effects.cohesive.is_some();
     let wanted = |stage: &Stage| match stage {
-        Stage::AdvanceTip | Stage::SoftenPath | Stage::NeedleContact => puncture,
+        Stage::AdvanceTip | Stage::NeedleContact => puncture,
+        // Where faces separate no cell is softened.
+        Stage::SoftenPath => puncture && !cohesive,
+        Stage::CohesiveForces | Stage::MeasureSeparation => cohesive,
         Stage::IndenterContact => indentation,
         Stage::MeasureContact => puncture || indentation,
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
@@ -196,14 +208,15 @@ impl GpuEngine {
             })
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
-        let results: Vec<ResultRange> = ["cell_sums", "node_sums", "contact_totals", "face_sums", "tip_result"]
-            .into_iter()
-            .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
-            .map(|(name, size)| {
-                offset += size;
-                ResultRange { name, offset: offset - size, size }
-            })
-            .collect();
+        let results: Vec<ResultRange> =
+            ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "tip_result"]
+                .into_iter()
+                .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
+                .map(|(name, size)| {
+                    offset += size;
+                    ResultRange { name, offset: offset - size, size }
+                })
+                .collect();
         let staging: Vec<wgpu::Buffer> = (0..RING)
             .map(|_| {
                 gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -362,6 +375,13 @@ impl GpuEngine {
                         sums.reactions[index / FACE_PARTS] += force;
                     }
                 }
+                "separation_sums" => {
+                    for s in read_all::<SeparationSums>(bytes) {
+                        sums.cohesive_dissipation += f64::from(s.dissipation);
+                        sums.cohesive_energy += f64::from(s.stored);
+                        sums.torn_area += f64::from(s.torn_area);
+                    }
+                }
                 "contact_totals" => {
                     for s in read_all::<ContactSums>(bytes) {
                         let vector = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
@@ -478,13 +498,20 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
         Stage::NeedleContact | Stage::IndenterContact => model.contact_nodes.len() as u32,
         Stage::IntegrateNodes => model.mesh.node_count() as u32,
         Stage::MeasureCells | Stage::MeasureNodes => measure_threads,
+        Stage::CohesiveForces => model.separation.pairs.len() as u32,
+        Stage::MeasureSeparation => SEPARATION_PARTS as u32,
         Stage::MeasureContact => CONTACT_PARTS as u32,
         Stage::MeasureFaces => 6 * FACE_PARTS as u32,
     }
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 45] = [
+const BUFFERS: [&str; 50] = [
+    "cohesive",
+    "face_pairs",
+    "pair_states",
+    "separation_sums",
+    "tied_nodes",
     "params",
     STEP_INPUT,
     "gravity",
@@ -569,6 +596,11 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
             }])
         }
         "indentation" => bytes_of(&[indentation_params(model)]),
+        "cohesive" => bytes_of(&[cohesive_params(model)]),
+        "face_pairs" => bytes_of(&face_pairs(model, layout)),
+        "pair_states" => zeros(model.separation.pairs.len().max(1) as u64, size_of::<PairState>()),
+        "separation_sums" => zeros(SEPARATION_PARTS as u64, size_of::<SeparationSums>()),
+        "tied_nodes" => bytes_of(&tied_nodes(model)),
         "cell_edges" => {
             let edges: Vec<CellEdge> = model
                 .mesh
@@ -579,7 +611,8 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
                 .map(|d| CellEdge {
                     length: d as f32,
                     cube_root: d.cbrt() as f32,
-                    quarter_inverse: (0.25 / d) as f32,
+                    // A gap between two copies of a line carries nothing.
+                    quarter_inverse: if d > 0.0 { (0.25 / d) as f32 } else { 0.0 },
                     _pad: 0.0,
                 })
                 .collect();
@@ -625,7 +658,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "node_sums" => zeros(measure_threads.into(), size_of::<NodeSums>()),
         "cell_stiffness" => bytes_of(&vec![1.0f32; model.mesh.cell_count()]),
         "tip_state" | "tip_result" => zeros(1, size_of::<TipState>()),
-        "tip_anchor_loads" => zeros(ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
+        "tip_anchor_loads" => zeros(LARGEST_ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
         "contact_memory" => zeros(contacts, size_of::<ContactMemory>()),
         "contact_sums" => zeros(contacts, size_of::<ContactSums>()),
         "face_sums" => zeros(6 * FACE_PARTS as u64, 16),
@@ -870,6 +903,9 @@ fn puncture_params(model: &Model) -> PunctureParams {
             anchor_reach: anchor_reach as f32,
             path_cell_count: plan.cells.len() as u32,
             shift: vec4(plan.profile.shift),
+            edge_radius: plan.profile.bore.map_or(0.0, |b| b.edge as f32),
+            bore_radius: plan.profile.bore.map_or(0.0, |b| b.radius as f32),
+            bore_friction: plan.needle.bore.map_or(0.0, |b| b.friction as f32),
             segments,
             ..Zeroable::zeroed()
         }
@@ -893,6 +929,71 @@ fn indentation_params(model: &Model) -> IndentationParams {
     }
 }
 
+fn cohesive_params(model: &Model) -> CohesiveParams {
+    let Some(law) = model.cohesion else { return CohesiveParams::zeroed() };
+    let h = model.scene.tissue.cell_size;
+    CohesiveParams {
+        onset: (law.strength / law.penalty) as f32,
+        shear_onset: (law.shear_strength / law.penalty) as f32,
+        energy: (2.0 * law.energy / law.penalty) as f32,
+        shear_energy: (2.0 * law.shear_energy / law.penalty) as f32,
+        exponent: law.exponent as f32,
+        penalty: law.penalty as f32,
+        inverse_ramp: (1.0 / h) as f32,
+        torn_reach: (TORN_REACH * h) as f32,
+        pair_count: model.separation.pairs.len() as u32,
+        ..Zeroable::zeroed()
+    }
+}
+
+fn face_pairs(model: &Model, layout: &Layout) -> Vec<FacePair> {
+    // Farther than any path [m].
+    const NEVER: f64 = 1e6;
+    let Some(block) = model.mesh.as_block() else { return Vec::new() };
+    let contact_of = |node: u32| model.contact_nodes.binary_search_by_key(&node, |c| c.node).ok();
+    let untouched = model.contact_nodes.iter().position(|c| !c.pushed).unwrap_or(0);
+    let mut pairs: Vec<FacePair> = model
+        .separation
+        .pairs
+        .iter()
+        .map(|pair| {
+            let [a, b] = pair.nodes;
+            let slot = |n: u32| {
+                let at = block.node_coordinates(n as usize);
+                layout.strips().pair_slot(at, block.cells(), pair.axis)
+            };
+            let way = |[from, to]: [u32; 2], w: f64| {
+                let d = block.rest_position(to as usize) - block.rest_position(from as usize);
+                [d.x as f32, d.y as f32, d.z as f32, w as f32]
+            };
+            let [first, second] = pair.ring;
+            let touched = contact_of(a).zip(contact_of(b)).filter(|_| pair.tip_driven.is_some());
+            let (ca, cb) = touched.unwrap_or((untouched, untouched));
+            FacePair {
+                nodes: [a, b, slot(a), slot(b)],
+                ring: [first[0], first[1], second[0], second[1]],
+                first_way_and_area: way(first, pair.area),
+                second_way_and_start: way(second, pair.tip_driven.unwrap_or(NEVER)),
+                contacts: [ca as u32, cb as u32, 0, 0],
+            }
+        })
+        .collect();
+    pairs.resize(pairs.len().max(1), FacePair::zeroed());
+    pairs
+}
+
+fn tied_nodes(model: &Model) -> Vec<[u32; 4]> {
+    (0..model.mesh.node_count())
+        .map(|node| {
+            let mut copies = [u32::MAX; 4];
+            let own = [node as u32];
+            let tied = model.separation.tied(node).unwrap_or(&own);
+            copies.iter_mut().zip(tied).for_each(|(place, copy)| *place = *copy);
+            copies
+        })
+        .collect()
+}
+
 fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
     let cells = model.mesh.block().cells();
     let mut nodes: Vec<ContactNode> = model
@@ -904,6 +1005,12 @@ fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
             ContactNode {
                 rest: vec4(model.mesh.rest_position(node)),
                 grid: [i as u32, j as u32, k as u32, 0],
+                surface: match c.surface {
+                    ContactSurface::OpenedPath => [0.0; 4],
+                    ContactSurface::Slit { side } => vec4(side),
+                    ContactSurface::OuterWall => [0.0, 0.0, 0.0, 1.0],
+                    ContactSurface::Bore => [0.0, 0.0, 0.0, -1.0],
+                },
                 node: c.node,
                 slot: layout.strips().owned_slot([i, j, k], cells),
                 pushed: c.pushed.into(),
@@ -1011,8 +1118,15 @@ impl Engine for GpuEngine {
     }
 
     fn read_state(&mut self) -> Result<State> {
-        const OPTIONAL: [&str; 6] =
-            ["cell_stiffness", "tip_state", "contact_memory", "plastic_state", "viscous_state", "point_history"];
+        const OPTIONAL: [&str; 7] = [
+            "pair_states",
+            "cell_stiffness",
+            "tip_state",
+            "contact_memory",
+            "plastic_state",
+            "viscous_state",
+            "point_history",
+        ];
         let names: Vec<&'static str> = ["node_displacement", "node_velocity"]
             .into_iter()
             .chain(OPTIONAL.into_iter().filter(|name| self.buffers.contains_key(name)))
@@ -1042,8 +1156,13 @@ impl Engine for GpuEngine {
                             overlap: m.overlap.into(),
                             axial_on: m.axial_on.into(),
                             touching: m.touching != 0.0,
+                            on_shaft: m.on_shaft != 0.0,
                         })
                         .collect();
+                }
+                "pair_states" => {
+                    let count = self.model.separation.pairs.len();
+                    state.pairs = read_all::<PairState>(bytes).map(|p| p.damage.into()).take(count).collect();
                 }
                 "plastic_state" => {
                     for (point, p) in state.points.iter_mut().zip(read_all::<PlasticState>(bytes)) {
@@ -1096,10 +1215,13 @@ impl Engine for GpuEngine {
                 overlap: c.overlap as f32,
                 axial_on: c.axial_on as f32,
                 touching: if c.touching { 1.0 } else { 0.0 },
-                _pad: 0.0,
+                on_shaft: if c.on_shaft { 1.0 } else { 0.0 },
             })
             .collect();
         write("contact_memory", bytemuck::cast_slice(&memory));
+        let pairs: Vec<PairState> =
+            state.pairs.iter().map(|d| PairState { damage: *d as f32, ..Zeroable::zeroed() }).collect();
+        write("pair_states", bytemuck::cast_slice(&pairs));
         let column = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
         let plastic: Vec<PlasticState> = state
             .points

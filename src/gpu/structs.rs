@@ -178,6 +178,10 @@ shared_structs! {
         _pad0: u32,
         _pad1: u32,
         shift: [f32; 4],
+        edge_radius: f32,
+        bore_radius: f32,
+        bore_friction: f32,
+        _pad2: u32,
         segments: [[f32; 4]; 16],
     }
     /// shaders/effects/puncture.wgsl
@@ -211,6 +215,43 @@ shared_structs! {
         _pad0: u32,
         _pad1: u32,
     }
+    /// shaders/effects/cohesive.wgsl
+    struct CohesiveParams {
+        onset: f32,
+        shear_onset: f32,
+        energy: f32,
+        shear_energy: f32,
+        exponent: f32,
+        penalty: f32,
+        inverse_ramp: f32,
+        torn_reach: f32,
+        pair_count: u32,
+        _pad0: u32,
+        _pad1: u32,
+        _pad2: u32,
+    }
+    /// shaders/effects/cohesive.wgsl
+    struct FacePair {
+        nodes: [u32; 4],
+        ring: [u32; 4],
+        first_way_and_area: [f32; 4],
+        second_way_and_start: [f32; 4],
+        contacts: [u32; 4],
+    }
+    /// shaders/effects/cohesive.wgsl
+    struct PairState {
+        damage: f32,
+        dissipation: f32,
+        stored: f32,
+        _pad: f32,
+    }
+    /// shaders/stages/measure_separation.wgsl
+    struct SeparationSums {
+        dissipation: f32,
+        stored: f32,
+        torn_area: f32,
+        _pad: f32,
+    }
     /// shaders/effects/friction.wgsl
     struct FrictionParams {
         coefficient: f32,
@@ -233,6 +274,7 @@ shared_structs! {
     struct ContactNode {
         rest: [f32; 4],
         grid: [u32; 4],
+        surface: [f32; 4],
         node: u32,
         slot: u32,
         pushed: u32,
@@ -248,7 +290,7 @@ shared_structs! {
         overlap: f32,
         axial_on: f32,
         touching: f32,
-        _pad: f32,
+        on_shaft: f32,
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactSums {

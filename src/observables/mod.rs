@@ -35,6 +35,8 @@ pub struct EnergyAccount {
     pub friction: f64,
     /// Dissipated by the tip law and by the softening of the path.
     pub cutting: f64,
+    /// Dissipated by faces that separate, plus what they store.
+    pub cohesive: f64,
     /// Dissipated by plastic flow, by damage and by the viscous terms.
     pub plastic: f64,
     pub damage: f64,
@@ -54,6 +56,7 @@ impl EnergyAccount {
             + self.damping
             + self.friction
             + self.cutting
+            + self.cohesive
             + self.plastic
             + self.damage
             + self.viscous

@@ -30,7 +30,7 @@ pub const FORCE_COLUMNS: [&str; 14] = [
 ];
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 25] = [
+pub const ENERGY_COLUMNS: [&str; 26] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -40,6 +40,7 @@ pub const ENERGY_COLUMNS: [&str; 25] = [
     "damping_j",
     "friction_j",
     "cutting_j",
+    "cohesive_j",
     "plastic_j",
     "damage_j",
     "viscous_j",
@@ -167,6 +168,7 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(e.damping),
         number(e.friction),
         number(e.cutting),
+        number(e.cohesive),
         number(e.plastic),
         number(e.damage),
         number(e.viscous),

@@ -36,6 +36,7 @@ pub struct SceneFile {
     /// Motion of the tool; required with a tool.
     pub motion: Option<MotionTable>,
     pub puncture: Option<PunctureTable>,
+    pub cohesive: Option<CohesiveTable>,
     pub friction: Option<FrictionTable>,
     pub indentation: Option<IndentationTable>,
     pub gravity: Option<GravityTable>,
@@ -324,6 +325,12 @@ pub struct NeedleTable {
     pub bevel_angle_deg: Option<f64>,
     /// Heading of the apex of a bevel seen from the axis [deg]; for a vertical needle from +x towards +y; default 0.
     pub bevel_heading_deg: Option<f64>,
+    /// Diameter of the bore of a hollow needle that takes a core [mm]; needs the effects `puncture` and `cohesive`.
+    pub bore_diameter_mm: Option<f64>,
+    /// Where the cutting edge of a hollow needle lies in its wall: 0 at the bore, 1 at the outer diameter.
+    pub cutting_edge: Option<f64>,
+    /// Friction coefficient of the bore.
+    pub bore_friction: Option<f64>,
     /// Needle material: a name in the library or a table; default "steel-304". The needle is rigid, so the material
     /// is checked and reported only.
     pub material: Option<NeedleMaterialEntry>,
@@ -445,6 +452,40 @@ pub struct FrictionTable {
     pub stiffness_ratio: Option<f64>,
     /// Length over which mu grows along the shaft behind the cone [mm].
     pub fade_length_mm: Option<f64>,
+}
+
+/// Parameters of the effect `cohesive`: faces that separate. With a needle that cuts, its path opens on them: on a slit
+/// before a solid needle, on the ring of its cutting edge before a hollow one.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CohesiveTable {
+    /// Strength in opening [kPa].
+    pub strength_kpa: Option<f64>,
+    /// Strength in shear [kPa]; default: that in opening.
+    pub shear_strength_kpa: Option<f64>,
+    /// Fracture energy in opening [J/m^2].
+    pub energy_j_m2: Option<f64>,
+    /// Fracture energy in shear [J/m^2]; default: that in opening.
+    pub shear_energy_j_m2: Option<f64>,
+    /// Exponent of the mode mixity (Benzeggagh and Kenane).
+    pub exponent: Option<f64>,
+    /// Penalty stiffness over E/h; or give `penalty_pa_m`.
+    pub penalty_factor: Option<f64>,
+    /// Penalty stiffness [Pa/m].
+    pub penalty_pa_m: Option<f64>,
+    /// Planes across the whole block that may separate.
+    #[serde(default)]
+    pub plane: Vec<CohesivePlaneTable>,
+}
+
+/// A plane that may separate; the nearest grid line is moved there.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CohesivePlaneTable {
+    /// Axis of its normal: "x", "y" or "z".
+    pub axis: String,
+    /// Coordinate [mm]; z is negative below the top face.
+    pub at_mm: f64,
 }
 
 /// Parameters of the effect `indentation`.

@@ -55,6 +55,28 @@ impl Scene {
         convert::load(path, overrides).map_err(Error::Scene)
     }
 
+    /// The needle, if the tool is one.
+    pub fn needle(&self) -> Option<&NeedleShape> {
+        match &self.tool {
+            Some(Tool::Needle(needle)) => Some(needle),
+            _ => None,
+        }
+    }
+
+    /// True where the tissue separates around a hollow needle.
+    pub fn has_bore(&self) -> bool {
+        self.effects.cohesive.is_some() && self.needle().is_some_and(|n| n.bore.is_some())
+    }
+
+    /// Axis of the normal of the plane that a solid needle slits: 0 where the direction has no x, 1 where it has no y.
+    pub fn slit_axis(&self) -> Option<usize> {
+        let solid = self.needle().is_some_and(|n| n.bore.is_none());
+        if self.effects.cohesive.is_none() || !solid {
+            return None;
+        }
+        (0..2).find(|a| self.motion.direction[*a].abs() < 1e-9)
+    }
+
     /// JSON schema of the scene file, for editors and for the `schema` command.
     pub fn schema() -> serde_json::Value {
         schemars::schema_for!(file::SceneFile).to_value()
@@ -287,8 +309,21 @@ pub struct NeedleShape {
     pub tip_length: f64,
     /// Shape of the tip.
     pub tip: TipShape,
+    /// What makes it hollow.
+    pub bore: Option<BoreShape>,
     /// Name of the needle material (rigid here; kept for reports).
     pub material: String,
+}
+
+/// The inside of a hollow needle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoreShape {
+    /// Radius of the bore [m].
+    pub radius: f64,
+    /// Radius of the cutting edge, between bore and outer radius [m].
+    pub edge: f64,
+    /// Friction coefficient of the bore (dimensionless).
+    pub friction: f64,
 }
 
 /// Shape of the tip of a needle.
@@ -314,7 +349,14 @@ impl NeedleShape {
 
     /// A needle with a conical tip, of steel. Lengths in m.
     pub fn cone(name: &str, radius: f64, tip_length: f64) -> Self {
-        NeedleShape { name: name.into(), radius, tip_length, tip: TipShape::Cone, material: "steel-304".into() }
+        NeedleShape {
+            name: name.into(),
+            radius,
+            tip_length,
+            tip: TipShape::Cone,
+            bore: None,
+            material: "steel-304".into(),
+        }
     }
 }
 

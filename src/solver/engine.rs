@@ -93,6 +93,11 @@ pub struct FrameSums {
     pub damage_dissipation: f64,
     /// Total: dissipated by the Prony terms [J].
     pub viscous_dissipation: f64,
+    /// Dissipated by cohesive faces [J]; total: stored in them [J].
+    pub cohesive_dissipation: f64,
+    pub cohesive_energy: f64,
+    /// Total: torn area, damage times area over all pairs [m^2].
+    pub torn_area: f64,
     /// What each face exerts on the tissue at the last step [N]; zero without driven faces.
     pub reactions: [DVec3; 6],
     /// Total: stored in contact, stick and tip springs [J].
@@ -137,6 +142,8 @@ pub struct State {
     /// Memory per contact node: stretch of the stick spring [m], overlap at activation [m], axial position at
     /// activation [m]; `touching` tells whether the last two are set.
     pub contact: Vec<ContactState>,
+    /// Damage D of every pair of copies that may separate.
+    pub pairs: Vec<f64>,
     /// History per cell; empty without `plasticity` and `viscoelastic`.
     pub points: Vec<PointState>,
 }
@@ -148,6 +155,8 @@ pub struct ContactState {
     pub overlap: f64,
     pub axial_on: f64,
     pub touching: bool,
+    /// True while it is pressed by the full shaft.
+    pub on_shaft: bool,
 }
 
 /// What an engine tells about itself.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::file::*;
-use super::super::{Motion, NeedleShape, Phase, TipShape, Tool, presets};
+use super::super::{BoreShape, Motion, NeedleShape, Phase, TipShape, Tool, presets};
 use super::{Check, MM, Within};
 use crate::material::four_digits;
 
@@ -61,6 +61,7 @@ impl Check<'_> {
         }
         let radius = 0.5 * diameter;
         let (tip, tip_length) = self.needle_tip(table, radius);
+        let bore = self.bore(table, radius);
         let material = match &table.material {
             None => "steel-304".to_string(),
             Some(NeedleMaterialEntry::Preset(name)) => {
@@ -75,7 +76,39 @@ impl Check<'_> {
                 "constants".to_string()
             }
         };
-        NeedleShape { name, radius, tip_length, tip, material }
+        NeedleShape { name, radius, tip_length, tip, bore, material }
+    }
+
+    /// What makes the needle hollow.
+    fn bore(&mut self, table: &NeedleTable, radius: f64) -> Option<BoreShape> {
+        let edge = self.optional("needle.cutting_edge", table.cutting_edge, 1.0, 0.25, Within::Between(0.0, 1.0));
+        let friction = self.optional("needle.bore_friction", table.bore_friction, 1.0, 0.05, Within::NotNegative(2.0));
+        let Some(diameter) = table.bore_diameter_mm else {
+            for (key, given) in [("cutting_edge", table.cutting_edge), ("bore_friction", table.bore_friction)] {
+                if given.is_some() {
+                    self.notices.push(format!("`needle.{key}` has no effect without needle.bore_diameter_mm."));
+                }
+            }
+            return None;
+        };
+        let inner = 0.5 * self.number("needle.bore_diameter_mm", diameter, Within::Between(0.02, 20.0)) * MM;
+        if inner >= radius {
+            self.problems.report(
+                "needle.bore_diameter_mm",
+                format!("the bore of {diameter} mm does not fit into the needle of {} mm", 2e3 * radius),
+                "must be smaller than the outer diameter",
+                "write e.g. bore_diameter_mm = 1.194 for 16G",
+            );
+        }
+        if table.bevel_angle_deg.is_some() {
+            self.problems.report(
+                "needle.bevel_angle_deg",
+                "a hollow needle has a ring for a tip, no bevel",
+                "bevel and bore",
+                "write tip_length_mm = 1.0 for the length of the ground edge",
+            );
+        }
+        Some(BoreShape { radius: inner, edge: inner + edge * (radius - inner), friction })
     }
 
     /// Shape and length of the tip.

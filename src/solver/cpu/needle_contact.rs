@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{ContactSums, CpuEngine};
-use crate::model::PuncturePlan;
+use crate::model::{ContactSurface, PuncturePlan};
 use crate::needle::ToolPose;
 use crate::needle::gap::Overlap;
 use crate::solver::engine::ContactState;
@@ -37,7 +37,13 @@ impl CpuEngine {
             if !(contact.pushed && contact.rest_axial < a && s > 0.0) {
                 *memory = ContactState::default();
             } else {
-                let free = profile.opened_path(relative, d, contact.rest_radius, (0.0, 0.0));
+                let overlap = |less: (f64, f64)| match contact.surface {
+                    ContactSurface::OpenedPath => profile.opened_path(relative, d, contact.rest_radius, less),
+                    ContactSurface::Slit { side } => profile.slit_face(relative, d, side, less),
+                    ContactSurface::OuterWall => profile.tube_wall(relative, d, false, less),
+                    ContactSurface::Bore => profile.tube_wall(relative, d, true, less),
+                };
+                let free = overlap((0.0, 0.0));
                 if !memory.touching {
                     memory.touching = true;
                     memory.overlap = free.value.max(0.0);
@@ -46,7 +52,7 @@ impl CpuEngine {
                 let travel = (s - memory.axial_on) / plan.params.entry_fade;
                 let fading = if travel > 0.0 && travel < 1.0 { -memory.overlap / plan.params.entry_fade } else { 0.0 };
                 let less = (memory.overlap * (1.0 - travel).clamp(0.0, 1.0), fading);
-                let Overlap { value: depth, gradient } = profile.opened_path(relative, d, contact.rest_radius, less);
+                let Overlap { value: depth, gradient } = overlap(less);
                 let steep = gradient.length();
                 let n = -gradient / steep;
                 let v = self.state.velocity[node] - pose.velocity;
@@ -60,10 +66,15 @@ impl CpuEngine {
                     sums.stored = 0.5 * k * depth * depth;
                     sums.damping_power = (elastic - normal) * vn;
                 }
+                memory.on_shaft = depth > 0.0 && s >= cone;
                 memory.stick = match model.effects.friction {
                     Some(friction) if normal > 0.0 => {
                         let kt = friction.stiffness_ratio * k;
-                        let mu = friction.coefficient * ((s - cone) / friction.fade_length).clamp(0.0, 1.0);
+                        let coefficient = match (contact.surface, plan.needle.bore) {
+                            (ContactSurface::Bore, Some(bore)) => bore.friction,
+                            _ => friction.coefficient,
+                        };
+                        let mu = coefficient * ((s - cone) / friction.fade_length).clamp(0.0, 1.0);
                         let trial = memory.stick + (v - n * vn) * self.dt;
                         let trial = trial - n * trial.dot(n);
                         let length = trial.length();

@@ -9,17 +9,12 @@ use crate::needle::ToolPose;
 use crate::solver::elements::{CORNERS, CellStates};
 
 impl CpuEngine {
-    /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction`.
-    pub(super) fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> ([usize; 8], [f64; 8], [f64; 8]) {
-        let (mut c, mut xi, mut width) = ([0; 3], [0.0; 3], [0.0; 3]);
-        for a in 0..3 {
-            let lines = &mesh.lines[a];
-            let i = lines.partition_point(|l| *l <= x[a]).clamp(1, lines.len() - 1) - 1;
-            c[a] = i;
-            width[a] = lines[i + 1] - lines[i];
-            xi[a] = ((x[a] - lines[i]) / width[a]).clamp(0.0, 1.0);
-        }
-        let nodes = mesh.cell_nodes(mesh.cell_index(c[0], c[1], c[2]));
+    /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction` (in a bent grid the
+    /// direction of its axis).
+    fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> ([usize; 8], [f64; 8], [f64; 8]) {
+        let ([i, j, k], xi) = mesh.locate(x);
+        let cell = mesh.cell_index(i, j, k);
+        let width = mesh.cell_size(cell);
         let (mut weight, mut slope) = ([0.0; 8], [0.0; 8]);
         for (i, signs) in CORNERS.iter().enumerate() {
             let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (xi[a] - 0.5));
@@ -27,7 +22,7 @@ impl CpuEngine {
             weight[i] = n[0] * n[1] * n[2];
             slope[i] = d[0] * n[1] * n[2] + n[0] * d[1] * n[2] + n[0] * n[1] * d[2];
         }
-        (nodes, weight, slope)
+        (mesh.cell_nodes(cell), weight, slope)
     }
 
     /// Stage `advance_tip`: each anchor k carries a spring between the tip plane and the material point at `a`.
