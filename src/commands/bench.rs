@@ -310,11 +310,7 @@ fn frame_overhead(gpu: Option<&Gpu>) -> Result<f64> {
 /// Time from program start to the first finished step of 20 k cells [ms] and peak memory [MB], in a fresh process.
 fn start(cold: bool, engine: EngineChoice) -> Option<(f64, f64)> {
     let mut command = std::process::Command::new(std::env::current_exe().ok()?);
-    command.arg("first-step").arg("--engine").arg(match engine {
-        EngineChoice::Auto => "auto",
-        EngineChoice::Gpu => "gpu",
-        EngineChoice::Cpu => "cpu",
-    });
+    command.arg("first-step").arg("--engine").arg(engine.key());
     if cold {
         // Drivers keep compiled shaders on disk; Mesa and NVIDIA have their own switches.
         command.env("MESA_SHADER_CACHE_DISABLE", "true").env("__GL_SHADER_DISK_CACHE", "0");

@@ -9,7 +9,7 @@ use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables, folder,
-    write_force_chart, write_sample_chart,
+    write_force_chart, write_parts_chart, write_sample_chart,
 };
 use crate::process;
 use crate::render;
@@ -149,6 +149,9 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     if !records.is_empty() {
         let figures = CurveFigures::from_records(&records);
         write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, &records, &figures)?;
+        if scene.tool.is_some() {
+            write_parts_chart(&output.file(folder::FORCE_PARTS_CHART), &scene.title, &records)?;
+        }
         if !driven.is_empty() {
             write_sample_chart(&output.file(folder::SAMPLE_CHART), &scene.title, &driven, &records)?;
         }
@@ -272,12 +275,15 @@ pub fn describe(summary: &Summary) -> String {
 /// Exit code of an interrupted run, as shells have it for Ctrl-C.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
+/// Exit code of a run that left the range in which its numbers mean something.
+pub const EXIT_DIVERGED: u8 = 3;
+
 /// Exit code of a finished run.
 pub fn exit_code(outcome: &Result<RunOutcome>) -> u8 {
     match outcome {
         Ok(o) if o.summary.status == Status::Interrupted => EXIT_INTERRUPTED,
         Ok(_) => 0,
-        Err(Error::Diverged { .. }) => 3,
+        Err(Error::Diverged { .. }) => EXIT_DIVERGED,
         Err(error) => error.exit_code(),
     }
 }

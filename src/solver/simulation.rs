@@ -29,6 +29,17 @@ pub enum EngineChoice {
     Cpu,
 }
 
+impl EngineChoice {
+    /// As the command line has it.
+    pub fn key(self) -> &'static str {
+        match self {
+            EngineChoice::Auto => "auto",
+            EngineChoice::Gpu => "gpu",
+            EngineChoice::Cpu => "cpu",
+        }
+    }
+}
+
 impl FromStr for EngineChoice {
     type Err = String;
 
