@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::effects::{EffectSet, puncture};
 use crate::material_point::Material;
 use crate::mesh::{BlockMesh, Mesh};
+use crate::needle::gap::Profile;
 use crate::needle::{Kinematics, PlannedPath, lateral_axes};
 use crate::scene::{Cutting, Face, FaceCondition, NeedleShape, RegionShape, Scene, TissueMaterial, Tool};
 
@@ -72,6 +73,8 @@ pub struct PuncturePlan {
     pub segments: Vec<PathSegment>,
     pub params: puncture::Params,
     pub needle: NeedleShape,
+    /// Its outer surface in the frame of the tip.
+    pub profile: Profile,
     pub path: PlannedPath,
     pub anchors: Vec<TipAnchor>,
     pub cells: Vec<PathCell>,
@@ -225,6 +228,7 @@ impl Model {
             cells,
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
             params,
+            profile: Profile::new(&needle, path.direction),
             needle,
             path,
         });

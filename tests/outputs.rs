@@ -153,7 +153,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
 }
 
 fn needle() -> Option<Tool> {
-    Some(Tool::Needle(NeedleShape { name: "16G".into(), radius: RADIUS, tip_length: 3e-3, material: "steel".into() }))
+    Some(Tool::Needle(NeedleShape::cone("16G", RADIUS, 3e-3)))
 }
 
 /// A dimple at the entry, tissue pushed aside by the shaft, stress falling with the distance from the tool.

@@ -18,6 +18,8 @@ struct PunctureParams {
     path_cell_count: u32,
     _pad0: u32,
     _pad1: u32,
+    // Shift of a section's centre per radius: zero for a cone, from the apex to the axis for a bevel; w unused.
+    shift: vec4<f32>,
     // Stretches of the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], unused.
     segments: array<vec4<f32>, 16>,
 }
@@ -80,9 +82,24 @@ fn tip_threshold(a: f32) -> f32 {
     return segment.z + (segment.y - segment.z) * entry;
 }
 
-// Needle radius at distance s behind the tip and its slope.
-fn needle_profile(s: f32) -> vec2<f32> {
-    let on_cone = s < puncture.tip_length;
-    let slope = puncture.needle_radius / puncture.tip_length;
-    return vec2<f32>(select(puncture.needle_radius, slope * s, on_cone), select(0.0, slope, on_cone));
+// How deep a point lies inside the needle [m] and the gradient of that depth (src/needle/gap.rs).
+struct Overlap {
+    value: f32,
+    gradient: vec3<f32>,
+}
+
+// Overlap with the opened path of a point whose material lay `rest_radius` from the line of the tip. `s`: distance behind
+// the tip along `d`; `less`: value and slope of what is taken off the radius.
+fn opened_path(lever: vec3<f32>, d: vec3<f32>, s: f32, rest_radius: f32, less: vec2<f32>) -> Overlap {
+    let on_tip = s < puncture.tip_length;
+    let full_slope = puncture.needle_radius / puncture.tip_length;
+    let rc = select(puncture.needle_radius, full_slope * s, on_tip);
+    let slope = select(0.0, full_slope, on_tip);
+    let shift = puncture.shift.xyz;
+    let radial = lever - d * s - shift * rc;
+    let r = length(radial);
+    let e = radial * select(0.0, 1.0 / r, r > 1e-9);
+    let open = sqrt(rest_radius * rest_radius + rc * rc);
+    let m = rc * slope / open - less.y + slope * dot(e, shift);
+    return Overlap(open - less.x - r, d * m - e);
 }

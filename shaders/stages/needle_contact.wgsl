@@ -49,33 +49,29 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     // Loops that run once or not at all: software adapters skip them, where they would walk through an `if`.
     for (var once = select(1u, 0u, passed); once == 0u; once++) {
         var memory = contact_memory[index];
-        let radial = lever - d * s;
-        let r = length(radial);
-        let e = radial * select(0.0, 1.0 / r, r > 1e-9);
-        let profile = needle_profile(s);
-        let open = sqrt(contact.rest_radius * contact.rest_radius + profile.x * profile.x);
         if (memory.touching == 0.0) {
             memory.touching = 1.0;
-            memory.overlap = max(0.0, open - r);
+            memory.overlap = max(0.0, opened_path(lever, d, s, contact.rest_radius, vec2<f32>(0.0)).value);
             memory.axial_on = s;
         }
         // An overlap found at activation fades over `entry_fade` of travel, so that the needle does that work.
         let travel = (s - memory.axial_on) / puncture.entry_fade;
-        let wall = open - memory.overlap * clamp(1.0 - travel, 0.0, 1.0);
-        let fading = select(0.0, memory.overlap / puncture.entry_fade, travel > 0.0 && travel < 1.0);
-        let m = profile.x * profile.y / open + fading;
-        let scale = inverseSqrt(1.0 + m * m);
-        let n = (e - d * m) * scale;
-        let depth = (wall - r) * scale;
+        let fading = select(0.0, -memory.overlap / puncture.entry_fade, travel > 0.0 && travel < 1.0);
+        let less = vec2<f32>(memory.overlap * clamp(1.0 - travel, 0.0, 1.0), fading);
+        let overlap = opened_path(lever, d, s, contact.rest_radius, less);
+        let depth = overlap.value;
+        let steep = length(overlap.gradient);
+        let n = overlap.gradient * (-1.0 / steep);
         let v = node_velocity[contact.node].xyz - step_input.velocity.xyz;
         let vn = dot(v, n);
         let k = puncture.contact_stiffness;
+        let elastic = k * depth * steep;
         let damping = 2.0 * puncture.contact_damping * sqrt(k * contact.mass);
-        let pressure = select(0.0, max(0.0, k * depth - damping * vn), depth > 0.0);
+        let pressure = select(0.0, max(0.0, elastic - damping * vn), depth > 0.0);
         normal = n * pressure;
         stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
         contact_sums[index].damping_dissipation +=
-            select(0.0, (k * depth - pressure) * vn * params.dt, depth > 0.0);
+            select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
 #ifdef FRICTION
         let kt = friction.stiffness_ratio * k;
         let grown = clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);

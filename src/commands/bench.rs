@@ -109,14 +109,7 @@ pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
         mesh: None,
         supports: Vec::new(),
         faces: [fixed.clone(), fixed.clone(), fixed.clone(), fixed.clone(), fixed, FaceCondition::default()],
-        tool: needle.then(|| {
-            Tool::Needle(NeedleShape {
-                name: "16G".into(),
-                radius: 0.8255e-3,
-                tip_length: 2.5e-3,
-                material: "steel-304".into(),
-            })
-        }),
+        tool: needle.then(|| Tool::Needle(NeedleShape::cone("16G", 0.8255e-3, 2.5e-3))),
         motion: Motion {
             // Off the grid lines, as scenes have it.
             entry: DVec3::new(0.23 * h, 0.31 * h, 0.0),

@@ -7,7 +7,7 @@ use crate::effects::{EffectSet, damage, fibres, plasticity, viscoelastic};
 use crate::error::Result;
 use crate::material::{describe_constants, describe_verdict, four_digits};
 use crate::mesh::Mesh;
-use crate::scene::{Face, FaceDrive, RegionShape, Scene, TissueMaterial, Tool};
+use crate::scene::{Face, FaceDrive, RegionShape, Scene, TipShape, TissueMaterial, Tool};
 use crate::solver::simulation::{EngineChoice, Simulation, tool_mach};
 use crate::solver::stable_dt::power_iteration;
 
@@ -256,14 +256,24 @@ fn describe_parameters(key: &str, effects: &EffectSet) -> String {
 
 fn describe_tool(tool: &Tool) -> String {
     match tool {
-        Tool::Needle(n) => format!(
-            "needle {}: diameter {:.3} mm, cone {:.3} mm (half angle {:.1} deg), {}",
-            n.name,
-            2e3 * n.radius,
-            1e3 * n.tip_length,
-            (n.radius / n.tip_length).atan().to_degrees(),
-            n.material
-        ),
+        Tool::Needle(n) => {
+            let tip = match n.tip {
+                TipShape::Cone => {
+                    format!(
+                        "cone {:.3} mm (half angle {:.1} deg)",
+                        1e3 * n.tip_length,
+                        n.tip_slope().atan().to_degrees()
+                    )
+                }
+                TipShape::Bevel { heading } => format!(
+                    "bevel {:.3} mm ({:.1} deg, apex heading {:.0} deg)",
+                    1e3 * n.tip_length,
+                    (2.0 * n.tip_slope()).atan().to_degrees(),
+                    heading.to_degrees()
+                ),
+            };
+            format!("needle {}: diameter {:.3} mm, {tip}, {}", n.name, 2e3 * n.radius, n.material)
+        }
         Tool::Sphere { radius } => format!("sphere of radius {:.3} mm", radius * 1e3),
         Tool::FlatPunch { radius, bonded } => {
             format!("flat punch of radius {:.3} mm{}", radius * 1e3, if *bonded { ", bonded" } else { "" })

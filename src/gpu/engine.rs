@@ -869,6 +869,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             tip_length: plan.needle.tip_length as f32,
             anchor_reach: anchor_reach as f32,
             path_cell_count: plan.cells.len() as u32,
+            shift: vec4(plan.profile.shift),
             segments,
             ..Zeroable::zeroed()
         }

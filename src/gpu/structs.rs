@@ -177,6 +177,7 @@ shared_structs! {
         path_cell_count: u32,
         _pad0: u32,
         _pad1: u32,
+        shift: [f32; 4],
         segments: [[f32; 4]; 16],
     }
     /// shaders/effects/puncture.wgsl

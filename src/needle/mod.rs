@@ -3,6 +3,8 @@
 pub mod banded;
 pub mod beam;
 
+pub mod gap;
+
 use glam::DVec3;
 
 use crate::scene::{Motion, Phase};

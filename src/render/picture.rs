@@ -12,11 +12,12 @@
 //! ```
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::slice::{self, EdgeKind, Plane, Slice};
 use super::stroke_font;
 use crate::mesh::Mesh;
+use crate::needle::gap::Profile;
 use crate::observables::FieldSnapshot;
 use crate::scene::{Scene, Tool};
 
@@ -379,8 +380,9 @@ struct ToolDrawing {
 
 #[derive(Debug, Clone, Copy)]
 enum ToolShape {
-    /// Cylinder behind a cone of the given length (0 for a flat end) [m].
-    Rod { radius: f64, cone: f64 },
+    /// Cylinder behind a tip of the given length (0 for a flat end) [m], its axis beside the line of the apex [m]
+    /// (positive towards `back.perp()`; 0 for a cone).
+    Rod { radius: f64, cone: f64, beside: f64 },
     /// Sphere on a thin rod [m].
     Sphere { radius: f64 },
 }
@@ -388,23 +390,29 @@ enum ToolShape {
 impl ToolDrawing {
     fn new(scene: &Scene, snapshot: &FieldSnapshot, plane: &Plane) -> Option<Self> {
         let (tip, direction) = snapshot.tool_pose?;
+        let in_plane = |v: DVec3| DVec2::new(v.dot(plane.right), v.dot(plane.up));
+        let back = (-in_plane(direction)).try_normalize().unwrap_or(DVec2::Y);
         let shape = match scene.tool.as_ref()? {
-            Tool::Needle(needle) => ToolShape::Rod { radius: needle.radius, cone: needle.tip_length },
-            Tool::FlatPunch { radius, .. } => ToolShape::Rod { radius: *radius, cone: 0.0 },
+            Tool::Needle(needle) => {
+                let shift = Profile::new(needle, direction).shift;
+                let beside = needle.radius * in_plane(shift).dot(back.perp());
+                ToolShape::Rod { radius: needle.radius, cone: needle.tip_length, beside }
+            }
+            Tool::FlatPunch { radius, .. } => ToolShape::Rod { radius: *radius, cone: 0.0, beside: 0.0 },
             Tool::Sphere { radius } => ToolShape::Sphere { radius: *radius },
         };
-        let back = DVec2::new(-direction.dot(plane.right), -direction.dot(plane.up));
         let tip = plane.project(tip);
-        tip.is_finite().then_some(Self { tip, back: back.try_normalize().unwrap_or(DVec2::Y), shape })
+        tip.is_finite().then_some(Self { tip, back, shape })
     }
 
     /// True where the tool covers a point of the plane [m].
     fn covers(&self, point: DVec2) -> bool {
         let p = point - self.tip;
-        let (along, across) = (p.dot(self.back), p.perp_dot(self.back).abs());
+        let (along, across) = (p.dot(self.back), p.dot(self.back.perp()));
         match self.shape {
-            ToolShape::Rod { radius, cone } => {
-                along >= 0.0 && across <= radius * if along < cone { along / cone } else { 1.0 }
+            ToolShape::Rod { radius, cone, beside } => {
+                let grown = if along < cone { along / cone } else { 1.0 };
+                along >= 0.0 && (across - beside * grown).abs() <= radius * grown
             }
             ToolShape::Sphere { radius } => (p - radius * self.back).length() <= radius,
         }
@@ -414,22 +422,25 @@ impl ToolDrawing {
         // Longer than the picture: the frame covers what is too much.
         let length = 4.0 * f64::from(layout.size.0 + layout.size.1) / layout.pixels_per_metre;
         match self.shape {
-            ToolShape::Rod { radius, cone } => {
-                self.draw_rod(canvas, layout, radius, cone, length);
-            }
+            ToolShape::Rod { .. } => self.draw_rod(canvas, layout, self.shape, length),
             ToolShape::Sphere { radius } => {
                 let stem = Self { tip: self.tip + radius * self.back, ..*self };
-                stem.draw_rod(canvas, layout, 0.25 * radius, 0.0, length);
+                let rod = ToolShape::Rod { radius: 0.25 * radius, cone: 0.0, beside: 0.0 };
+                stem.draw_rod(canvas, layout, rod, length);
                 let centre = layout.place(self.tip + radius * self.back);
                 draw_ball(canvas, centre, radius * layout.pixels_per_metre, layout.unit);
             }
         }
     }
 
-    fn draw_rod(&self, canvas: &mut Canvas, layout: &Layout, radius: f64, cone: f64, length: f64) {
+    fn draw_rod(&self, canvas: &mut Canvas, layout: &Layout, rod: ToolShape, length: f64) {
         const STRIPS: usize = 16;
+        let ToolShape::Rod { radius, cone, beside } = rod else { return };
         let side = self.back.perp();
-        let at = |t: f64, along: f64, width: f64| layout.place(self.tip + along * self.back + t * width * side);
+        let at = |t: f64, along: f64, width: f64| {
+            let across = if along < cone || (along == 0.0 && width == 0.0) { 0.0 } else { beside };
+            layout.place(self.tip + along * self.back + (across + t * width) * side)
+        };
         // Shading runs from the left side of the rod in the picture to its right one.
         let left_is = if side.x > 0.0 { -1.0 } else { 1.0 };
         for strip in 0..STRIPS {

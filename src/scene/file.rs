@@ -308,7 +308,7 @@ pub struct FaceTable {
     pub traction_ramp_s: Option<f64>,
 }
 
-/// A rigid solid needle: cylinder and cone.
+/// A rigid solid needle: cylinder and tip.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NeedleTable {
@@ -320,6 +320,10 @@ pub struct NeedleTable {
     pub tip_length_mm: Option<f64>,
     /// Half of the opening angle of the cone [deg].
     pub tip_half_angle_deg: Option<f64>,
+    /// Angle between the bevel and the shaft [deg], instead of a cone.
+    pub bevel_angle_deg: Option<f64>,
+    /// Heading of the apex of a bevel seen from the axis [deg]; for a vertical needle from +x towards +y; default 0.
+    pub bevel_heading_deg: Option<f64>,
     /// Needle material: a name in the library or a table; default "steel-304". The needle is rigid, so the material
     /// is checked and reported only.
     pub material: Option<NeedleMaterialEntry>,

@@ -276,17 +276,46 @@ pub enum Tool {
     },
 }
 
-/// A rigid solid needle: a cylinder with a conical tip.
+/// A rigid solid needle: a cylinder with a straight or oblique conical tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeedleShape {
     /// What the user calls it, e.g. `16G`.
     pub name: String,
     /// Shaft radius R [m].
     pub radius: f64,
-    /// Length Lc of the cone [m].
+    /// Length of the tip, Lc of the cone, 2R/tan(beta) of a bevel [m].
     pub tip_length: f64,
+    /// Shape of the tip.
+    pub tip: TipShape,
     /// Name of the needle material (rigid here; kept for reports).
     pub material: String,
+}
+
+/// Shape of the tip of a needle.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum TipShape {
+    /// Circular cone, apex on the axis.
+    #[default]
+    Cone,
+    /// Bevel: an oblique circular cone with its apex on the rim, so that one side runs on along the shaft and the other
+    /// stands at the bevel angle to it.
+    Bevel {
+        /// Heading of the apex seen from the axis [rad], from the first lateral axis of the direction to the second
+        /// (`needle::lateral_axes`); for a vertical needle 0 is +x.
+        heading: f64,
+    },
+}
+
+impl NeedleShape {
+    /// Growth of the section's radius per length of the tip; half of that of the flank of a bevel.
+    pub fn tip_slope(&self) -> f64 {
+        self.radius / self.tip_length
+    }
+
+    /// A needle with a conical tip, of steel. Lengths in m.
+    pub fn cone(name: &str, radius: f64, tip_length: f64) -> Self {
+        NeedleShape { name: name.into(), radius, tip_length, tip: TipShape::Cone, material: "steel-304".into() }
+    }
 }
 
 /// Motion of the tool along a straight line.

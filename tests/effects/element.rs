@@ -122,7 +122,7 @@ fn softened_scene() -> Scene {
     scene.effects.puncture = Some(puncture::Params::default());
     with_tool(
         &mut scene,
-        Tool::Needle(NeedleShape { name: "18G".into(), radius: 0.635e-3, tip_length: 2e-3, material: "steel".into() }),
+        Tool::Needle(NeedleShape::cone("18G", 0.635e-3, 2e-3)),
         DVec3::NEG_Z,
         vec![Phase::Insert { speed: 10e-3, depth: 3e-3 }],
     );

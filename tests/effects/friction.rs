@@ -177,7 +177,7 @@ fn insertion(mu: Option<f64>) -> Scene {
     scene.solver.mass_damping = 40.0;
     with_tool(
         &mut scene,
-        Tool::Needle(NeedleShape { name: "test".into(), radius: 1e-3, tip_length: 1.5e-3, material: "steel".into() }),
+        Tool::Needle(NeedleShape::cone("test", 1e-3, 1.5e-3)),
         DVec3::NEG_Z,
         vec![Phase::Insert { speed: 20e-3, depth: 5e-3 }, Phase::Withdraw { speed: 20e-3, depth: 3e-3 }],
     );

@@ -32,7 +32,7 @@ fn insertion(depth: f64) -> Arc<Model> {
     scene.solver.mass_damping = 30.0;
     with_tool(
         &mut scene,
-        Tool::Needle(NeedleShape { name: "14G".into(), radius: 1e-3, tip_length: 3e-3, material: "steel".into() }),
+        Tool::Needle(NeedleShape::cone("14G", 1e-3, 3e-3)),
         DVec3::NEG_Z,
         vec![Phase::Insert { speed, depth }],
     );

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::file::*;
-use super::super::{Motion, NeedleShape, Phase, Tool, presets};
+use super::super::{Motion, NeedleShape, Phase, TipShape, Tool, presets};
 use super::{Check, MM, Within};
 use crate::material::four_digits;
 
@@ -60,21 +60,7 @@ impl Check<'_> {
             ),
         }
         let radius = 0.5 * diameter;
-        let tip_length = match (table.tip_length_mm, table.tip_half_angle_deg) {
-            (Some(length), None) => self.number("needle.tip_length_mm", length, Within::Between(0.05, 50.0)) * MM,
-            (None, Some(angle)) => {
-                radius / self.number("needle.tip_half_angle_deg", angle, Within::Between(3.0, 80.0)).to_radians().tan()
-            }
-            (length, _) => {
-                self.problems.report(
-                    "needle",
-                    if length.is_some() { "the tip has two shapes" } else { "the tip has no shape" },
-                    "exactly one of tip_length_mm and tip_half_angle_deg",
-                    "write tip_half_angle_deg = 18 or tip_length_mm = 2.5",
-                );
-                MM
-            }
-        };
+        let (tip, tip_length) = self.needle_tip(table, radius);
         let material = match &table.material {
             None => "steel-304".to_string(),
             Some(NeedleMaterialEntry::Preset(name)) => {
@@ -89,7 +75,45 @@ impl Check<'_> {
                 "constants".to_string()
             }
         };
-        NeedleShape { name, radius, tip_length, material }
+        NeedleShape { name, radius, tip_length, tip, material }
+    }
+
+    /// Shape and length of the tip.
+    fn needle_tip(&mut self, table: &NeedleTable, radius: f64) -> (TipShape, f64) {
+        if table.bevel_heading_deg.is_some() && table.bevel_angle_deg.is_none() {
+            self.notices.push("`needle.bevel_heading_deg` has no effect without needle.bevel_angle_deg.".into());
+        }
+        match (table.tip_length_mm, table.tip_half_angle_deg, table.bevel_angle_deg) {
+            (Some(length), None, None) => {
+                (TipShape::Cone, self.number("needle.tip_length_mm", length, Within::Between(0.05, 50.0)) * MM)
+            }
+            (None, Some(angle), None) => {
+                let angle = self.number("needle.tip_half_angle_deg", angle, Within::Between(3.0, 80.0));
+                (TipShape::Cone, radius / angle.to_radians().tan())
+            }
+            (None, None, Some(angle)) => {
+                let angle = self.number("needle.bevel_angle_deg", angle, Within::Between(5.0, 80.0));
+                let heading = self.optional(
+                    "needle.bevel_heading_deg",
+                    table.bevel_heading_deg,
+                    1.0,
+                    0.0,
+                    Within::Between(-360.0, 360.0),
+                );
+                let length = 2.0 * radius / angle.to_radians().tan();
+                (TipShape::Bevel { heading: heading.to_radians() }, length)
+            }
+            (length, angle, bevel) => {
+                let count = [length, angle, bevel].iter().flatten().count();
+                self.problems.report(
+                    "needle",
+                    if count > 1 { format!("the tip has {count} shapes") } else { "the tip has no shape".into() },
+                    "exactly one of tip_length_mm, tip_half_angle_deg and bevel_angle_deg",
+                    "write tip_half_angle_deg = 18 (cone) or bevel_angle_deg = 20",
+                );
+                (TipShape::Cone, MM)
+            }
+        }
     }
 
     fn needle_material(&mut self, table: &NeedleMaterialTable) {

@@ -1,18 +1,21 @@
 //! The CPU engine: f64, rayon, written from the equations. Reference for the tests and fallback without an adapter.
 
+mod indenter_contact;
+mod needle_contact;
+mod tip;
+
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::elements::{CORNERS, CellForces, CellInput, CellMeasure, CellStates, Elements};
+use super::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
-use crate::mesh::BlockMesh;
-use crate::model::{Model, PuncturePlan};
+use crate::model::Model;
 use crate::needle::ToolPose;
-use crate::scene::{Face, Tool};
+use crate::scene::Face;
 
 /// Sums of one contact node over one step.
 #[derive(Debug, Clone, Copy, Default)]
@@ -105,102 +108,6 @@ impl CpuEngine {
         self.integrate_nodes(input);
     }
 
-    /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction`.
-    fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> ([usize; 8], [f64; 8], [f64; 8]) {
-        let (mut c, mut xi, mut width) = ([0; 3], [0.0; 3], [0.0; 3]);
-        for a in 0..3 {
-            let lines = &mesh.lines[a];
-            let i = lines.partition_point(|l| *l <= x[a]).clamp(1, lines.len() - 1) - 1;
-            c[a] = i;
-            width[a] = lines[i + 1] - lines[i];
-            xi[a] = ((x[a] - lines[i]) / width[a]).clamp(0.0, 1.0);
-        }
-        let nodes = mesh.cell_nodes(mesh.cell_index(c[0], c[1], c[2]));
-        let (mut weight, mut slope) = ([0.0; 8], [0.0; 8]);
-        for (i, signs) in CORNERS.iter().enumerate() {
-            let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (xi[a] - 0.5));
-            let d: [f64; 3] = std::array::from_fn(|a| signs[a] * direction[a] / width[a]);
-            weight[i] = n[0] * n[1] * n[2];
-            slope[i] = d[0] * n[1] * n[2] + n[0] * d[1] * n[2] + n[0] * n[1] * d[2];
-        }
-        (nodes, weight, slope)
-    }
-
-    /// Stage `advance_tip`: each anchor k carries a spring between the tip plane and the material point at `a`.
-    ///
-    /// `g_k = max(0, (p_tip - x_k).t)`, `F = k_tip/N sum g_k`, threshold `F_c(a)` falls from F_pun to F_cut over l_p;
-    /// where F > F_c: `a += min((F - F_c) / (k_tip lambda), cap)`, `lambda = <dx_k/da . t>` clamped to 0.2..3.
-    fn advance_tip(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
-        let model = self.model.clone();
-        let mesh = model.mesh.block();
-        let u = &self.state.displacement;
-        let t = pose.direction;
-        let spring = plan.params.tip_stiffness / plan.anchors.len() as f64;
-        let tip_axial = (pose.tip - plan.path.entry).dot(t);
-        let gaps = |a: f64| -> Vec<(f64, f64, [usize; 8], [f64; 8])> {
-            plan.anchors
-                .iter()
-                .map(|anchor| {
-                    let x = anchor.surface + t * a;
-                    let (nodes, weight, slope) = Self::locate(mesh, x, t);
-                    let (mut du, mut stretch) = (0.0, 1.0);
-                    for i in 0..8 {
-                        let along = u[nodes[i]].dot(t);
-                        du += weight[i] * along;
-                        stretch += slope[i] * along;
-                    }
-                    ((tip_axial - a - du).max(0.0), stretch, nodes, weight)
-                })
-                .collect()
-        };
-        let a = self.state.tip_coordinate;
-        let mut springs = gaps(a);
-        let force: f64 = springs.iter().map(|s| spring * s.0).sum();
-        let p = &plan.params;
-        let threshold = plan.threshold(a);
-        if force > threshold {
-            let lambda = springs.iter().map(|s| s.1).sum::<f64>() / springs.len() as f64;
-            let speed = pose.velocity.length();
-            let cap = if a == 0.0 { 0.005e-3 } else { 0.013e-3 };
-            let cap = f64::min(cap, 4.0 * speed * self.dt);
-            let advance = ((force - threshold) / (p.tip_stiffness * lambda.clamp(0.2, 3.0))).min(cap);
-            self.state.tip_coordinate = a + advance;
-            let before = springs;
-            springs = gaps(a + advance);
-            // Force after the advance times the loss of stretch: with the force of the next step this closes the
-            // trapezoidal rule of the leapfrog work; the loss of spring energy would count half a step twice.
-            let lost = before.iter().zip(&springs).map(|(b, s)| spring * s.0 * (b.0 - s.0));
-            self.sums.tip_dissipation += lost.sum::<f64>();
-        }
-        self.tip_energy = springs.iter().map(|s| 0.5 * spring * s.0 * s.0).sum();
-        self.tip_forces = springs.into_iter().map(|s| (spring * s.0, s.2, s.3)).collect();
-    }
-
-    /// Stage `soften_path`: factor `max(residual, 1 - phi ramp(a))`; the energy that a cell loses is dissipated.
-    fn soften_path(&mut self, plan: &PuncturePlan) {
-        let a = self.state.tip_coordinate;
-        for path_cell in &plan.cells {
-            let cell = path_cell.cell as usize;
-            let length = path_cell.axial_end - path_cell.axial_start;
-            let ramp = ((a - path_cell.axial_start) / length.max(1e-9)).clamp(0.0, 1.0);
-            let factor = (1.0 - path_cell.fraction * ramp).max(plan.params.residual_stiffness);
-            let old = self.state.stiffness[cell];
-            if factor < old {
-                // Half a step back: the mean of the energies before and after the step, as the leapfrog work has it.
-                let half = 0.5 * self.dt;
-                let mut u = [DVec3::ZERO; 8];
-                for (u, n) in u.iter_mut().zip(self.model.mesh.cell_nodes(cell).iter()) {
-                    *u = self.state.displacement[*n] - self.state.velocity[*n] * half;
-                }
-                let intact = CellStates { points: &self.state.points, stiffness: &[] };
-                let m = self.elements.measure_corners(&self.model, cell, &u, None, intact);
-                // What Prony terms hold is booked with their work, which the softening does not touch.
-                self.sums.softening_dissipation += (old - factor) * (m.elastic - m.held + m.hourglass);
-                self.state.stiffness[cell] = factor;
-            }
-        }
-    }
-
     /// Stage `element_forces`; tetrahedra get their averaged pressure first.
     fn element_forces(&mut self, input: &StepInput) {
         let (model, elements, dt) = (&self.model, &self.elements, self.dt);
@@ -230,150 +137,6 @@ impl CpuEngine {
             })
             .sum();
         self.sums.return_failures += failures;
-    }
-
-    /// Stage `needle_contact`: nodes of the ring that the tip has passed keep `r >= r_e(s)`,
-    /// `r_e = sqrt(r0^2 + rc(s)^2) - overlap fade(s)`, `rc = R min(1, s/Lc)`; friction on the shaft; tip springs.
-    fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
-        let model = self.model.clone();
-        let d = -pose.direction;
-        let k = plan.contact_stiffness;
-        let a = self.state.tip_coordinate;
-        let (radius, cone) = (plan.needle.radius, plan.needle.tip_length);
-        let mut stored = self.tip_energy;
-        let mut tip_on_node: std::collections::HashMap<usize, f64> = Default::default();
-        for (force, nodes, weights) in &self.tip_forces {
-            for (n, w) in nodes.iter().zip(weights) {
-                *tip_on_node.entry(*n).or_default() += force * w;
-            }
-        }
-        for (contact, memory) in model.contact_nodes.iter().zip(&mut self.state.contact) {
-            let node = contact.node as usize;
-            let x = model.mesh.rest_position(node) + self.state.displacement[node];
-            let mut sums = ContactSums::default();
-            if let Some(f) = tip_on_node.get(&node) {
-                sums.tip = pose.direction * *f;
-            }
-            let relative = x - pose.tip;
-            let s = relative.dot(d);
-            if !(contact.pushed && contact.rest_axial < a && s > 0.0) {
-                *memory = ContactState::default();
-            } else {
-                let radial = relative - d * s;
-                let r = radial.length();
-                let e = if r > 1e-9 { radial / r } else { DVec3::ZERO };
-                let (rc, slope) = if s < cone { (radius * s / cone, radius / cone) } else { (radius, 0.0) };
-                let open = (contact.rest_radius.powi(2) + rc * rc).sqrt();
-                if !memory.touching {
-                    memory.touching = true;
-                    memory.overlap = (open - r).max(0.0);
-                    memory.axial_on = s;
-                }
-                let travel = (s - memory.axial_on) / plan.params.entry_fade;
-                let fade = (1.0 - travel).clamp(0.0, 1.0);
-                let target = open - memory.overlap * fade;
-                let fading = if travel > 0.0 && travel < 1.0 { memory.overlap / plan.params.entry_fade } else { 0.0 };
-                let m = rc * slope / open + fading;
-                let scale = 1.0 / (1.0 + m * m).sqrt();
-                let n = (e - d * m) * scale;
-                let depth = (target - r) * scale;
-                let v = self.state.velocity[node] - pose.velocity;
-                let vn = v.dot(n);
-                let mass = model.node_mass[node];
-                let damping = 2.0 * plan.params.contact_damping * (k * mass).sqrt();
-                let normal = if depth > 0.0 { (k * depth - damping * vn).max(0.0) } else { 0.0 };
-                sums.normal = n * normal;
-                if depth > 0.0 {
-                    sums.stored = 0.5 * k * depth * depth;
-                    sums.damping_power = (k * depth - normal) * vn;
-                }
-                memory.stick = match model.effects.friction {
-                    Some(friction) if normal > 0.0 => {
-                        let kt = friction.stiffness_ratio * k;
-                        let mu = friction.coefficient * ((s - cone) / friction.fade_length).clamp(0.0, 1.0);
-                        let trial = memory.stick + (v - n * vn) * self.dt;
-                        let trial = trial - n * trial.dot(n);
-                        let length = trial.length();
-                        let allowed = mu * normal / kt;
-                        let stretch = if length > allowed { trial * (allowed / length) } else { trial };
-                        sums.friction = stretch * -kt;
-                        // Friction force times slip.
-                        sums.friction_work = kt * stretch.dot(trial - stretch);
-                        sums.stored += 0.5 * kt * stretch.length_squared();
-                        stretch
-                    }
-                    _ => DVec3::ZERO,
-                };
-            }
-            let total = sums.tip + sums.normal + sums.friction;
-            sums.torque = relative.cross(total);
-            self.external[node] += total;
-            stored += sums.stored;
-            self.sums.book(&sums, pose, self.dt);
-        }
-        self.contact_energy = stored;
-    }
-
-    /// Stage `indenter_contact`: penalty contact of the top face with a sphere or a flat punch.
-    fn indenter_contact(&mut self, pose: &ToolPose) {
-        let model = self.model.clone();
-        let (Some(params), Some(tool)) = (model.effects.indentation, &model.scene.tool) else { return };
-        let k = model.tool_contact_stiffness();
-        let mut stored = 0.0;
-        for (contact, memory) in model.contact_nodes.iter().zip(&mut self.state.contact) {
-            let node = contact.node as usize;
-            let x = model.mesh.rest_position(node) + self.state.displacement[node];
-            let (depth, n, bonded) = match *tool {
-                Tool::Sphere { radius } => {
-                    let centre = pose.tip - pose.direction * radius;
-                    let to = x - centre;
-                    let length = to.length();
-                    (radius - length, to / length, false)
-                }
-                Tool::FlatPunch { radius, bonded } => {
-                    let s = (pose.tip - x).dot(pose.direction);
-                    let inside = contact.rest_radius <= radius;
-                    (if inside { s } else { -1.0 }, pose.direction, bonded)
-                }
-                Tool::Needle(_) => return,
-            };
-            let v = self.state.velocity[node] - pose.velocity;
-            let vn = v.dot(n);
-            let damping = 2.0 * params.contact_damping * (k * model.node_mass[node]).sqrt();
-            let mut sums = ContactSums::default();
-            if bonded && (memory.touching || depth > 0.0) {
-                memory.touching = true;
-                memory.stick += (v - n * vn) * self.dt;
-                sums.normal = n * (k * depth) - v * damping - memory.stick * k;
-                sums.damping_power = damping * v.length_squared();
-                sums.stored = 0.5 * k * (depth * depth + memory.stick.length_squared());
-            } else if depth > 0.0 {
-                memory.touching = true;
-                let normal = (k * depth - damping * vn).max(0.0);
-                sums.normal = n * normal;
-                sums.damping_power = (k * depth - normal) * vn;
-                sums.stored = 0.5 * k * depth * depth;
-                if let Some(friction) = model.effects.friction {
-                    let kt = friction.stiffness_ratio * k;
-                    let trial = memory.stick + (v - n * vn) * self.dt;
-                    let trial = trial - n * trial.dot(n);
-                    let length = trial.length();
-                    let allowed = friction.coefficient * normal / kt;
-                    memory.stick = if length > allowed { trial * (allowed / length) } else { trial };
-                    sums.friction = memory.stick * -kt;
-                    sums.friction_work = kt * memory.stick.dot(trial - memory.stick);
-                    sums.stored += 0.5 * kt * memory.stick.length_squared();
-                }
-            } else {
-                *memory = ContactState::default();
-            }
-            let total = sums.normal + sums.friction;
-            sums.torque = (x - pose.tip).cross(total);
-            self.external[node] += total;
-            stored += sums.stored;
-            self.sums.book(&sums, pose, self.dt);
-        }
-        self.contact_energy = stored;
     }
 
     /// Stage `integrate_nodes`: `v+ = ((1 - alpha dt/2) v + dt f/m) / (1 + alpha dt/2)`, `u+ = u + dt v+`.

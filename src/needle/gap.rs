@@ -1,0 +1,116 @@
+//! Gap functions of the needle: how deep a point of the tissue lies inside the needle, and the gradient.
+//!
+//! Every contact of the needle is a potential in the needle's frame,
+//! ```text
+//! U = 1/2 k phi^2 where phi > 0,  f = -dU/dx = -k phi grad phi                            [J], [N]
+//! ```
+//! with the exact gradient, so that a contact that is made at phi = 0 gives back what it took: it creates no energy.
+//! A force along another normal than grad phi does not (a bevel with radial normals created half of the needle's work in
+//! the project's trials). Only the direction `grad phi/|grad phi|` is used for damping and friction.
+
+use glam::DVec3;
+
+use super::lateral_axes;
+use crate::scene::{NeedleShape, TipShape};
+
+/// Overlap phi [m] (positive inside the needle) and its gradient with respect to the position of the point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Overlap {
+    pub value: f64,
+    pub gradient: DVec3,
+}
+
+/// The outer surface of a needle in its own frame: `s` runs from the tip to the hub.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Profile {
+    /// Radius R of the shaft and length Lc of the tip [m].
+    pub radius: f64,
+    pub tip_length: f64,
+    /// Shift of the section's centre per radius: zero for a cone; for a bevel the unit vector from the apex to the axis, so
+    /// that all sections touch the line through the apex parallel to the axis.
+    pub shift: DVec3,
+}
+
+impl Profile {
+    /// The profile of a needle that points along `direction`.
+    pub fn new(needle: &NeedleShape, direction: DVec3) -> Self {
+        let shift = match needle.tip {
+            TipShape::Cone => DVec3::ZERO,
+            TipShape::Bevel { heading } => {
+                let (e1, e2) = lateral_axes(direction);
+                -(e1 * heading.cos() + e2 * heading.sin())
+            }
+        };
+        Profile { radius: needle.radius, tip_length: needle.tip_length, shift }
+    }
+
+    /// Radius of the section at `s` behind the tip, and its slope d rc/ds.
+    pub fn section(&self, s: f64) -> (f64, f64) {
+        if s < self.tip_length {
+            (self.radius * s / self.tip_length, self.radius / self.tip_length)
+        } else {
+            (self.radius, 0.0)
+        }
+    }
+
+    /// Overlap of a point whose material lay `rest_radius` from the line of the tip, with the opened path:
+    /// ```text
+    /// phi = sqrt(r0^2 + rc^2) - less(s) - r,  r = |x - tip - s d - c(s)|,  c = shift rc(s)
+    /// grad phi = m d - e,  m = rc rc'/sqrt(r0^2 + rc^2) - less'(s) + rc' e.shift,  e: radial unit vector
+    /// ```
+    /// `lever`: from the tip to the point [m]; `d`: unit vector from the tip to the hub; `less`: value [m] and slope of what
+    /// is taken off the radius.
+    pub fn opened_path(&self, lever: DVec3, d: DVec3, rest_radius: f64, less: (f64, f64)) -> Overlap {
+        let s = lever.dot(d);
+        let (rc, slope) = self.section(s);
+        let radial = lever - d * s - self.shift * rc;
+        let r = radial.length();
+        let e = if r > 1e-9 { radial / r } else { DVec3::ZERO };
+        let open = rest_radius.hypot(rc);
+        let m = rc * slope / open - less.1 + slope * e.dot(self.shift);
+        Overlap { value: open - less.0 - r, gradient: d * m - e }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The gradient is the derivative of the value, for cone and bevel, on tip and shaft.
+    #[test]
+    fn gradients_are_derivatives() {
+        let direction = DVec3::new(0.3, -0.2, -0.9).normalize();
+        let d = -direction;
+        for tip in [TipShape::Cone, TipShape::Bevel { heading: 0.7 }] {
+            let needle = NeedleShape { tip, ..NeedleShape::cone("test", 0.8e-3, 2.5e-3) };
+            let profile = Profile::new(&needle, direction);
+            for i in 0..40 {
+                let t = f64::from(i);
+                let lever = d * (0.1e-3 + 0.1e-3 * t) + DVec3::new(t.sin(), (1.3 * t).cos(), (2.1 * t).sin()) * 0.6e-3;
+                // The overlap at activation fades with s.
+                let phi = |x: DVec3| profile.opened_path(x, d, 0.9e-3, (0.1e-3 - 0.02 * x.dot(d), -0.02));
+                let h = 1e-9;
+                for axis in DVec3::AXES {
+                    let rate = (phi(lever + axis * h).value - phi(lever - axis * h).value) / (2.0 * h);
+                    let exact = phi(lever).gradient.dot(axis);
+                    assert!((rate - exact).abs() < 1e-5, "{tip:?}, point {i}: {rate} against {exact}");
+                }
+            }
+        }
+    }
+
+    /// Behind the tip a bevel is the shaft itself, one radius beside the line of its apex.
+    #[test]
+    fn a_bevel_runs_on_along_its_apex() {
+        let needle = NeedleShape { tip: TipShape::Bevel { heading: 0.0 }, ..NeedleShape::cone("test", 1e-3, 3e-3) };
+        let profile = Profile::new(&needle, DVec3::NEG_Z);
+        let overlap = |x: f64, s: f64| profile.opened_path(DVec3::new(x, 0.0, s), DVec3::Z, 0.0, (0.0, 0.0)).value;
+        for s in [0.5e-3, 1.5e-3, 2.9e-3, 5e-3] {
+            // Apex side: flush with the line of the tip; other side: the slope of the bevel.
+            assert!(overlap(0.0, s).abs() < 1e-15, "{}", overlap(0.0, s));
+            let width = 2e-3 * (s / 3e-3).min(1.0);
+            assert!(overlap(-width, s).abs() < 1e-15);
+            assert!(overlap(-0.5 * width, s) > 0.0 && overlap(1e-5, s) < 0.0);
+        }
+    }
+}
