@@ -1,4 +1,7 @@
-//! Motion of the rigid tool on the CPU, and the geometry of a planned path.
+//! Motion of the tool on the CPU, the flexible needle ([`beam`]), and the geometry of a planned path.
+
+pub mod banded;
+pub mod beam;
 
 pub mod gap;
 
