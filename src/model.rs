@@ -5,8 +5,10 @@ use glam::DVec3;
 use crate::effects::{EffectSet, puncture};
 use crate::material_point::Material;
 use crate::mesh::{BlockMesh, Mesh};
+use crate::needle::free_path::FreeTip;
 use crate::needle::gap::Profile;
 use crate::needle::{Kinematics, PlannedPath, lateral_axes};
+use crate::scene::motion::Placement;
 use crate::scene::{Cutting, Face, FaceCondition, NeedleShape, RegionShape, Scene, TissueMaterial, Tool};
 
 /// A node that the tool may touch.
@@ -80,7 +82,47 @@ pub struct PuncturePlan {
     pub cells: Vec<PathCell>,
     /// Contact stiffness k [N/m].
     pub contact_stiffness: f64,
+    /// The path is not planned but found while the tip moves.
+    pub free: Option<FreePlan>,
 }
+
+/// What a free path needs instead of a planned one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreePlan {
+    /// Box of the cells that the tip may open: first cell and number of cells along each axis.
+    pub low: [usize; 3],
+    pub count: [usize; 3],
+    /// Tip forces of each material.
+    pub cuttings: Vec<Cutting>,
+}
+
+impl FreePlan {
+    pub fn cell_count(&self) -> usize {
+        self.count.iter().product()
+    }
+
+    /// Grid coordinates of the cell number `index` of the box.
+    pub fn cell(&self, index: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.count;
+        let part = [index % nx, index / nx % ny, index / (nx * ny)];
+        std::array::from_fn(|a| self.low[a] + part[a])
+    }
+
+    /// Number of a cell in the box; `None` outside it.
+    pub fn index(&self, cell: [usize; 3]) -> Option<usize> {
+        let inside = (0..3).all(|a| (self.low[a]..self.low[a] + self.count[a]).contains(&cell[a]));
+        let [i, j, k]: [usize; 3] = std::array::from_fn(|a| cell[a].wrapping_sub(self.low[a]));
+        inside.then(|| (k * self.count[1] + j) * self.count[0] + i)
+    }
+}
+
+/// True where the path of the needle is found while the tip moves, false where it is planned: the one place that decides.
+pub fn has_free_path(scene: &Scene) -> bool {
+    scene.effects.puncture.is_some_and(|p| p.always_free) || scene.motion.is_free()
+}
+
+/// Room around the planned motion for the nodes and cells of a free path: tissue moves before the tip comes [m].
+const FREE_PATH_ROOM: f64 = 1.0e-3;
 
 /// Everything constant.
 #[derive(Debug, Clone)]
@@ -203,6 +245,10 @@ impl Model {
             return;
         };
         let needle = needle.clone();
+        if has_free_path(&self.scene) {
+            self.plan_free_path(params, needle);
+            return;
+        }
         let path = PlannedPath { entry: self.scene.motion.entry, direction: self.scene.motion.direction };
         let deepest = self.scene.motion.deepest();
         let Some(mesh) = self.mesh.as_block() else { return };
@@ -231,6 +277,56 @@ impl Model {
             profile: Profile::new(&needle, path.direction),
             needle,
             path,
+            free: None,
+        });
+    }
+
+    /// Nodes and cells that the needle can reach on a free path, generously.
+    fn plan_free_path(&mut self, params: puncture::Params, needle: NeedleShape) {
+        let Some(mesh) = self.mesh.as_block() else { return };
+        let motion = &self.scene.motion;
+        // The needle's axis inside the block, again and again along the motion.
+        let inside = |p: Placement| {
+            let surface = p.tip - p.direction * p.depth;
+            (surface, if p.depth > 0.0 { p.tip } else { surface })
+        };
+        let axes: Vec<(DVec3, DVec3)> =
+            motion.samples(0.25e-3).into_iter().filter(|p| p.depth > -FREE_PATH_ROOM).map(inside).collect();
+        let near = |x: DVec3, reach: f64| axes.iter().any(|(a, b)| distance_to_segment(x, *a, *b) < reach);
+        let h = self.scene.tissue.cell_size;
+        let reach = params.ring_radius.max(needle.radius + 1.5 * h) + FREE_PATH_ROOM;
+        self.contact_nodes = (0..mesh.node_count())
+            .filter(|&node| near(mesh.rest_position(node), reach))
+            .map(|node| ContactNode { node: node as u32, rest_radius: 0.0, rest_axial: 0.0, pushed: true })
+            .collect();
+        let opened = (0..mesh.cell_count()).filter(|&cell| {
+            let size = mesh.cell_size(cell);
+            let centre = mesh.rest_position(mesh.cell_nodes(cell)[0]) + 0.5 * size;
+            near(centre, params.softened_radius + FREE_PATH_ROOM + 0.5 * size.length())
+        });
+        let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
+        for cell in opened {
+            let at = mesh.cell_coordinates(cell);
+            for a in 0..3 {
+                low[a] = low[a].min(at[a]);
+                high[a] = high[a].max(at[a] + 1);
+            }
+        }
+        let count = std::array::from_fn(|a| high[a].saturating_sub(low[a]));
+        let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
+        let cutting = |m: &TissueMaterial| m.cutting.unwrap_or(own);
+        let cuttings = std::iter::once(&self.scene.material).chain(self.scene.regions.iter().map(|r| &r.material));
+        let path = PlannedPath { entry: motion.entry, direction: motion.direction };
+        self.puncture = Some(PuncturePlan {
+            free: Some(FreePlan { low, count, cuttings: cuttings.map(cutting).collect() }),
+            segments: vec![PathSegment { start: 0.0, cutting: cutting(&self.scene.material) }],
+            anchors: Vec::new(),
+            cells: Vec::new(),
+            contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
+            profile: Profile::new(&needle, motion.direction),
+            params,
+            needle,
+            path,
         });
     }
 
@@ -255,6 +351,20 @@ impl Model {
                 })
             })
             .collect();
+    }
+
+    /// The tip before the run, where the path is free.
+    pub fn free_tip(&self) -> FreeTip {
+        let motion = &self.scene.motion;
+        match self.puncture.as_ref().filter(|p| p.free.is_some()) {
+            Some(_) => FreeTip {
+                place: motion.entry,
+                along: motion.direction,
+                across: lateral_axes(motion.direction).0,
+                ..FreeTip::default()
+            },
+            None => FreeTip::default(),
+        }
     }
 
     /// Contact stiffness of the tool [N/m].
@@ -301,6 +411,13 @@ impl Model {
         centre[face.axis()] = if face.is_max() { high } else { low }[face.axis()];
         centre
     }
+}
+
+fn distance_to_segment(x: DVec3, a: DVec3, b: DVec3) -> f64 {
+    let along = b - a;
+    let square = along.length_squared();
+    let part = if square > 0.0 { ((x - a).dot(along) / square).clamp(0.0, 1.0) } else { 0.0 };
+    x.distance(a + along * part)
 }
 
 /// A material with the effects that are on; what it does not state itself comes from the scene's tables.

@@ -1,4 +1,7 @@
 // Puncture: state and pure functions of the tip law and of the opened path. Equations: src/effects/puncture.rs.
+#ifdef FREE_PATH
+#import effects/free_path
+#endif
 struct PunctureParams {
     // Length over which the threshold of the tip force falls behind the entry of a material [m].
     transition_length: f32,
@@ -16,11 +19,18 @@ struct PunctureParams {
     // Nodes farther than this from the tip coordinate along the path are on no cell that holds an anchor [m].
     anchor_reach: f32,
     path_cell_count: u32,
-    _pad0: u32,
-    _pad1: u32,
+    // Radius of the softened path, and of the nodes around it that the shaft pushes [m].
+    softened_radius: f32,
+    ring_radius: f32,
     // Shift of a section's centre per radius: zero for a cone, from the apex to the axis for a bevel; w unused.
     shift: vec4<f32>,
-    // Stretches of the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], unused.
+    // Of a free path: direction of the needle before the run, to which `shift` belongs; first cell and cells per axis of
+    // the box of `free_cells`; w unused.
+    reference: vec4<f32>,
+    free_low: vec4<u32>,
+    free_count: vec4<u32>,
+    // Of a free path: of material number i only F_pun and F_cut [N], second and third. Of a planned path: stretches of
+    // the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], unused.
     segments: array<vec4<f32>, 16>,
 }
 
@@ -95,7 +105,10 @@ fn opened_path(lever: vec3<f32>, d: vec3<f32>, s: f32, rest_radius: f32, less: v
     let full_slope = puncture.needle_radius / puncture.tip_length;
     let rc = select(puncture.needle_radius, full_slope * s, on_tip);
     let slope = select(0.0, full_slope, on_tip);
-    let shift = puncture.shift.xyz;
+    var shift = puncture.shift.xyz;
+#ifdef FREE_PATH
+    shift = swing(puncture.reference.xyz, -d, shift);
+#endif
     let radial = lever - d * s - shift * rc;
     let r = length(radial);
     let e = radial * select(0.0, 1.0 / r, r > 1e-9);

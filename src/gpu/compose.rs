@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 pub const SOURCES: &[(&str, &str)] = &[
     ("effects/damage", include_str!("../../shaders/effects/damage.wgsl")),
     ("effects/fibres", include_str!("../../shaders/effects/fibres.wgsl")),
+    ("effects/free_path", include_str!("../../shaders/effects/free_path.wgsl")),
     ("effects/friction", include_str!("../../shaders/effects/friction.wgsl")),
     ("effects/gravity", include_str!("../../shaders/effects/gravity.wgsl")),
     ("effects/indentation", include_str!("../../shaders/effects/indentation.wgsl")),
@@ -52,6 +53,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/symmetric_eigen", include_str!("../../shaders/shared/symmetric_eigen.wgsl")),
     ("shared/tetrahedron", include_str!("../../shaders/shared/tetrahedron.wgsl")),
     ("shared/thread_index", include_str!("../../shaders/shared/thread_index.wgsl")),
+    ("stages/advance_free_tip", include_str!("../../shaders/stages/advance_free_tip.wgsl")),
     ("stages/advance_tip", include_str!("../../shaders/stages/advance_tip.wgsl")),
     ("stages/average_pressure", include_str!("../../shaders/stages/average_pressure.wgsl")),
     ("stages/element_forces", include_str!("../../shaders/stages/element_forces.wgsl")),
@@ -63,12 +65,14 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("stages/measure_faces", include_str!("../../shaders/stages/measure_faces.wgsl")),
     ("stages/measure_nodes", include_str!("../../shaders/stages/measure_nodes.wgsl")),
     ("stages/needle_contact", include_str!("../../shaders/stages/needle_contact.wgsl")),
+    ("stages/soften_free_path", include_str!("../../shaders/stages/soften_free_path.wgsl")),
     ("stages/soften_path", include_str!("../../shaders/stages/soften_path.wgsl")),
     ("stages/tetrahedron_forces", include_str!("../../shaders/stages/tetrahedron_forces.wgsl")),
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 15] = [
+pub const SCENE_DEFINES: [&str; 16] = [
+    "FREE_PATH",
     "STEP_INPUT",
     "LOADED_FACES",
     "DRIVEN_FACES",

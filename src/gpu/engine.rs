@@ -16,7 +16,8 @@ use crate::effects::EffectSet;
 use crate::error::{Error, Result};
 use crate::material::Isochoric;
 use crate::material_point::{Material as Constants, PointState};
-use crate::model::{ANCHOR_COUNT, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model};
+use crate::model::{ANCHOR_COUNT, FreePlan, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model};
+use crate::needle::free_path as needle;
 use crate::scene::Tool;
 use crate::solver::elements::HOURGLASS_MODULUS;
 use crate::solver::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State};
@@ -46,6 +47,8 @@ pub struct Features {
     pub regions: bool,
     /// Tetrahedra instead of the block.
     pub tetrahedra: bool,
+    /// The path of the needle is found while the tip moves.
+    pub free_path: bool,
     /// Keys of the elastic laws that occur.
     pub laws: BTreeSet<&'static str>,
 }
@@ -57,6 +60,7 @@ impl Features {
             driven_faces: model.has_driven_faces(),
             regions: !model.cell_material.is_empty(),
             tetrahedra: model.mesh.as_tets().is_some(),
+            free_path: model.puncture.as_ref().is_some_and(|p| p.free.is_some()),
             laws: model.materials.iter().map(|m| m.law.isochoric.key()).collect(),
         }
     }
@@ -90,6 +94,7 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     define("NODE_WORK", loaded || driven);
     define("REGIONS", features.regions);
     define("TETRAHEDRA", features.tetrahedra);
+    define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
     // The bulk stiffness of a cell is not that of all others.
     define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || effects.damage.is_some()));
     define("HISTORY", effects.plasticity.is_some() || effects.viscoelastic.is_some() || effects.damage.is_some());
@@ -107,7 +112,9 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     let puncture = block && effects.puncture.is_some();
     let indentation = block && effects.indentation.is_some();
     let wanted = |stage: &Stage| match stage {
-        Stage::AdvanceTip | Stage::SoftenPath | Stage::NeedleContact => puncture,
+        Stage::AdvanceTip | Stage::SoftenPath => puncture && !features.free_path,
+        Stage::AdvanceFreeTip | Stage::SoftenFreePath => puncture && features.free_path,
+        Stage::NeedleContact => puncture,
         Stage::IndenterContact => indentation,
         Stage::MeasureContact => puncture || indentation,
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
@@ -470,7 +477,8 @@ fn measure_threads(model: &Model) -> u32 {
 /// Threads that a stage needs.
 fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -> u32 {
     match stage {
-        Stage::AdvanceTip => 32,
+        Stage::AdvanceTip | Stage::AdvanceFreeTip => 32,
+        Stage::SoftenFreePath => free_plan(model).map_or(1, |f| f.cell_count() as u32),
         Stage::SoftenPath => model.puncture.as_ref().map_or(1, |p| p.cells.len() as u32),
         Stage::MeasureDilatation | Stage::TetrahedronForces => model.mesh.cell_count() as u32,
         Stage::AveragePressure => model.mesh.node_count() as u32,
@@ -484,7 +492,7 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 45] = [
+const BUFFERS: [&str; 47] = [
     "params",
     STEP_INPUT,
     "gravity",
@@ -508,6 +516,8 @@ const BUFFERS: [&str; 45] = [
     "cell_stiffness",
     "tip_state",
     "tip_anchor_loads",
+    "free_tip",
+    "free_cells",
     "contact_memory",
     "contact_sums",
     "face_sums",
@@ -625,6 +635,8 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "node_sums" => zeros(measure_threads.into(), size_of::<NodeSums>()),
         "cell_stiffness" => bytes_of(&vec![1.0f32; model.mesh.cell_count()]),
         "tip_state" | "tip_result" => zeros(1, size_of::<TipState>()),
+        "free_tip" => bytes_of(&[free_tip(&model.free_tip())]),
+        "free_cells" => bytes_of(&free_cells(model, &[])),
         "tip_anchor_loads" => zeros(ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
         "contact_memory" => zeros(contacts, size_of::<ContactMemory>()),
         "contact_sums" => zeros(contacts, size_of::<ContactSums>()),
@@ -857,7 +869,25 @@ fn puncture_params(model: &Model) -> PunctureParams {
             *out = [s.start as f32, c.puncture_force as f32, c.cutting_force as f32, 0.0];
         }
         let tallest = model.mesh.block().lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-        let anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
+        let mut anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
+        let (mut free_low, mut free_count, mut path_cell_count) = ([0; 4], [0; 4], plan.cells.len());
+        if let Some(free) = &plan.free {
+            let mesh = model.mesh.block();
+            let diagonal = |index: usize| {
+                let [i, j, k] = free.cell(index);
+                mesh.cell_size(mesh.cell_index(i, j, k)).length()
+            };
+            // An anchor acts on the corners of its cell.
+            anchor_reach = 1.001 * (plan.needle.radius + (0..free.cell_count()).map(diagonal).fold(0.0, f64::max));
+            for (out, value) in free_low.iter_mut().zip(free.low).chain(free_count.iter_mut().zip(free.count)) {
+                *out = value as u32;
+            }
+            for (out, i) in segments.iter_mut().zip(0..) {
+                let c = free.cuttings.get(i).unwrap_or(&free.cuttings[0]);
+                *out = [0.0, c.puncture_force as f32, c.cutting_force as f32, 0.0];
+            }
+            path_cell_count = free.cell_count();
+        }
         PunctureParams {
             transition_length: p.transition_length as f32,
             tip_stiffness: p.tip_stiffness as f32,
@@ -868,12 +898,55 @@ fn puncture_params(model: &Model) -> PunctureParams {
             needle_radius: plan.needle.radius as f32,
             tip_length: plan.needle.tip_length as f32,
             anchor_reach: anchor_reach as f32,
-            path_cell_count: plan.cells.len() as u32,
+            path_cell_count: path_cell_count as u32,
+            softened_radius: p.softened_radius as f32,
+            ring_radius: p.ring_radius as f32,
             shift: vec4(plan.profile.shift),
+            reference: vec4(plan.path.direction),
+            free_low,
+            free_count,
             segments,
-            ..Zeroable::zeroed()
         }
     })
+}
+
+fn free_plan(model: &Model) -> Option<&FreePlan> {
+    model.puncture.as_ref().and_then(|p| p.free.as_ref())
+}
+
+fn free_tip(tip: &needle::FreeTip) -> FreeTip {
+    FreeTip {
+        place: vec4(tip.place),
+        along: vec4(tip.along),
+        across: vec4(tip.across),
+        coordinate: tip.coordinate as f32,
+        entry: tip.entry as f32,
+        advance: tip.advance as f32,
+        inside: if tip.inside { 1.0 } else { 0.0 },
+        material: tip.material as u32,
+        ..Zeroable::zeroed()
+    }
+}
+
+/// The cells of the box of a free path with their marked samples; without any where `samples` is empty.
+fn free_cells(model: &Model, samples: &[u64]) -> Vec<FreeCell> {
+    let (Some(free), Some(mesh)) = (free_plan(model), model.mesh.as_block()) else { return Vec::new() };
+    (0..free.cell_count())
+        .map(|index| {
+            let [i, j, k] = free.cell(index);
+            let cell = mesh.cell_index(i, j, k);
+            let marked = samples.get(index).copied().unwrap_or(0);
+            FreeCell {
+                low: vec4(DVec3::new(mesh.lines[0][i], mesh.lines[1][j], mesh.lines[2][k])),
+                size: vec4(mesh.cell_size(cell)),
+                cell: cell as u32,
+                material: model.material_index(cell) as u32,
+                marked_low: marked as u32,
+                marked_high: (marked >> 32) as u32,
+                ..Zeroable::zeroed()
+            }
+        })
+        .collect()
 }
 
 fn indentation_params(model: &Model) -> IndentationParams {
@@ -938,9 +1011,11 @@ fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) ->
         ..StepInput::zeroed()
     };
     if let Some(pose) = input.pose {
-        out.tip = vec4(pose.tip);
-        out.velocity = vec4(pose.velocity);
-        out.direction = vec4(pose.direction);
+        let with = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
+        let spin = pose.angular_velocity;
+        out.tip = with(pose.tip, spin.x);
+        out.velocity = with(pose.velocity, spin.y);
+        out.direction = with(pose.direction, spin.z);
         out.depth = pose.depth as f32;
     }
     for (out, drive) in out.drives.iter_mut().zip(&input.drives) {
@@ -1011,8 +1086,16 @@ impl Engine for GpuEngine {
     }
 
     fn read_state(&mut self) -> Result<State> {
-        const OPTIONAL: [&str; 6] =
-            ["cell_stiffness", "tip_state", "contact_memory", "plastic_state", "viscous_state", "point_history"];
+        const OPTIONAL: [&str; 8] = [
+            "cell_stiffness",
+            "tip_state",
+            "free_tip",
+            "free_cells",
+            "contact_memory",
+            "plastic_state",
+            "viscous_state",
+            "point_history",
+        ];
         let names: Vec<&'static str> = ["node_displacement", "node_velocity"]
             .into_iter()
             .chain(OPTIONAL.into_iter().filter(|name| self.buffers.contains_key(name)))
@@ -1035,6 +1118,25 @@ impl Engine for GpuEngine {
                 "tip_state" => {
                     state.tip_coordinate = read_all::<TipState>(bytes).next().map_or(0.0, |t| t.coordinate.into());
                 }
+                "free_tip" => {
+                    for t in read_all::<FreeTip>(bytes) {
+                        state.tip_coordinate = t.coordinate.into();
+                        state.tip = needle::FreeTip {
+                            place: vector(t.place),
+                            along: vector(t.along),
+                            across: vector(t.across),
+                            coordinate: t.coordinate.into(),
+                            entry: t.entry.into(),
+                            advance: t.advance.into(),
+                            material: t.material as usize,
+                            inside: t.inside != 0.0,
+                        };
+                    }
+                }
+                "free_cells" => {
+                    let marked = |c: FreeCell| u64::from(c.marked_low) | u64::from(c.marked_high) << 32;
+                    state.cut_samples = read_all::<FreeCell>(bytes).map(marked).collect();
+                }
                 "contact_memory" => {
                     state.contact = read_all::<ContactMemory>(bytes)
                         .map(|m| ContactState {
@@ -1042,6 +1144,8 @@ impl Engine for GpuEngine {
                             overlap: m.overlap.into(),
                             axial_on: m.axial_on.into(),
                             touching: m.touching != 0.0,
+                            rest_radius: m.rest_radius.into(),
+                            passed: m.passed != 0.0,
                         })
                         .collect();
                 }
@@ -1088,6 +1192,8 @@ impl Engine for GpuEngine {
         write("cell_stiffness", bytemuck::cast_slice(&stiffness));
         let tip = TipState { coordinate: state.tip_coordinate as f32, ..TipState::zeroed() };
         write("tip_state", bytemuck::bytes_of(&tip));
+        write("free_tip", bytemuck::bytes_of(&free_tip(&state.tip)));
+        write("free_cells", bytemuck::cast_slice(&free_cells(&self.model, &state.cut_samples)));
         let memory: Vec<ContactMemory> = state
             .contact
             .iter()
@@ -1096,7 +1202,9 @@ impl Engine for GpuEngine {
                 overlap: c.overlap as f32,
                 axial_on: c.axial_on as f32,
                 touching: if c.touching { 1.0 } else { 0.0 },
-                _pad: 0.0,
+                passed: if c.passed { 1.0 } else { 0.0 },
+                rest_radius: c.rest_radius as f32,
+                ..Zeroable::zeroed()
             })
             .collect();
         write("contact_memory", bytemuck::cast_slice(&memory));

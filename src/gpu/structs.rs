@@ -175,9 +175,12 @@ shared_structs! {
         tip_length: f32,
         anchor_reach: f32,
         path_cell_count: u32,
-        _pad0: u32,
-        _pad1: u32,
+        softened_radius: f32,
+        ring_radius: f32,
         shift: [f32; 4],
+        reference: [f32; 4],
+        free_low: [u32; 4],
+        free_count: [u32; 4],
         segments: [[f32; 4]; 16],
     }
     /// shaders/effects/puncture.wgsl
@@ -210,6 +213,34 @@ shared_structs! {
         material: u32,
         _pad0: u32,
         _pad1: u32,
+    }
+    /// shaders/effects/free_path.wgsl
+    struct FreeTip {
+        place: [f32; 4],
+        along: [f32; 4],
+        across: [f32; 4],
+        sway: [f32; 4],
+        coordinate: f32,
+        entry: f32,
+        advance: f32,
+        inside: f32,
+        material: u32,
+        dissipation: f32,
+        spring_energy: f32,
+        _pad: f32,
+    }
+    /// shaders/effects/free_path.wgsl
+    struct FreeCell {
+        low: [f32; 4],
+        size: [f32; 4],
+        cell: u32,
+        material: u32,
+        marked_low: u32,
+        marked_high: u32,
+        dissipation: f32,
+        _pad0: f32,
+        _pad1: f32,
+        _pad2: f32,
     }
     /// shaders/effects/friction.wgsl
     struct FrictionParams {
@@ -248,7 +279,11 @@ shared_structs! {
         overlap: f32,
         axial_on: f32,
         touching: f32,
-        _pad: f32,
+        passed: f32,
+        rest_radius: f32,
+        _pad0: f32,
+        _pad1: f32,
+        _pad2: f32,
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactSums {

@@ -133,15 +133,15 @@ impl BlockMesh {
                 ],
             };
         };
-        let end = motion.deepest_point();
+        let (low, high) = motion.reach();
         let lateral = |axis: usize| {
             let entry = motion.entry[axis];
-            let zone = [entry.min(end[axis]) - tissue.fine_radius, entry.max(end[axis]) + tissue.fine_radius];
+            let zone = [low[axis] - tissue.fine_radius, high[axis] + tissue.fine_radius];
             let anchor = entry - tissue.axis_offset_cells[axis] * h;
             graded_lines([-half[axis], half[axis]], zone, anchor, h, tissue.growth)
         };
         BlockMesh {
-            lines: [lateral(0), lateral(1), depth_lines(tissue.size.z, -end.z + FINE_BELOW_PATH, h, tissue.growth)],
+            lines: [lateral(0), lateral(1), depth_lines(tissue.size.z, -low.z + FINE_BELOW_PATH, h, tissue.growth)],
         }
     }
 }
