@@ -6,9 +6,11 @@ use glam::DVec3;
 
 use crate::effects::{EffectSet, cohesive, puncture};
 use crate::material_point::Material;
-use crate::mesh::{BlockMesh, Mesh};
+use crate::mesh::{BlockMesh, Bore, Mesh};
+use crate::needle::free_path::FreeTip;
 use crate::needle::gap::Profile;
 use crate::needle::{Kinematics, PlannedPath, lateral_axes};
+use crate::scene::motion::Placement;
 use crate::scene::{Cutting, Face, FaceCondition, NeedleShape, RegionShape, Scene, TissueMaterial, Tool};
 use crate::separation::{Cut, FacePair, Separation};
 
@@ -99,7 +101,47 @@ pub struct PuncturePlan {
     pub cells: Vec<PathCell>,
     /// Contact stiffness k [N/m].
     pub contact_stiffness: f64,
+    /// The path is not planned but found while the tip moves.
+    pub free: Option<FreePlan>,
 }
+
+/// What a free path needs instead of a planned one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreePlan {
+    /// Box of the cells that the tip may open: first cell and number of cells along each axis.
+    pub low: [usize; 3],
+    pub count: [usize; 3],
+    /// Tip forces of each material.
+    pub cuttings: Vec<Cutting>,
+}
+
+impl FreePlan {
+    pub fn cell_count(&self) -> usize {
+        self.count.iter().product()
+    }
+
+    /// Grid coordinates of the cell number `index` of the box.
+    pub fn cell(&self, index: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.count;
+        let part = [index % nx, index / nx % ny, index / (nx * ny)];
+        std::array::from_fn(|a| self.low[a] + part[a])
+    }
+
+    /// Number of a cell in the box; `None` outside it.
+    pub fn index(&self, cell: [usize; 3]) -> Option<usize> {
+        let inside = (0..3).all(|a| (self.low[a]..self.low[a] + self.count[a]).contains(&cell[a]));
+        let [i, j, k]: [usize; 3] = std::array::from_fn(|a| cell[a].wrapping_sub(self.low[a]));
+        inside.then(|| (k * self.count[1] + j) * self.count[0] + i)
+    }
+}
+
+/// True where the path of the needle is found while the tip moves, false where it is planned: the one place that decides.
+pub fn has_free_path(scene: &Scene) -> bool {
+    scene.effects.puncture.is_some_and(|p| p.always_free) || scene.motion.is_free()
+}
+
+/// Room around the planned motion for the nodes and cells of a free path: tissue moves before the tip comes [m].
+const FREE_PATH_ROOM: f64 = 1.0e-3;
 
 /// Everything constant.
 #[derive(Debug, Clone)]
@@ -131,6 +173,9 @@ pub struct Model {
 
 /// Reference length of the contact stiffness [m].
 const CONTACT_LENGTH: f64 = 0.6e-3;
+
+/// Number of tip springs of a solid needle on a path without a slit: one on the axis, 6 at R/2, 12 at R.
+pub const ANCHOR_COUNT: usize = 19;
 
 /// Most tip springs: those of a cutting ring.
 pub const LARGEST_ANCHOR_COUNT: usize = 24;
@@ -233,7 +278,7 @@ impl Model {
     /// The planned path, if the tool is a needle that cuts.
     fn planned_path(&self) -> Option<PlannedPath> {
         let motion = &self.scene.motion;
-        let cuts = self.effects.puncture.is_some() && self.scene.needle().is_some();
+        let cuts = self.effects.puncture.is_some() && self.scene.needle().is_some() && !has_free_path(&self.scene);
         cuts.then_some(PlannedPath { entry: motion.entry, direction: motion.direction })
     }
 
@@ -257,13 +302,18 @@ impl Model {
             return;
         };
         let needle = needle.clone();
+        if has_free_path(&self.scene) {
+            self.plan_free_path(params, needle);
+            return;
+        }
         let path = PlannedPath { entry: self.scene.motion.entry, direction: self.scene.motion.direction };
         let deepest = self.scene.motion.deepest();
         let Some(mesh) = self.mesh.as_block() else { return };
-        // Faces that separate need no softened path.
-        let cells = match self.cohesion {
-            Some(_) => Vec::new(),
-            None => path_cells(mesh, &path, params.softened_radius, deepest),
+        // Faces that separate need no softened path; the core of a hollow needle is severed cell by cell.
+        let cells = match (&self.cohesion, mesh.bore) {
+            (Some(_), Some(bore)) => core_cells(mesh, &bore, deepest),
+            (Some(_), None) => Vec::new(),
+            (None, _) => path_cells(mesh, &path, params.softened_radius, deepest),
         };
         let surfaces = self.separated_surfaces(&path);
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the needle radius.
@@ -294,6 +344,62 @@ impl Model {
             profile: Profile::new(&needle, path.direction),
             needle,
             path,
+            free: None,
+        });
+    }
+
+    /// Nodes and cells that the needle can reach on a free path, generously.
+    fn plan_free_path(&mut self, params: puncture::Params, needle: NeedleShape) {
+        let Some(mesh) = self.mesh.as_block() else { return };
+        let motion = &self.scene.motion;
+        // The needle's axis inside the block, again and again along the motion.
+        let inside = |p: Placement| {
+            let surface = p.tip - p.direction * p.depth;
+            (surface, if p.depth > 0.0 { p.tip } else { surface })
+        };
+        let axes: Vec<(DVec3, DVec3)> =
+            motion.samples(0.25e-3).into_iter().filter(|p| p.depth > -FREE_PATH_ROOM).map(inside).collect();
+        let near = |x: DVec3, reach: f64| axes.iter().any(|(a, b)| distance_to_segment(x, *a, *b) < reach);
+        let h = self.scene.tissue.cell_size;
+        let reach = params.ring_radius.max(needle.radius + 1.5 * h) + FREE_PATH_ROOM;
+        self.contact_nodes = (0..mesh.node_count())
+            .filter(|&node| near(mesh.rest_position(node), reach))
+            .map(|node| ContactNode {
+                node: node as u32,
+                rest_radius: 0.0,
+                rest_axial: 0.0,
+                pushed: true,
+                surface: ContactSurface::OpenedPath,
+            })
+            .collect();
+        let opened = (0..mesh.cell_count()).filter(|&cell| {
+            let size = mesh.cell_size(cell);
+            let centre = mesh.rest_position(mesh.cell_nodes(cell)[0]) + 0.5 * size;
+            near(centre, params.softened_radius + FREE_PATH_ROOM + 0.5 * size.length())
+        });
+        let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
+        for cell in opened {
+            let at = mesh.cell_coordinates(cell);
+            for a in 0..3 {
+                low[a] = low[a].min(at[a]);
+                high[a] = high[a].max(at[a] + 1);
+            }
+        }
+        let count = std::array::from_fn(|a| high[a].saturating_sub(low[a]));
+        let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
+        let cutting = |m: &TissueMaterial| m.cutting.unwrap_or(own);
+        let cuttings = std::iter::once(&self.scene.material).chain(self.scene.regions.iter().map(|r| &r.material));
+        let path = PlannedPath { entry: motion.entry, direction: motion.direction };
+        self.puncture = Some(PuncturePlan {
+            free: Some(FreePlan { low, count, cuttings: cuttings.map(cutting).collect() }),
+            segments: vec![PathSegment { start: 0.0, cutting: cutting(&self.scene.material) }],
+            anchors: Vec::new(),
+            cells: Vec::new(),
+            contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
+            profile: Profile::new(&needle, motion.direction),
+            params,
+            needle,
+            path,
         });
     }
 
@@ -317,6 +423,11 @@ impl Model {
                 })
             })
             .collect()
+    }
+
+    /// True where a node is held against a surface of this kind.
+    pub fn has_surface(&self, wanted: impl Fn(&ContactSurface) -> bool) -> bool {
+        self.contact_nodes.iter().any(|c| wanted(&c.surface))
     }
 
     /// True for the pairs of the slit, driven or not.
@@ -346,6 +457,20 @@ impl Model {
                 })
             })
             .collect();
+    }
+
+    /// The tip before the run, where the path is free.
+    pub fn free_tip(&self) -> FreeTip {
+        let motion = &self.scene.motion;
+        match self.puncture.as_ref().filter(|p| p.free.is_some()) {
+            Some(_) => FreeTip {
+                place: motion.entry,
+                along: motion.direction,
+                across: lateral_axes(motion.direction).0,
+                ..FreeTip::default()
+            },
+            None => FreeTip::default(),
+        }
     }
 
     /// Contact stiffness of the tool [N/m].
@@ -392,6 +517,13 @@ impl Model {
         centre[face.axis()] = if face.is_max() { high } else { low }[face.axis()];
         centre
     }
+}
+
+fn distance_to_segment(x: DVec3, a: DVec3, b: DVec3) -> f64 {
+    let along = b - a;
+    let square = along.length_squared();
+    let part = if square > 0.0 { ((x - a).dot(along) / square).clamp(0.0, 1.0) } else { 0.0 };
+    x.distance(a + along * part)
 }
 
 /// A material with the effects that are on; what it does not state itself comes from the scene's tables.
@@ -536,6 +668,28 @@ fn path_cells(mesh: &BlockMesh, path: &PlannedPath, radius: f64, deepest: f64) -
             (inside > 0 && start < deepest).then_some(PathCell {
                 cell: cell as u32,
                 fraction: inside as f64 / SAMPLES.pow(3) as f64,
+                axial_start: start,
+                axial_end: end,
+            })
+        })
+        .collect()
+}
+
+/// Cells of the core that a hollow needle can cut out, with the range of s0 of their layer.
+fn core_cells(mesh: &BlockMesh, bore: &Bore, deepest: f64) -> Vec<PathCell> {
+    let ring = bore.radius * (1.0 + 1e-9);
+    (0..mesh.cell_count())
+        .filter(|cell| !mesh.is_gap(*cell))
+        .filter_map(|cell| {
+            let at = mesh.cell_coordinates(cell);
+            let inside = (0..2).all(|a| {
+                let from_axis = [mesh.lines[a][at[a]], mesh.lines[a][at[a] + 1]].map(|x| (x - bore.centre[a]).abs());
+                from_axis[0].max(from_axis[1]) <= ring
+            });
+            let (start, end) = (-mesh.lines[2][at[2] + 1], -mesh.lines[2][at[2]]);
+            (inside && start < deepest).then_some(PathCell {
+                cell: cell as u32,
+                fraction: 1.0,
                 axial_start: start,
                 axial_end: end,
             })

@@ -34,6 +34,11 @@ struct ContactMemory {
     touching: f32,
     // 1 while pressed by the full shaft.
     on_shaft: f32,
+    // On a free path: 1 where the tip has passed, and the distance from the axis there [m].
+    passed: f32,
+    rest_radius: f32,
+    _pad0: f32,
+    _pad1: f32,
 }
 
 // Sums over the steps of a frame; forces on the tissue.
@@ -69,4 +74,7 @@ fn book_contact(index: u32, tip: vec3<f32>, normal: vec3<f32>, tangential: vec3<
     contact_sums[index].spreading += dot(normal, d);
     contact_sums[index].sliding += dot(tangential, d);
     contact_sums[index].work += dot(total, step_input.velocity.xyz) * params.dt;
+#ifdef FREE_PATH
+    contact_sums[index].work += dot(cross(lever, total), angular_velocity()) * params.dt;
+#endif
 }

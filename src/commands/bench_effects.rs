@@ -162,6 +162,8 @@ pub fn off_is_absent() -> Result<bool> {
             driven_faces: false,
             regions: false,
             bore: false,
+            slit: false,
+            free_path: false,
             tetrahedra: false,
             laws: BTreeSet::from([laws]),
         };

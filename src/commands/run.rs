@@ -188,20 +188,21 @@ fn difference(after: Option<f64>, before: Option<f64>) -> Option<f64> {
 /// The frames at which pictures and field files are due.
 fn moments(simulation: &Simulation) -> Vec<Moment> {
     let outputs = &simulation.model.scene.outputs;
+    let frame_of_time = |t: f64| (t <= simulation.duration() + simulation.dt).then(|| simulation.frame_at(t));
     let frame_of = |value: f64| match &simulation.model.kinematics {
         // A depth counts on the way in: the first time that the tool gets there.
         Some(k) => k.time_of_depth(value).map(|t| simulation.frame_at(t)),
-        None => (value <= simulation.duration() + simulation.dt).then(|| simulation.frame_at(value)),
+        None => frame_of_time(value),
     };
     let has_tool = simulation.model.kinematics.is_some();
     let name = |v: f64| if has_tool { PictureMoment::Depth(v) } else { PictureMoment::Time(v) };
-    let pictures = outputs
-        .pictures_at
-        .iter()
-        .filter_map(|v| Some(Moment { frame: frame_of(*v)?, picture: Some(name(*v)), field: false }));
-    let fields =
-        outputs.fields_at.iter().filter_map(|v| Some(Moment { frame: frame_of(*v)?, picture: None, field: true }));
-    pictures.chain(fields).collect()
+    let picture = |frame: Option<u64>, at| Some(Moment { frame: frame?, picture: Some(at), field: false });
+    let field = |frame: Option<u64>| Some(Moment { frame: frame?, picture: None, field: true });
+    let by_time = outputs.pictures_at_time.iter().map(|t| picture(frame_of_time(*t), PictureMoment::Time(*t)));
+    let pictures = outputs.pictures_at.iter().map(|v| picture(frame_of(*v), name(*v))).chain(by_time);
+    let fields = outputs.fields_at.iter().map(|v| field(frame_of(*v)));
+    let fields = fields.chain(outputs.fields_at_time.iter().map(|t| field(frame_of_time(*t))));
+    pictures.chain(fields).flatten().collect()
 }
 
 fn write_moment(

@@ -175,18 +175,23 @@ shared_structs! {
         tip_length: f32,
         anchor_reach: f32,
         path_cell_count: u32,
-        _pad0: u32,
-        _pad1: u32,
+        softened_radius: f32,
+        ring_radius: f32,
         shift: [f32; 4],
         edge_radius: f32,
         bore_radius: f32,
         bore_friction: f32,
         _pad2: u32,
+        reference: [f32; 4],
+        free_low: [u32; 4],
+        free_count: [u32; 4],
         segments: [[f32; 4]; 16],
     }
     /// shaders/effects/puncture.wgsl
     struct TipAnchor {
         surface: [f32; 4],
+        column: [u32; 4],
+        local: [f32; 4],
     }
     /// shaders/effects/puncture.wgsl
     struct TipAnchorLoad {
@@ -252,6 +257,34 @@ shared_structs! {
         torn_area: f32,
         _pad: f32,
     }
+    /// shaders/effects/free_path.wgsl
+    struct FreeTip {
+        place: [f32; 4],
+        along: [f32; 4],
+        across: [f32; 4],
+        sway: [f32; 4],
+        coordinate: f32,
+        entry: f32,
+        advance: f32,
+        inside: f32,
+        material: u32,
+        dissipation: f32,
+        spring_energy: f32,
+        _pad: f32,
+    }
+    /// shaders/effects/free_path.wgsl
+    struct FreeCell {
+        low: [f32; 4],
+        size: [f32; 4],
+        cell: u32,
+        material: u32,
+        marked_low: u32,
+        marked_high: u32,
+        dissipation: f32,
+        _pad0: f32,
+        _pad1: f32,
+        _pad2: f32,
+    }
     /// shaders/effects/friction.wgsl
     struct FrictionParams {
         coefficient: f32,
@@ -291,6 +324,10 @@ shared_structs! {
         axial_on: f32,
         touching: f32,
         on_shaft: f32,
+        passed: f32,
+        rest_radius: f32,
+        _pad0: f32,
+        _pad1: f32,
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactSums {

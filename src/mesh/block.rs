@@ -210,6 +210,9 @@ impl BlockMesh {
         let motion = scene.tool.as_ref().map(|_| &scene.motion);
         let mut mesh = BlockMesh::for_tissue(&scene.tissue, motion);
         let Some(cohesive) = &scene.effects.cohesive else { return mesh };
+        if let (true, Some(bore)) = (scene.has_bore(), scene.needle().and_then(|n| n.bore)) {
+            mesh.follow_bore(&scene.tissue, scene.motion.entry, bore.edge);
+        }
         if let Some(slit) = scene.slit_axis() {
             let mut tissue = scene.tissue.clone();
             tissue.axis_offset_cells[slit] = 0.0;
@@ -220,6 +223,28 @@ impl BlockMesh {
             mesh.split(plane.axis, plane.at);
         }
         mesh
+    }
+
+    /// Lays lines on the square around a ring of the given radius, bends them to its circle and doubles them.
+    fn follow_bore(&mut self, tissue: &Tissue, entry: DVec3, radius: f64) {
+        let h = tissue.cell_size;
+        let centre = entry.truncate();
+        for axis in 0..2 {
+            let half = 0.5 * tissue.size[axis];
+            // From the axis outwards, in both directions.
+            let side = |face: f64| side_lines(face, radius, tissue.fine_radius, h, tissue.growth);
+            let below = side(half + centre[axis]);
+            let above = side(half - centre[axis]);
+            let mut lines: Vec<f64> = below.iter().rev().map(|d| centre[axis] - d).collect();
+            lines.push(centre[axis]);
+            lines.extend(above.iter().map(|d| centre[axis] + d));
+            let end = lines.len() - 1;
+            (lines[0], lines[end]) = (-half, half);
+            self.lines[axis] = lines;
+            self.split(axis, centre[axis] - radius);
+            self.split(axis, centre[axis] + radius);
+        }
+        self.bore = Some(Bore { centre, radius, outer: (3.0 * radius).max(radius + 2.0 * h) });
     }
 
     /// Moves the nearest inner line of an axis to `at` [m] and doubles it.
@@ -244,15 +269,40 @@ impl BlockMesh {
                 uniform_lines(-tissue.size.z, 0.0, h),
             ]);
         };
-        let end = motion.deepest_point();
+        let (low, high) = motion.reach();
         let lateral = |axis: usize| {
             let entry = motion.entry[axis];
-            let zone = [entry.min(end[axis]) - tissue.fine_radius, entry.max(end[axis]) + tissue.fine_radius];
+            let zone = [low[axis] - tissue.fine_radius, high[axis] + tissue.fine_radius];
             let anchor = entry - tissue.axis_offset_cells[axis] * h;
             graded_lines([-half[axis], half[axis]], zone, anchor, h, tissue.growth)
         };
-        BlockMesh::new([lateral(0), lateral(1), depth_lines(tissue.size.z, -end.z + FINE_BELOW_PATH, h, tissue.growth)])
+        BlockMesh::new([lateral(0), lateral(1), depth_lines(tissue.size.z, -low.z + FINE_BELOW_PATH, h, tissue.growth)])
     }
+}
+
+/// Distances of grid lines from the axis of a bore up to a face: whole cells within the radius, edges `h` to the end of
+/// the fine zone, growing beyond.
+fn side_lines(face: f64, radius: f64, fine_radius: f64, h: f64, growth: f64) -> Vec<f64> {
+    let inner = (radius / h).round().max(1.0) as usize;
+    let mut lines: Vec<f64> = (1..=inner).map(|k| radius * k as f64 / inner as f64).collect();
+    let left = (face - radius) / h;
+    let fine = ((fine_radius - radius) / h).round().clamp(1.0, left.floor().max(1.0));
+    match series_to_face(|give_up| left - (fine - give_up), growth) {
+        Some((give_up, edges)) => {
+            let fine = fine as usize - give_up.min(fine as usize);
+            lines.extend((1..=fine).map(|k| radius + k as f64 * h));
+            let mut at = radius + fine as f64 * h;
+            for edge in edges {
+                at += edge * h;
+                lines.push(at);
+            }
+        }
+        None => {
+            let count = left.round().max(1.0) as usize;
+            lines.extend((1..=count).map(|k| radius + (face - radius) * k as f64 / count as f64));
+        }
+    }
+    lines
 }
 
 /// Uniform lines from `low` to `high` with an edge as close to `h` as whole cells allow.

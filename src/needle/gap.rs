@@ -42,6 +42,9 @@ pub struct BoreProfile {
     pub radius: f64,
 }
 
+/// Half width, in shaft radii, over which the push to the own side fades at the ends of a slit.
+const SLIT_BLEND: f64 = 1.0 / 6.0;
+
 impl Profile {
     /// The profile of a needle that points along `direction`.
     pub fn new(needle: &NeedleShape, direction: DVec3) -> Self {
@@ -68,11 +71,12 @@ impl Profile {
     /// Overlap of one face of a slit with the section, pushed towards its own side `side` (unit, lateral):
     /// ```text
     /// p = rho.side,  q = rho - side p,  w = sqrt(rc^2 - q^2)
-    /// phi = w (w - p)/rc - less  where p >= 0,  w^2 (1 - p/rc)/rc - less  where p < 0
+    /// phi = w (w - p)/rc - less  where p >= 0,  w^2/rc - p w^2/(w^2 + b^2) - less  where p < 0,  b = R/6
     /// ```
     /// with the lateral vector `rho` from the section's centre. Zero where the face has reached the circle and where the circle
-    /// ends (q = rc), with bounded gradients in between. A radial normal would push both faces to one side; with the first
-    /// form for p < 0 too the gradient grows without limit at the ends of the slit, and the contact creates 14 % of the work.
+    /// ends (q = rc), with bounded gradients in between, also at the apex. A radial normal would push both faces to one side;
+    /// with the first form for p < 0 too the gradient grows without limit at the ends of the slit, and the contact creates
+    /// 14 % of the work.
     pub fn slit_face(&self, lever: DVec3, d: DVec3, side: DVec3, less: (f64, f64)) -> Overlap {
         let s = lever.dot(d);
         let (rc, slope) = self.section(s);
@@ -88,10 +92,10 @@ impl Profile {
             let value = w * (w - p) / rc;
             (value, (-side * w + q * (p / w - 2.0)) / rc, (2.0 - p / w) - value / rc)
         } else {
-            let behind = 1.0 - p / rc;
-            let (gradient, growth) =
-                (-side * (square / rc) - q * (2.0 * behind), 2.0 * behind + square * p / rc.powi(3));
-            (square * behind / rc, gradient / rc, growth - square * behind / (rc * rc))
+            let blend = (SLIT_BLEND * self.radius).powi(2);
+            let (part, rate) = (square / (square + blend), blend / (square + blend).powi(2));
+            let lateral = -side * part - q * (2.0 / rc - 2.0 * p * rate);
+            (square / rc - p * part, lateral, 2.0 - square / (rc * rc) - 2.0 * p * rc * rate)
         };
         let along = (growth - lateral.dot(self.shift)) * slope - less.1;
         Overlap { value: value - less.0, gradient: lateral + d * along }

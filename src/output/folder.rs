@@ -38,7 +38,7 @@ pub struct OutputFolder {
 pub enum PictureMoment {
     /// Depth of the tool [m].
     Depth(f64),
-    /// Time [s], in a scene without a tool.
+    /// Time [s], in a scene without a tool or with a free motion.
     Time(f64),
 }
 

@@ -377,7 +377,7 @@ pub struct FlatPunchTable {
     pub bonded: bool,
 }
 
-/// Motion of the tool along a straight line. Depth is counted along it from the entry point.
+/// Motion of the tool. Depth is counted along the needle from the point where its axis meets z = 0.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MotionTable {
@@ -398,14 +398,28 @@ pub struct MotionTable {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhaseTable {
-    /// What the tool does.
+    /// What the tool does. With move, turn or reposition the path is not planned but found while the tip moves.
     pub kind: PhaseKind,
-    /// Speed [mm/s]; for insert and withdraw.
+    /// Speed of the tip [mm/s]; for insert, withdraw and move.
     pub speed_mm_s: Option<f64>,
     /// Depth at the end of the phase [mm]; for insert and withdraw.
     pub depth_mm: Option<f64>,
     /// Duration [s]; for hold.
     pub duration_s: Option<f64>,
+    /// Where the tip goes on a straight line, in the coordinates of the block [mm]; for move.
+    pub to_mm: Option<[f64; 3]>,
+    /// Direction of the needle at the end, any length; for move (default: as before), turn and reposition.
+    pub direction: Option<[f64; 3]>,
+    /// The same as an angle to the downward vertical, 0 to 80 [deg].
+    pub angle_deg: Option<f64>,
+    /// Heading that belongs to `angle_deg` [deg]; default 0.
+    pub azimuth_deg: Option<f64>,
+    /// How fast the needle turns [deg/s]; for turn.
+    pub rate_deg_s: Option<f64>,
+    /// Point fixed in space about which it turns [mm]; for turn; default: the tip.
+    pub pivot_mm: Option<[f64; 3]>,
+    /// New entry point on the top face, x and y [mm]; for reposition, outside the tissue.
+    pub entry_mm: Option<[f64; 2]>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -414,6 +428,17 @@ pub enum PhaseKind {
     Insert,
     Hold,
     Withdraw,
+    Move,
+    Turn,
+    Reposition,
+}
+
+/// How the path of the needle is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PathWord {
+    Auto,
+    Free,
 }
 
 /// Parameters of the effect `puncture`.
@@ -440,6 +465,8 @@ pub struct PunctureTable {
     pub contact_damping: Option<f64>,
     /// Travel over which an overlap found at activation fades out [mm].
     pub entry_fade_mm: Option<f64>,
+    /// "auto" (default): planned before the run for a straight motion, else free; "free": always found while the tip moves.
+    pub path: Option<PathWord>,
 }
 
 /// Parameters of the effect `friction`.
@@ -601,9 +628,9 @@ pub struct OutputsTable {
     pub pictures_at_depth_mm: Option<Vec<f64>>,
     /// Depths on the way in at which a VTU file is written [mm]; scenes with a tool.
     pub fields_at_depth_mm: Option<Vec<f64>>,
-    /// Times at which a picture is drawn [s]; scenes without a tool.
+    /// Times at which a picture is drawn [s]; scenes without a tool or with a free motion.
     pub pictures_at_s: Option<Vec<f64>>,
-    /// Times at which a VTU file is written [s]; scenes without a tool.
+    /// Times at which a VTU file is written [s]; scenes without a tool or with a free motion.
     pub fields_at_s: Option<Vec<f64>>,
     /// Width of a picture in pixels, 64 to 8192; default 900.
     pub picture_width_px: Option<u32>,

@@ -6,12 +6,15 @@
 mod convert;
 pub(crate) mod document;
 pub mod file;
+pub mod motion;
 pub mod presets;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
+
+pub use motion::{Motion, Phase};
 
 use crate::effects::{self, EffectSet};
 use crate::material::ElasticLaw;
@@ -71,7 +74,7 @@ impl Scene {
     /// Axis of the normal of the plane that a solid needle slits: 0 where the direction has no x, 1 where it has no y.
     pub fn slit_axis(&self) -> Option<usize> {
         let solid = self.needle().is_some_and(|n| n.bore.is_none());
-        if self.effects.cohesive.is_none() || !solid {
+        if self.effects.cohesive.is_none() || !solid || crate::model::has_free_path(self) {
             return None;
         }
         (0..2).find(|a| self.motion.direction[*a].abs() < 1e-9)
@@ -360,50 +363,6 @@ impl NeedleShape {
     }
 }
 
-/// Motion of the tool along a straight line.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Motion {
-    /// Entry point on the top face [m] (z = 0).
-    pub entry: DVec3,
-    /// Unit vector of the insertion, into the tissue (z < 0).
-    pub direction: DVec3,
-    pub phases: Vec<Phase>,
-}
-
-impl Motion {
-    /// Largest depth of all phases along the direction [m].
-    pub fn deepest(&self) -> f64 {
-        self.phases.iter().fold(0.0, |deepest, phase| match *phase {
-            Phase::Insert { depth, .. } => depth.max(deepest),
-            _ => deepest,
-        })
-    }
-
-    /// Where the tip is at the largest depth [m].
-    pub fn deepest_point(&self) -> DVec3 {
-        self.entry + self.direction * self.deepest()
-    }
-
-    /// Largest speed of all phases [m/s].
-    pub fn largest_speed(&self) -> f64 {
-        self.phases.iter().fold(0.0, |largest, phase| match *phase {
-            Phase::Insert { speed, .. } | Phase::Withdraw { speed, .. } => speed.max(largest),
-            Phase::Hold { .. } => largest,
-        })
-    }
-}
-
-/// One phase of the motion. Depth is measured along the direction from the entry point [m].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Phase {
-    /// Advance to `depth` at `speed` [m/s].
-    Insert { speed: f64, depth: f64 },
-    /// Stand still for `duration` [s].
-    Hold { duration: f64 },
-    /// Go back to `depth` (>= 0 or slightly negative: out of the tissue) at `speed` [m/s].
-    Withdraw { speed: f64, depth: f64 },
-}
-
 /// Numbers of the time integration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SolverSettings {
@@ -430,6 +389,9 @@ pub struct Outputs {
     pub pictures_at: Vec<f64>,
     /// Depths on the way in at which a VTU file is written [m], or times [s] in a scene without a tool.
     pub fields_at: Vec<f64>,
+    /// Times of pictures and field files in a scene with a tool on a free path [s].
+    pub pictures_at_time: Vec<f64>,
+    pub fields_at_time: Vec<f64>,
     /// Width of a picture in pixels.
     pub picture_width: u32,
     /// Upper end of the colour bar [Pa]; `None`: the largest value in the picture, rounded up.

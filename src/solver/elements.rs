@@ -41,6 +41,27 @@ pub struct CellShape {
     hexahedron: Option<Hexahedron>,
 }
 
+/// The base of a column of cells: what the shaders know of it.
+#[derive(Debug, Clone, Copy)]
+pub struct PrismBase {
+    /// An eighth of the gradients of xi and eta at the centre [1/m]; zero for a gap.
+    pub gradients: [DVec3; 2],
+    /// [m]
+    pub taper: DVec3,
+    /// [m^2]
+    pub area: f64,
+}
+
+impl PrismBase {
+    /// The base of the column that `cell` stands in.
+    pub fn new(block: &BlockMesh, cell: usize) -> Self {
+        let hexahedron = Hexahedron::new(block, cell);
+        let [xi, eta, _] = hexahedron.modes;
+        let area = 4.0 * hexahedron.edges[0].truncate().perp_dot(hexahedron.edges[1].truncate());
+        PrismBase { gradients: [xi, eta], taper: hexahedron.taper, area }
+    }
+}
+
 /// A prism between two planes z = const, bilinear in the plane: `X = centre + xi E_xi + eta E_eta + xi eta taper + zeta E_zeta`.
 #[derive(Debug, Clone, Copy)]
 struct Hexahedron {

@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::ToolPose;
+use crate::needle::free_path::FreeTip;
 use crate::scene::Face;
 
 /// What is given to one step from outside: the only place where user input enters.
@@ -139,6 +140,10 @@ pub struct State {
     pub stiffness: Vec<f64>,
     /// Material coordinate of the tip [m].
     pub tip_coordinate: f64,
+    /// Tip on a free path; at rest on a planned one.
+    pub tip: FreeTip,
+    /// Marked sample points per cell of the box of a free path, bit = x + 4 y + 16 z; empty on a planned one.
+    pub cut_samples: Vec<u64>,
     /// Memory per contact node: stretch of the stick spring [m], overlap at activation [m], axial position at
     /// activation [m]; `touching` tells whether the last two are set.
     pub contact: Vec<ContactState>,
@@ -157,6 +162,9 @@ pub struct ContactState {
     pub touching: bool,
     /// True while it is pressed by the full shaft.
     pub on_shaft: bool,
+    /// On a free path: distance r0 from the axis where the tip passed [m], and whether it has.
+    pub rest_radius: f64,
+    pub passed: bool,
 }
 
 /// What an engine tells about itself.

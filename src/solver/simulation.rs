@@ -153,6 +153,12 @@ impl Simulation {
                 limit * 1e6
             ));
         }
+        if model.scene.motion.is_free() && model.puncture.is_some() {
+            notices.push(
+                "the motion leaves one straight line: the path is not planned but found while the tip moves (free path)"
+                    .into(),
+            );
+        }
         if let Some(mach) = tool_mach(&model).filter(|m| *m > 0.1) {
             notices.push(format!(
                 "the tool moves at {mach:.2} of the scaled shear wave speed: inertia will show in the force; lower \

@@ -7,6 +7,10 @@ pub enum Stage {
     AdvanceTip,
     /// Cells that the tip has passed lose stiffness; their energy is booked as cutting.
     SoftenPath,
+    /// The same tip law on a free path: the tip finds its material point, and whether it is in open material.
+    AdvanceFreeTip,
+    /// Sample points that the tip of a free path has passed are marked; their cells lose stiffness.
+    SoftenFreePath,
     /// J and volumetric stiffness of every tetrahedron.
     MeasureDilatation,
     /// Dilatation and pressure of every node of a tetrahedral mesh.
@@ -37,9 +41,11 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 15] = [
+    pub const ALL: [Stage; 17] = [
         Stage::AdvanceTip,
         Stage::SoftenPath,
+        Stage::AdvanceFreeTip,
+        Stage::SoftenFreePath,
         Stage::MeasureDilatation,
         Stage::AveragePressure,
         Stage::TetrahedronForces,
@@ -60,6 +66,8 @@ impl Stage {
         match self {
             Stage::AdvanceTip => "advance_tip",
             Stage::SoftenPath => "soften_path",
+            Stage::AdvanceFreeTip => "advance_free_tip",
+            Stage::SoftenFreePath => "soften_free_path",
             Stage::MeasureDilatation => "measure_dilatation",
             Stage::AveragePressure => "average_pressure",
             Stage::TetrahedronForces => "tetrahedron_forces",

@@ -235,6 +235,7 @@ impl Check<'_> {
                 NotNegative(1.0),
             ),
             entry_fade: self.optional(&at("entry_fade_mm"), t.entry_fade_mm, MM, d.entry_fade, Positive(100.0)),
+            always_free: t.path == Some(PathWord::Free),
         };
         if params.softened_radius >= params.ring_radius {
             let key = if t.softened_radius_mm.is_some() { "softened_radius_mm" } else { "ring_radius_mm" };

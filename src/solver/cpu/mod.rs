@@ -1,6 +1,7 @@
 //! The CPU engine: f64, rayon, written from the equations. Reference for the tests and fallback without an adapter.
 
 mod cohesive_forces;
+mod free_tip;
 mod indenter_contact;
 mod needle_contact;
 mod tip;
@@ -47,6 +48,8 @@ pub struct CpuEngine {
     added_bound: Vec<f64>,
     tip_forces: Vec<(f64, [usize; 8], [f64; 8])>,
     tip_energy: f64,
+    /// Force across the needle on every anchor of a free tip [N].
+    tip_sway: DVec3,
     contact_energy: f64,
     /// Plastic and damage dissipation that earlier frames have told [J].
     booked: (f64, f64),
@@ -64,6 +67,8 @@ impl CpuEngine {
             velocity: vec![DVec3::ZERO; nodes],
             stiffness: if model.puncture.is_some() { vec![1.0; cells] } else { Vec::new() },
             tip_coordinate: 0.0,
+            tip: model.free_tip(),
+            cut_samples: vec![0; model.puncture.as_ref().and_then(|p| p.free.as_ref()).map_or(0, |f| f.cell_count())],
             contact: vec![ContactState::default(); model.contact_nodes.len()],
             pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
@@ -89,6 +94,7 @@ impl CpuEngine {
             added_bound: vec![0.0; nodes],
             tip_forces: Vec::new(),
             tip_energy: 0.0,
+            tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
             booked: (0.0, 0.0),
             finished: Default::default(),
@@ -102,8 +108,16 @@ impl CpuEngine {
         let model = self.model.clone();
         self.external.fill(DVec3::ZERO);
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
-            self.advance_tip(plan, &pose);
-            self.soften_path(plan);
+            match &plan.free {
+                None => {
+                    self.advance_tip(plan, &pose);
+                    self.soften_path(plan, &pose);
+                }
+                Some(free) => {
+                    self.advance_free_tip(plan, free, &pose);
+                    self.soften_free_path(plan, free);
+                }
+            }
         }
         self.element_forces(input);
         self.added_bound.fill(0.0);
@@ -283,7 +297,7 @@ impl FrameSums {
         self.friction_impulse += c.friction.dot(pose.direction) * dt;
         self.impulse += total * dt;
         self.angular_impulse += c.torque * dt;
-        self.tool_work += total.dot(pose.velocity) * dt;
+        self.tool_work += (total.dot(pose.velocity) + c.torque.dot(pose.angular_velocity)) * dt;
         self.friction_dissipation += c.friction_work;
         self.contact_dissipation += c.damping_power * dt;
     }
