@@ -425,6 +425,11 @@ impl Model {
             .collect()
     }
 
+    /// True where the mesh follows the bore of a hollow needle.
+    pub fn has_bore(&self) -> bool {
+        self.mesh.as_block().is_some_and(|block| block.bore.is_some())
+    }
+
     /// True where a node is held against a surface of this kind.
     pub fn has_surface(&self, wanted: impl Fn(&ContactSurface) -> bool) -> bool {
         self.contact_nodes.iter().any(|c| wanted(&c.surface))

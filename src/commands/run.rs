@@ -64,7 +64,7 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         simulation.stop_after(moment.frame);
     }
     let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
-    let mut tables = Tables::create(&output, &driven)?;
+    let mut tables = Tables::create(&output, &driven, simulation.model.has_bore())?;
     let mut fields = FieldFiles::new(&output);
     let progress = Progress::new(simulation.duration());
     let device = simulation.device().cloned();
@@ -258,6 +258,17 @@ pub fn describe(summary: &Summary) -> String {
         text += &format!(
             "sample: largest nominal stress {:.2} kPa at a stretch of {stretch:.3} on {face}\n",
             stress * 1e-3
+        );
+    }
+    if let (Some(length), Some(rest), Some(mass)) =
+        (summary.core_length_m, summary.core_rest_length_m, summary.core_mass_kg)
+    {
+        text += &format!(
+            "core: {:.2} mm in the bore, {:.2} mm at rest ({:.0} % strain), {:.2} mg\n",
+            length * 1e3,
+            rest * 1e3,
+            100.0 * summary.core_strain.unwrap_or(0.0),
+            mass * 1e6
         );
     }
     text += &format!(

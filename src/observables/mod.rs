@@ -136,6 +136,8 @@ pub struct FrameRecord {
     pub reactions: [DVec3; 6],
     pub energy: EnergyAccount,
     pub health: Health,
+    /// What the bore of a hollow needle holds.
+    pub core: Option<CoreSample>,
 }
 
 /// Fields of one moment, for VTU files and pictures.
@@ -167,6 +169,8 @@ pub struct FieldSnapshot {
     pub material: Vec<f64>,
 }
 
+mod core_sample;
 mod recorder;
 
+pub use core_sample::{CoreSample, cells_inside};
 pub use recorder::Recorder;

@@ -58,6 +58,7 @@ impl Recorder {
             tip_coordinate: sums.tip_coordinate,
             reactions: sums.reactions,
             energy: *e,
+            core: None,
             health: Health {
                 min_j: sums.min_j,
                 min_corner_j: sums.min_corner_j,
