@@ -111,9 +111,11 @@ fn graded(low: f64, high: f64, cell: f64, fine: f64) -> Vec<f64> {
 }
 
 fn mesh(cell: f64) -> Mesh {
-    Mesh::Block(BlockMesh {
-        lines: [graded(-10e-3, 10e-3, cell, 3e-3), graded(-10e-3, 10e-3, cell, 3e-3), graded(-16e-3, 0.0, cell, 9e-3)],
-    })
+    Mesh::Block(BlockMesh::new([
+        graded(-10e-3, 10e-3, cell, 3e-3),
+        graded(-10e-3, 10e-3, cell, 3e-3),
+        graded(-16e-3, 0.0, cell, 9e-3),
+    ]))
 }
 
 fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
@@ -299,7 +301,7 @@ fn pictures_are_named_by_their_moment() {
 fn tables_grow_row_by_row_and_survive_without_being_closed() {
     let base = tempfile::tempdir().unwrap();
     let folder = OutputFolder::create(Some(base.path()), "scene", false).unwrap();
-    let mut tables = Tables::create(&folder, &[]).unwrap();
+    let mut tables = Tables::create(&folder, &[], false).unwrap();
     assert!(!folder.file(SAMPLE_TABLE).exists());
     let records = records();
     for (rows, record) in records.iter().take(5).enumerate() {

@@ -11,6 +11,9 @@
 #ifdef PUNCTURE
 @group(3) @binding(7) var<storage, read_write> tip_result: TipState;
 #endif
+#ifdef FREE_PATH
+var<workgroup> softened: array<f32, 64>;
+#endif
 
 @compute @workgroup_size(64)
 fn measure_contact(@builtin(local_invocation_index) lane: u32) {
@@ -29,6 +32,22 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
         contact_sums[index] = ContactSums();
     }
     contact_totals[lane] = total;
+#ifdef FREE_PATH
+    var taken = 0.0;
+    for (var index = lane; index < puncture.path_cell_count; index += 64u) {
+        taken += free_cells[index].dissipation;
+        free_cells[index].dissipation = 0.0;
+    }
+    softened[lane] = taken;
+    workgroupBarrier();
+    if (lane == 0u) {
+        tip_result = TipState(free_tip.coordinate, free_tip.dissipation, free_tip.spring_energy, 0.0);
+        free_tip.dissipation = 0.0;
+        for (var other = 0u; other < 64u; other++) {
+            tip_result.softening += softened[other];
+        }
+    }
+#else
 #ifdef PUNCTURE
     if (lane == 0u) {
         tip_result = tip_state;
@@ -38,5 +57,6 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
             path_cells[index].dissipation = 0.0;
         }
     }
+#endif
 #endif
 }

@@ -137,13 +137,11 @@ pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
 }
 
 pub(super) fn uniform_mesh(cells: [usize; 3], h: f64) -> BlockMesh {
-    BlockMesh {
-        lines: std::array::from_fn(|a| {
-            let n = cells[a];
-            let start = if a == 2 { -(n as f64) * h } else { -0.5 * n as f64 * h };
-            (0..=n).map(|i| start + i as f64 * h).collect()
-        }),
-    }
+    BlockMesh::new(std::array::from_fn(|a| {
+        let n = cells[a];
+        let start = if a == 2 { -(n as f64) * h } else { -0.5 * n as f64 * h };
+        (0..=n).map(|i| start + i as f64 * h).collect()
+    }))
 }
 
 /// A prepared block that steps on request.

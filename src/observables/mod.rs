@@ -58,6 +58,8 @@ pub struct EnergyAccount {
     pub friction: f64,
     /// Dissipated by the tip law and by the softening of the path.
     pub cutting: f64,
+    /// Dissipated by faces that separate, plus what they store.
+    pub cohesive: f64,
     /// Dissipated by plastic flow, by damage and by the viscous terms.
     pub plastic: f64,
     pub damage: f64,
@@ -77,6 +79,7 @@ impl EnergyAccount {
             + self.damping
             + self.friction
             + self.cutting
+            + self.cohesive
             + self.plastic
             + self.damage
             + self.viscous
@@ -133,6 +136,8 @@ pub struct FrameRecord {
     pub reactions: [DVec3; 6],
     pub energy: EnergyAccount,
     pub health: Health,
+    /// What the bore of a hollow needle holds.
+    pub core: Option<CoreSample>,
 }
 
 /// Fields of one moment, for VTU files and pictures.
@@ -164,6 +169,8 @@ pub struct FieldSnapshot {
     pub material: Vec<f64>,
 }
 
+mod core_sample;
 mod recorder;
 
+pub use core_sample::{CoreSample, cells_inside};
 pub use recorder::Recorder;

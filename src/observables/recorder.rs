@@ -11,6 +11,7 @@ use crate::solver::engine::FrameSums;
 pub struct Recorder {
     totals: EnergyAccount,
     contact_dissipation: f64,
+    cohesive_dissipation: f64,
     step: u64,
 }
 
@@ -30,6 +31,8 @@ impl Recorder {
         e.damping += sums.damping_dissipation;
         e.friction += sums.friction_dissipation;
         e.cutting += sums.tip_dissipation + sums.softening_dissipation;
+        self.cohesive_dissipation += sums.cohesive_dissipation;
+        e.cohesive = sums.cohesive_energy + self.cohesive_dissipation;
         e.plastic += sums.plastic_dissipation;
         e.damage += sums.damage_dissipation;
         e.viscous = sums.viscous_dissipation;
@@ -55,6 +58,7 @@ impl Recorder {
             tip_coordinate: sums.tip_coordinate,
             reactions: sums.reactions,
             energy: *e,
+            core: None,
             health: Health {
                 min_j: sums.min_j,
                 min_corner_j: sums.min_corner_j,

@@ -16,6 +16,8 @@ pub const FORCE_CHART: &str = "force.svg";
 pub const FORCE_PARTS_CHART: &str = "force_parts.svg";
 /// Written where faces are driven.
 pub const SAMPLE_TABLE: &str = "sample.csv";
+/// What the bore of a hollow needle holds, per frame.
+pub const CORE_TABLE: &str = "core.csv";
 pub const SAMPLE_CHART: &str = "sample.svg";
 pub const FIELD_COLLECTION: &str = "frames.pvd";
 /// Folder of the VTU files `frame_00012.vtu`.
@@ -38,7 +40,7 @@ pub struct OutputFolder {
 pub enum PictureMoment {
     /// Depth of the tool [m].
     Depth(f64),
-    /// Time [s], in a scene without a tool.
+    /// Time [s], in a scene without a tool or with a free motion.
     Time(f64),
 }
 

@@ -6,7 +6,7 @@
 use std::fs::File;
 use std::path::PathBuf;
 
-use super::folder::{ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE};
+use super::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE};
 use super::sample::{DrivenFace, SAMPLE_COLUMNS, SamplePoint};
 use crate::observables::{EnergyAccount, ForceParts, FrameRecord};
 use crate::{Error, Result};
@@ -28,7 +28,7 @@ pub fn force_columns() -> Vec<&'static str> {
 }
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 25] = [
+pub const ENERGY_COLUMNS: [&str; 26] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -38,6 +38,7 @@ pub const ENERGY_COLUMNS: [&str; 25] = [
     "damping_j",
     "friction_j",
     "cutting_j",
+    "cohesive_j",
     "plastic_j",
     "damage_j",
     "viscous_j",
@@ -55,6 +56,10 @@ pub const ENERGY_COLUMNS: [&str; 25] = [
     "deleted_cells",
     "return_failures",
 ];
+
+/// Columns of `core.csv`.
+pub const CORE_COLUMNS: [&str; 8] =
+    ["time_s", "depth_m", "tip_coordinate_m", "length_m", "rest_length_m", "strain", "mass_kg", "severed"];
 
 /// Kinetic over internal energy, internal = elastic + hourglass; 0 where nothing is stored.
 pub fn kinetic_to_internal(energy: &EnergyAccount) -> f64 {
@@ -78,6 +83,8 @@ fn ratio(part: f64, whole: f64) -> f64 {
 pub struct Tables {
     force: Table,
     energy: Table,
+    /// With a hollow needle.
+    core: Option<Table>,
     /// Where faces are driven.
     sample: Option<(Vec<DrivenFace>, Table)>,
 }
@@ -106,13 +113,16 @@ impl Table {
 }
 
 impl Tables {
-    /// Creates the files with their header rows; that of the sample only where faces are driven.
-    pub fn create(folder: &OutputFolder, driven: &[DrivenFace]) -> Result<Self> {
+    /// Creates the files with their header rows; that of the sample only where faces are driven, that of the core only with a
+    /// hollow needle.
+    pub fn create(folder: &OutputFolder, driven: &[DrivenFace], hollow: bool) -> Result<Self> {
         let sample = match driven {
             [] => None,
             driven => Some((driven.to_vec(), Table::create(folder.file(SAMPLE_TABLE), &SAMPLE_COLUMNS)?)),
         };
+        let core = hollow.then(|| Table::create(folder.file(CORE_TABLE), &CORE_COLUMNS)).transpose()?;
         Ok(Self {
+            core,
             sample,
             force: Table::create(folder.file(FORCE_TABLE), &force_columns())?,
             energy: Table::create(folder.file(ENERGY_TABLE), &ENERGY_COLUMNS)?,
@@ -123,6 +133,18 @@ impl Tables {
     pub fn append(&mut self, record: &FrameRecord) -> Result<()> {
         self.force.write_row(&force_row(record))?;
         self.energy.write_row(&energy_row(record))?;
+        if let (Some(table), Some(core)) = (&mut self.core, &record.core) {
+            table.write_row(&[
+                number(record.time),
+                number(record.depth),
+                number(record.tip_coordinate),
+                number(core.length),
+                number(core.rest_length),
+                number(core.strain()),
+                number(core.mass),
+                u8::from(core.severed).to_string(),
+            ])?;
+        }
         if let Some((faces, table)) = &mut self.sample {
             for face in faces {
                 table.write_row(&sample_row(face, &face.point(record)))?;
@@ -154,6 +176,7 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(e.damping),
         number(e.friction),
         number(e.cutting),
+        number(e.cohesive),
         number(e.plastic),
         number(e.damage),
         number(e.viscous),

@@ -6,12 +6,15 @@
 mod convert;
 pub(crate) mod document;
 pub mod file;
+pub mod motion;
 pub mod presets;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
+
+pub use motion::{Motion, Phase};
 
 use crate::effects::{self, EffectSet};
 use crate::material::ElasticLaw;
@@ -53,6 +56,28 @@ impl Scene {
     /// replace values of the file. Every error is an [`Error::Scene`] with file, line, excerpt and way out.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
         convert::load(path, overrides).map_err(Error::Scene)
+    }
+
+    /// The needle, if the tool is one.
+    pub fn needle(&self) -> Option<&NeedleShape> {
+        match &self.tool {
+            Some(Tool::Needle(needle)) => Some(needle),
+            _ => None,
+        }
+    }
+
+    /// True where the tissue separates around a hollow needle.
+    pub fn has_bore(&self) -> bool {
+        self.effects.cohesive.is_some() && self.needle().is_some_and(|n| n.bore.is_some())
+    }
+
+    /// Axis of the normal of the plane that a solid needle slits: 0 where the direction has no x, 1 where it has no y.
+    pub fn slit_axis(&self) -> Option<usize> {
+        let solid = self.needle().is_some_and(|n| n.bore.is_none());
+        if self.effects.cohesive.is_none() || !solid || crate::model::has_free_path(self) {
+            return None;
+        }
+        (0..2).find(|a| self.motion.direction[*a].abs() < 1e-9)
     }
 
     /// JSON schema of the scene file, for editors and for the `schema` command.
@@ -287,8 +312,21 @@ pub struct NeedleShape {
     pub tip_length: f64,
     /// Shape of the tip.
     pub tip: TipShape,
+    /// What makes it hollow.
+    pub bore: Option<BoreShape>,
     /// Name of the needle material (rigid here; kept for reports).
     pub material: String,
+}
+
+/// The inside of a hollow needle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoreShape {
+    /// Radius of the bore [m].
+    pub radius: f64,
+    /// Radius of the cutting edge, between bore and outer radius [m].
+    pub edge: f64,
+    /// Friction coefficient of the bore (dimensionless).
+    pub friction: f64,
 }
 
 /// Shape of the tip of a needle.
@@ -314,52 +352,15 @@ impl NeedleShape {
 
     /// A needle with a conical tip, of steel. Lengths in m.
     pub fn cone(name: &str, radius: f64, tip_length: f64) -> Self {
-        NeedleShape { name: name.into(), radius, tip_length, tip: TipShape::Cone, material: "steel-304".into() }
+        NeedleShape {
+            name: name.into(),
+            radius,
+            tip_length,
+            tip: TipShape::Cone,
+            bore: None,
+            material: "steel-304".into(),
+        }
     }
-}
-
-/// Motion of the tool along a straight line.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Motion {
-    /// Entry point on the top face [m] (z = 0).
-    pub entry: DVec3,
-    /// Unit vector of the insertion, into the tissue (z < 0).
-    pub direction: DVec3,
-    pub phases: Vec<Phase>,
-}
-
-impl Motion {
-    /// Largest depth of all phases along the direction [m].
-    pub fn deepest(&self) -> f64 {
-        self.phases.iter().fold(0.0, |deepest, phase| match *phase {
-            Phase::Insert { depth, .. } => depth.max(deepest),
-            _ => deepest,
-        })
-    }
-
-    /// Where the tip is at the largest depth [m].
-    pub fn deepest_point(&self) -> DVec3 {
-        self.entry + self.direction * self.deepest()
-    }
-
-    /// Largest speed of all phases [m/s].
-    pub fn largest_speed(&self) -> f64 {
-        self.phases.iter().fold(0.0, |largest, phase| match *phase {
-            Phase::Insert { speed, .. } | Phase::Withdraw { speed, .. } => speed.max(largest),
-            Phase::Hold { .. } => largest,
-        })
-    }
-}
-
-/// One phase of the motion. Depth is measured along the direction from the entry point [m].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Phase {
-    /// Advance to `depth` at `speed` [m/s].
-    Insert { speed: f64, depth: f64 },
-    /// Stand still for `duration` [s].
-    Hold { duration: f64 },
-    /// Go back to `depth` (>= 0 or slightly negative: out of the tissue) at `speed` [m/s].
-    Withdraw { speed: f64, depth: f64 },
 }
 
 /// Numbers of the time integration.
@@ -388,6 +389,9 @@ pub struct Outputs {
     pub pictures_at: Vec<f64>,
     /// Depths on the way in at which a VTU file is written [m], or times [s] in a scene without a tool.
     pub fields_at: Vec<f64>,
+    /// Times of pictures and field files in a scene with a tool on a free path [s].
+    pub pictures_at_time: Vec<f64>,
+    pub fields_at_time: Vec<f64>,
     /// Width of a picture in pixels.
     pub picture_width: u32,
     /// Upper end of the colour bar [Pa]; `None`: the largest value in the picture, rounded up.

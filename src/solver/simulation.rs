@@ -16,7 +16,7 @@ use crate::material::{Verdict, von_mises};
 use crate::material_point::PointState;
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
-use crate::observables::{FieldSnapshot, FrameRecord, Recorder};
+use crate::observables::{CoreSample, FieldSnapshot, FrameRecord, Recorder};
 use crate::scene::Scene;
 
 /// Which engine the user wants.
@@ -153,6 +153,12 @@ impl Simulation {
                 limit * 1e6
             ));
         }
+        if model.scene.motion.is_free() && model.puncture.is_some() {
+            notices.push(
+                "the motion leaves one straight line: the path is not planned but found while the tip moves (free path)"
+                    .into(),
+            );
+        }
         if let Some(mach) = tool_mach(&model).filter(|m| *m > 0.1) {
             notices.push(format!(
                 "the tool moves at {mach:.2} of the scaled shear wave speed: inertia will show in the force; lower \
@@ -236,7 +242,8 @@ impl Simulation {
     }
 
     fn may_start(&self, frame: u64) -> bool {
-        let waits = self.watch_stretch || self.stops.range(self.collected..frame).next().is_some();
+        let waits =
+            self.watch_stretch || self.model.has_bore() || self.stops.range(self.collected..frame).next().is_some();
         frame < self.frames && frame - self.collected <= AHEAD && (!waits || frame == self.collected)
     }
 
@@ -256,7 +263,7 @@ impl Simulation {
             return Err(Error::Device("the engine lost a frame".into()));
         };
         self.collected += 1;
-        let record = self.recorder.record(&self.model, self.dt, &sums);
+        let mut record = self.recorder.record(&self.model, self.dt, &sums);
         if record.health.not_finite {
             return Err(self.diverged(&record));
         }
@@ -269,6 +276,11 @@ impl Simulation {
         let cell_steps = record.step.max(self.steps_per_frame) as f64 * self.model.mesh.cell_count() as f64;
         if too_many_return_failures(self.return_failures, cell_steps) {
             return Err(self.flow_lost(&record, self.return_failures as f64 / cell_steps));
+        }
+        if self.model.has_bore() {
+            let state = self.engine.read_state()?;
+            let pose = self.model.kinematics.as_ref().map(|k| k.pose(record.time));
+            record.core = pose.and_then(|pose| CoreSample::of(&self.model, &state, &pose));
         }
         if self.watch_stretch {
             self.check_stretch(&record)?;

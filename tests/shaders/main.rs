@@ -15,7 +15,16 @@ use stylet::solver::step::Stage;
 /// Features of a block of Mooney-Rivlin tissue.
 fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
     let laws = BTreeSet::from(["mooney_rivlin"]);
-    Features { loaded_faces, driven_faces, regions: false, tetrahedra: false, laws }
+    Features {
+        loaded_faces,
+        driven_faces,
+        regions: false,
+        tetrahedra: false,
+        free_path: false,
+        bore: false,
+        slit: false,
+        laws,
+    }
 }
 
 /// Features of a mesh of tetrahedra, whose faces cannot be loaded yet.
@@ -27,6 +36,10 @@ fn tetrahedra(driven_faces: bool, regions: bool) -> Features {
 fn scenes() -> Vec<Features> {
     let mut scenes = vec![scene(false, false), scene(true, false), scene(false, true), scene(true, true)];
     scenes.push(Features { regions: true, ..scene(false, false) });
+    scenes.push(Features { free_path: true, ..scene(false, false) });
+    scenes.push(Features { bore: true, ..scene(false, false) });
+    scenes.push(Features { slit: true, ..scene(true, true) });
+    scenes.push(Features { free_path: true, regions: true, ..scene(true, true) });
     scenes.extend([tetrahedra(false, false), tetrahedra(true, false), tetrahedra(false, true)]);
     scenes
 }
@@ -189,7 +202,10 @@ fn shader_structs() -> BTreeMap<String, ShaderStruct> {
     let mut found: BTreeMap<String, ShaderStruct> = BTreeMap::new();
     let block = Features { regions: true, ..scene(true, true) };
     let every = effect_set(|_| true);
-    for r in [block, tetrahedra(true, true)].iter().flat_map(|features| reflected(&every, features)) {
+    let free = Features { free_path: true, ..block.clone() };
+    let bore = Features { bore: true, ..block.clone() };
+    let slit = Features { slit: true, ..block.clone() };
+    for r in [block, free, bore, slit, tetrahedra(true, true)].iter().flat_map(|features| reflected(&every, features)) {
         for (_, ty) in r.module.types.iter() {
             let (naga::TypeInner::Struct { members, span }, Some(name)) = (&ty.inner, &ty.name) else {
                 continue;
@@ -239,6 +255,9 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "CellEnergy",
         "IsochoricFactors",
         "AnchorPlace",
+        "GridPlace",
+        "MaterialPlace",
+        "Overlap",
         "Slopes",
         "IsochoricStress",
         "PointPlace",
