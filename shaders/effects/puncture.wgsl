@@ -134,7 +134,7 @@ fn opened_path(lever: vec3<f32>, d: vec3<f32>, s: f32, rest_radius: f32, less: v
 }
 
 #ifdef SLIT
-// Overlap of one face of a slit with the section, pushed to its own side.
+// Overlap of one face of a slit with the section, pushed to its own side, faded over SLIT_FADE = 1/3 of the radius.
 fn slit_face(lever: vec3<f32>, d: vec3<f32>, s: f32, side: vec3<f32>, less: vec2<f32>) -> Overlap {
     let on_tip = s < puncture.tip_length;
     let full_slope = puncture.needle_radius / puncture.tip_length;
@@ -145,27 +145,14 @@ fn slit_face(lever: vec3<f32>, d: vec3<f32>, s: f32, side: vec3<f32>, less: vec2
     let p = dot(rho, side);
     let q = rho - side * p;
     let square = rc * rc - dot(q, q);
-    let inverse = 1.0 / max(rc, 1e-9);
-    let w = sqrt(max(square, 1e-18));
-    // In front of the axis plane, and behind it.
-    let ahead = w * (w - p) * inverse;
-    let blend = puncture.needle_radius * puncture.needle_radius / 36.0;
-    let part = square / (square + blend);
-    let rate = blend / ((square + blend) * (square + blend));
-    let back = square * inverse - p * part;
-    let is_ahead = p >= 0.0;
-    let value = select(back, ahead, is_ahead);
-    let lateral = select(
-        side * -part - q * (2.0 * inverse - 2.0 * p * rate),
-        (side * -w + q * (p / w - 2.0)) * inverse,
-        is_ahead,
-    );
-    let growth = select(
-        2.0 - square * inverse * inverse - 2.0 * p * rc * rate,
-        2.0 - p / w - ahead * inverse,
-        is_ahead,
-    );
-    let along = (growth - dot(lateral, shift)) * slope - less.y;
+    let w = sqrt(max(square, 0.0));
+    let fade = square + puncture.needle_radius * puncture.needle_radius / 9.0;
+    let part = square / fade;
+    // d phi / d w^2.
+    let rate = (1.0 - part) / fade * (w - p) + 0.5 * w / fade;
+    let value = part * (w - p);
+    let lateral = side * -part - q * (2.0 * rate);
+    let along = (2.0 * rc * rate - dot(lateral, shift)) * slope - less.y;
     return Overlap(select(-1.0, value - less.x, square > 0.0), select(-side, lateral + d * along, square > 0.0));
 }
 #endif
