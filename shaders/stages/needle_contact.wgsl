@@ -11,6 +11,9 @@
 #ifdef FRICTION
 #import effects/friction
 #endif
+#ifdef FLEXIBLE_NEEDLE
+#import effects/flexible_needle
+#endif
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
@@ -42,6 +45,14 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     let tip = step_input.direction.xyz * tip_share(contact.grid.xyz, contact.rest_axial);
     let d = -step_input.direction.xyz;
     let s = dot(lever, d);
+#ifdef FLEXIBLE_NEEDLE
+    let bend = bend_at(s);
+    let from_axis = lever - bend.offset;
+    let needle_velocity = step_input.velocity.xyz + bend.rate;
+#else
+    let from_axis = lever;
+    let needle_velocity = step_input.velocity.xyz;
+#endif
     let passed = contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0;
     var normal = vec3<f32>(0.0);
     var tangential = vec3<f32>(0.0);
@@ -51,18 +62,21 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         var memory = contact_memory[index];
         if (memory.touching == 0.0) {
             memory.touching = 1.0;
-            memory.overlap = max(0.0, opened_path(lever, d, s, contact.rest_radius, vec2<f32>(0.0)).value);
+            memory.overlap = max(0.0, opened_path(from_axis, d, s, contact.rest_radius, vec2<f32>(0.0)).value);
             memory.axial_on = s;
         }
         // An overlap found at activation fades over `entry_fade` of travel, so that the needle does that work.
         let travel = (s - memory.axial_on) / puncture.entry_fade;
         let fading = select(0.0, -memory.overlap / puncture.entry_fade, travel > 0.0 && travel < 1.0);
         let less = vec2<f32>(memory.overlap * clamp(1.0 - travel, 0.0, 1.0), fading);
-        let overlap = opened_path(lever, d, s, contact.rest_radius, less);
+        var overlap = opened_path(from_axis, d, s, contact.rest_radius, less);
+#ifdef FLEXIBLE_NEEDLE
+        overlap.gradient -= d * dot(overlap.gradient, bend.slope);
+#endif
         let depth = overlap.value;
         let steep = length(overlap.gradient);
         let n = overlap.gradient * (-1.0 / steep);
-        let v = node_velocity[contact.node].xyz - step_input.velocity.xyz;
+        let v = node_velocity[contact.node].xyz - needle_velocity;
         let vn = dot(v, n);
         let k = puncture.contact_stiffness;
         let elastic = k * depth * steep;
@@ -89,6 +103,9 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     for (var once = select(1u, 0u, dot(total, total) > 0.0); once == 0u; once++) {
         corner_force[contact.slot] += vec4<f32>(total, 0.0);
         book_contact(index, tip, normal, tangential, lever);
+#ifdef FLEXIBLE_NEEDLE
+        contact_sums[index].work += dot(total, bend.rate) * params.dt;
+#endif
     }
     contact_sums[index].stored = stored;
     // A node that the needle has left forgets.

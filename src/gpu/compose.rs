@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 pub const SOURCES: &[(&str, &str)] = &[
     ("effects/damage", include_str!("../../shaders/effects/damage.wgsl")),
     ("effects/fibres", include_str!("../../shaders/effects/fibres.wgsl")),
+    ("effects/flexible_needle", include_str!("../../shaders/effects/flexible_needle.wgsl")),
     ("effects/friction", include_str!("../../shaders/effects/friction.wgsl")),
     ("effects/gravity", include_str!("../../shaders/effects/gravity.wgsl")),
     ("effects/indentation", include_str!("../../shaders/effects/indentation.wgsl")),

@@ -2,12 +2,14 @@
 
 pub mod banded;
 pub mod beam;
+pub mod centre_line;
+pub mod flexible;
 
 pub mod gap;
 
 use glam::DVec3;
 
-use crate::scene::{Motion, Phase};
+use crate::scene::{Motion, Phase, Vibration};
 
 /// Position and velocity of the tool tip at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,7 +26,7 @@ pub struct ToolPose {
     pub phase: usize,
 }
 
-/// Depth of the tool over time: piecewise linear, one piece per phase.
+/// Depth of the tool over time: piecewise linear, one piece per phase; a vibration of the hub on top.
 #[derive(Debug, Clone)]
 pub struct Kinematics {
     entry: DVec3,
@@ -33,6 +35,7 @@ pub struct Kinematics {
     pieces: Vec<(f64, f64, f64)>,
     end: f64,
     end_depth: f64,
+    vibration: Option<Vibration>,
 }
 
 impl Kinematics {
@@ -50,7 +53,14 @@ impl Kinematics {
             time += duration;
             depth = target;
         }
-        Kinematics { entry: motion.entry, direction: motion.direction, pieces, end: time, end_depth: depth }
+        Kinematics {
+            entry: motion.entry,
+            direction: motion.direction,
+            pieces,
+            end: time,
+            end_depth: depth,
+            vibration: motion.vibration,
+        }
     }
 
     /// Length of the motion [s].
@@ -67,7 +77,7 @@ impl Kinematics {
         })
     }
 
-    /// Pose at `time` [s]; after the end the tool stands still.
+    /// Pose at `time` [s]; after the end the phases stand still.
     pub fn pose(&self, time: f64) -> ToolPose {
         let last = self.pieces.len().saturating_sub(1);
         let phase = self.pieces.iter().rposition(|p| time >= p.0).unwrap_or(0);
@@ -77,11 +87,12 @@ impl Kinematics {
             let (start, depth, rate) = self.pieces[phase];
             (depth + rate * (time - start), rate)
         };
+        let (offset, shaking) = self.vibration.map_or((DVec3::ZERO, DVec3::ZERO), |v| v.at(time));
         ToolPose {
-            tip: self.entry + self.direction * depth,
-            velocity: self.direction * rate,
+            tip: self.entry + self.direction * depth + offset,
+            velocity: self.direction * rate + shaking,
             direction: self.direction,
-            depth,
+            depth: depth + offset.dot(self.direction),
             phase: phase.min(last),
         }
     }

@@ -30,7 +30,7 @@ pub const FORCE_COLUMNS: [&str; 14] = [
 ];
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 25] = [
+pub const ENERGY_COLUMNS: [&str; 26] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -44,6 +44,7 @@ pub const ENERGY_COLUMNS: [&str; 25] = [
     "damage_j",
     "viscous_j",
     "contact_j",
+    "needle_j",
     "imbalance",
     "kinetic_to_internal",
     "hourglass_to_internal",
@@ -171,6 +172,7 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(e.damage),
         number(e.viscous),
         number(e.contact),
+        number(e.needle),
         number(e.imbalance()),
         number(kinetic_to_internal(e)),
         number(hourglass_to_internal(e)),

@@ -276,7 +276,7 @@ pub enum Tool {
     },
 }
 
-/// A rigid solid needle: a cylinder with a straight or oblique conical tip.
+/// A needle, solid to the tissue: a cylinder with a straight or oblique conical tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeedleShape {
     /// What the user calls it, e.g. `16G`.
@@ -287,8 +287,13 @@ pub struct NeedleShape {
     pub tip_length: f64,
     /// Shape of the tip.
     pub tip: TipShape,
-    /// Name of the needle material (rigid here; kept for reports).
+    /// Name of the needle material.
     pub material: String,
+    /// Young's modulus [Pa] and density [kg/m^3] of the material, and diameter of the bore [m] (0: solid): how a flexible
+    /// needle bends.
+    pub youngs_modulus: f64,
+    pub density: f64,
+    pub inner_diameter: f64,
 }
 
 /// Shape of the tip of a needle.
@@ -314,7 +319,16 @@ impl NeedleShape {
 
     /// A needle with a conical tip, of steel. Lengths in m.
     pub fn cone(name: &str, radius: f64, tip_length: f64) -> Self {
-        NeedleShape { name: name.into(), radius, tip_length, tip: TipShape::Cone, material: "steel-304".into() }
+        NeedleShape {
+            name: name.into(),
+            radius,
+            tip_length,
+            tip: TipShape::Cone,
+            material: "steel-304".into(),
+            youngs_modulus: 193e9,
+            density: 7900.0,
+            inner_diameter: 0.0,
+        }
     }
 }
 
@@ -326,6 +340,28 @@ pub struct Motion {
     /// Unit vector of the insertion, into the tissue (z < 0).
     pub direction: DVec3,
     pub phases: Vec<Phase>,
+    /// What the hub does beside the phases.
+    pub vibration: Option<Vibration>,
+}
+
+/// A sinusoidal motion of the hub from t = 0 on: `amplitude sin(2 pi frequency t)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vibration {
+    /// Amplitude [m].
+    pub amplitude: f64,
+    /// Frequency [Hz].
+    pub frequency: f64,
+    /// Unit vector of the motion.
+    pub direction: DVec3,
+}
+
+impl Vibration {
+    /// Offset [m] and its exact derivative [m/s] at `time` [s].
+    pub fn at(&self, time: f64) -> (DVec3, DVec3) {
+        let rate = std::f64::consts::TAU * self.frequency;
+        let (sine, cosine) = (rate * time).sin_cos();
+        (self.direction * (self.amplitude * sine), self.direction * (self.amplitude * rate * cosine))
+    }
 }
 
 impl Motion {
@@ -342,12 +378,14 @@ impl Motion {
         self.entry + self.direction * self.deepest()
     }
 
-    /// Largest speed of all phases [m/s].
+    /// Largest speed of all phases, that of the vibration on top [m/s].
     pub fn largest_speed(&self) -> f64 {
-        self.phases.iter().fold(0.0, |largest, phase| match *phase {
-            Phase::Insert { speed, .. } | Phase::Withdraw { speed, .. } => speed.max(largest),
-            Phase::Hold { .. } => largest,
-        })
+        let shaking = self.vibration.map_or(0.0, |v| v.at(0.0).1.length());
+        shaking
+            + self.phases.iter().fold(0.0, |largest, phase| match *phase {
+                Phase::Insert { speed, .. } | Phase::Withdraw { speed, .. } => speed.max(largest),
+                Phase::Hold { .. } => largest,
+            })
     }
 }
 

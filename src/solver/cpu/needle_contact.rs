@@ -5,13 +5,14 @@ use glam::DVec3;
 use super::{ContactSums, CpuEngine};
 use crate::model::PuncturePlan;
 use crate::needle::ToolPose;
+use crate::needle::centre_line::Bend;
 use crate::needle::gap::Overlap;
 use crate::solver::engine::ContactState;
 
 impl CpuEngine {
     /// Stage `needle_contact`: nodes of the ring that the tip has passed stay outside the opened path (potential
     /// `1/2 k phi^2`, see `needle::gap`); friction on the shaft; tip springs.
-    pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
+    pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
         let d = -pose.direction;
         let k = plan.contact_stiffness;
@@ -19,13 +20,14 @@ impl CpuEngine {
         let profile = plan.profile;
         let cone = profile.tip_length;
         let mut stored = self.tip_energy;
+        let line = self.centre_line;
         let mut tip_on_node: std::collections::HashMap<usize, f64> = Default::default();
         for (force, nodes, weights) in &self.tip_forces {
             for (n, w) in nodes.iter().zip(weights) {
                 *tip_on_node.entry(*n).or_default() += force * w;
             }
         }
-        for (contact, memory) in model.contact_nodes.iter().zip(&mut self.state.contact) {
+        for (index, (contact, memory)) in model.contact_nodes.iter().zip(&mut self.state.contact).enumerate() {
             let node = contact.node as usize;
             let x = model.mesh.rest_position(node) + self.state.displacement[node];
             let mut sums = ContactSums::default();
@@ -34,10 +36,12 @@ impl CpuEngine {
             }
             let relative = x - pose.tip;
             let s = relative.dot(d);
+            let bend = line.map_or(Bend::default(), |l| l.at(s, (step - l.first_step) as f64 * self.dt));
+            let from_axis = relative - bend.offset;
             if !(contact.pushed && contact.rest_axial < a && s > 0.0) {
                 *memory = ContactState::default();
             } else {
-                let free = profile.opened_path(relative, d, contact.rest_radius, (0.0, 0.0));
+                let free = profile.opened_path(from_axis, d, contact.rest_radius, (0.0, 0.0));
                 if !memory.touching {
                     memory.touching = true;
                     memory.overlap = free.value.max(0.0);
@@ -46,10 +50,11 @@ impl CpuEngine {
                 let travel = (s - memory.axial_on) / plan.params.entry_fade;
                 let fading = if travel > 0.0 && travel < 1.0 { -memory.overlap / plan.params.entry_fade } else { 0.0 };
                 let less = (memory.overlap * (1.0 - travel).clamp(0.0, 1.0), fading);
-                let Overlap { value: depth, gradient } = profile.opened_path(relative, d, contact.rest_radius, less);
+                let Overlap { value: depth, gradient } = profile.opened_path(from_axis, d, contact.rest_radius, less);
+                let gradient = gradient - d * gradient.dot(bend.slope);
                 let steep = gradient.length();
                 let n = -gradient / steep;
-                let v = self.state.velocity[node] - pose.velocity;
+                let v = self.state.velocity[node] - pose.velocity - bend.rate;
                 let vn = v.dot(n);
                 let mass = model.node_mass[node];
                 let damping = 2.0 * plan.params.contact_damping * (k * mass).sqrt();
@@ -83,7 +88,21 @@ impl CpuEngine {
             self.external[node] += total;
             stored += sums.stored;
             self.sums.book(&sums, pose, self.dt);
+            if line.is_some() {
+                self.sums.tool_work += total.dot(bend.rate) * self.dt;
+                self.node_impulse[index] += total * self.dt;
+            }
         }
         self.contact_energy = stored;
+    }
+
+    /// Shares the impulses of the frame over the entries of the centre-line, by where the nodes are at its end.
+    pub(super) fn share_needle_loads(&mut self, pose: &ToolPose) {
+        let Some(line) = self.centre_line else { return };
+        for (contact, impulse) in self.model.contact_nodes.iter().zip(&mut self.node_impulse) {
+            let node = contact.node as usize;
+            let x = self.model.mesh.rest_position(node) + self.state.displacement[node];
+            line.share(&mut self.sums.needle_loads, (pose.tip - x).dot(pose.direction), std::mem::take(impulse));
+        }
     }
 }
