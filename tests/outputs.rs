@@ -12,7 +12,7 @@ use stylet::mesh::{BlockMesh, Mesh};
 use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord, Health};
 use stylet::output::folder::{ENERGY_TABLE, FORCE_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY};
 use stylet::output::sample::{Motion as FaceMotion, SAMPLE_COLUMNS};
-use stylet::output::tables::{ENERGY_COLUMNS, FORCE_COLUMNS};
+use stylet::output::tables::{ENERGY_COLUMNS, force_columns};
 use stylet::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Status, Summary, Tables, write_force_chart,
     write_sample_chart,
@@ -109,9 +109,11 @@ fn graded(low: f64, high: f64, cell: f64, fine: f64) -> Vec<f64> {
 }
 
 fn mesh(cell: f64) -> Mesh {
-    Mesh::Block(BlockMesh {
-        lines: [graded(-10e-3, 10e-3, cell, 3e-3), graded(-10e-3, 10e-3, cell, 3e-3), graded(-16e-3, 0.0, cell, 9e-3)],
-    })
+    Mesh::Block(BlockMesh::new([
+        graded(-10e-3, 10e-3, cell, 3e-3),
+        graded(-10e-3, 10e-3, cell, 3e-3),
+        graded(-16e-3, 0.0, cell, 9e-3),
+    ]))
 }
 
 fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
@@ -297,7 +299,7 @@ fn pictures_are_named_by_their_moment() {
 fn tables_grow_row_by_row_and_survive_without_being_closed() {
     let base = tempfile::tempdir().unwrap();
     let folder = OutputFolder::create(Some(base.path()), "scene", false).unwrap();
-    let mut tables = Tables::create(&folder, &[]).unwrap();
+    let mut tables = Tables::create(&folder, &[], false).unwrap();
     assert!(!folder.file(SAMPLE_TABLE).exists());
     let records = records();
     for (rows, record) in records.iter().take(5).enumerate() {
@@ -308,7 +310,7 @@ fn tables_grow_row_by_row_and_survive_without_being_closed() {
         assert!(text.ends_with('\n'));
     }
     std::mem::forget(tables);
-    for (name, columns) in [(FORCE_TABLE, &FORCE_COLUMNS[..]), (ENERGY_TABLE, &ENERGY_COLUMNS[..])] {
+    for (name, columns) in [(FORCE_TABLE, &force_columns()[..]), (ENERGY_TABLE, &ENERGY_COLUMNS[..])] {
         let mut reader = csv::Reader::from_path(folder.file(name)).unwrap();
         assert_eq!(reader.headers().unwrap(), columns);
         let rows: Vec<Vec<f64>> =

@@ -12,7 +12,7 @@ struct CentreLine {
     rate: array<vec4<f32>, 32>,
 }
 
-@group(0) @binding(12) var<uniform> centre_line: CentreLine;
+@group(0) @binding(13) var<uniform> centre_line: CentreLine;
 
 const LAST_ENTRY: f32 = 31.0;
 

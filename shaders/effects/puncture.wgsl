@@ -1,4 +1,7 @@
 // Puncture: state and pure functions of the tip law and of the opened path. Equations: src/effects/puncture.rs.
+#ifdef FREE_PATH
+#import effects/free_path
+#endif
 struct PunctureParams {
     // Length over which the threshold of the tip force falls behind the entry of a material [m].
     transition_length: f32,
@@ -16,17 +19,32 @@ struct PunctureParams {
     // Nodes farther than this from the tip coordinate along the path are on no cell that holds an anchor [m].
     anchor_reach: f32,
     path_cell_count: u32,
-    _pad0: u32,
-    _pad1: u32,
+    // Radius of the softened path, and of the nodes around it that the shaft pushes [m].
+    softened_radius: f32,
+    ring_radius: f32,
     // Shift of a section's centre per radius: zero for a cone, from the apex to the axis for a bevel; w unused.
     shift: vec4<f32>,
-    // Stretches of the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], unused.
+    // Radii of the cutting edge and of the bore [m]; friction coefficient of the bore.
+    edge_radius: f32,
+    bore_radius: f32,
+    bore_friction: f32,
+    _pad2: u32,
+    // Of a free path: direction of the needle before the run, to which `shift` belongs; first cell and cells per axis of
+    // the box of `free_cells`; w unused.
+    reference: vec4<f32>,
+    free_low: vec4<u32>,
+    free_count: vec4<u32>,
+    // Of a free path: of material number i only F_pun and F_cut [N], second and third. Of a planned path: stretches of
+    // the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], unused.
     segments: array<vec4<f32>, 16>,
 }
 
 // Material line parallel to the path: where it enters the surface [m], w: unused.
 struct TipAnchor {
     surface: vec4<f32>,
+    // In a bent grid, whose columns it runs through: column (x, y) and place in it (0..1); z, w unused.
+    column: vec4<u32>,
+    local: vec4<f32>,
 }
 
 // Where an anchor sits now: cell (w unused), local coordinates 0..1, force along the path [N].
@@ -70,7 +88,15 @@ struct PathCell {
 @group(3) @binding(1) var<storage, read_write> tip_state: TipState;
 @group(3) @binding(2) var<storage, read_write> tip_anchor_loads: array<TipAnchorLoad>;
 
+#ifdef BORE
+const ANCHOR_COUNT: u32 = 24u;
+#else
+#ifdef SLIT
+const ANCHOR_COUNT: u32 = 18u;
+#else
 const ANCHOR_COUNT: u32 = 19u;
+#endif
+#endif
 
 // Threshold of the tip force at material coordinate a [N].
 fn tip_threshold(a: f32) -> f32 {
@@ -95,7 +121,10 @@ fn opened_path(lever: vec3<f32>, d: vec3<f32>, s: f32, rest_radius: f32, less: v
     let full_slope = puncture.needle_radius / puncture.tip_length;
     let rc = select(puncture.needle_radius, full_slope * s, on_tip);
     let slope = select(0.0, full_slope, on_tip);
-    let shift = puncture.shift.xyz;
+    var shift = puncture.shift.xyz;
+#ifdef FREE_PATH
+    shift = swing(puncture.reference.xyz, -d, shift);
+#endif
     let radial = lever - d * s - shift * rc;
     let r = length(radial);
     let e = radial * select(0.0, 1.0 / r, r > 1e-9);
@@ -103,3 +132,53 @@ fn opened_path(lever: vec3<f32>, d: vec3<f32>, s: f32, rest_radius: f32, less: v
     let m = rc * slope / open - less.y + slope * dot(e, shift);
     return Overlap(open - less.x - r, d * m - e);
 }
+
+#ifdef SLIT
+// Overlap of one face of a slit with the section, pushed to its own side.
+fn slit_face(lever: vec3<f32>, d: vec3<f32>, s: f32, side: vec3<f32>, less: vec2<f32>) -> Overlap {
+    let on_tip = s < puncture.tip_length;
+    let full_slope = puncture.needle_radius / puncture.tip_length;
+    let rc = select(puncture.needle_radius, full_slope * s, on_tip);
+    let slope = select(0.0, full_slope, on_tip);
+    let shift = puncture.shift.xyz;
+    let rho = lever - d * s - shift * rc;
+    let p = dot(rho, side);
+    let q = rho - side * p;
+    let square = rc * rc - dot(q, q);
+    let inverse = 1.0 / max(rc, 1e-9);
+    let w = sqrt(max(square, 1e-18));
+    // In front of the axis plane, and behind it.
+    let ahead = w * (w - p) * inverse;
+    let blend = puncture.needle_radius * puncture.needle_radius / 36.0;
+    let part = square / (square + blend);
+    let rate = blend / ((square + blend) * (square + blend));
+    let back = square * inverse - p * part;
+    let is_ahead = p >= 0.0;
+    let value = select(back, ahead, is_ahead);
+    let lateral = select(
+        side * -part - q * (2.0 * inverse - 2.0 * p * rate),
+        (side * -w + q * (p / w - 2.0)) * inverse,
+        is_ahead,
+    );
+    let growth = select(
+        2.0 - square * inverse * inverse - 2.0 * p * rc * rate,
+        2.0 - p / w - ahead * inverse,
+        is_ahead,
+    );
+    let along = (growth - dot(lateral, shift)) * slope - less.y;
+    return Overlap(select(-1.0, value - less.x, square > 0.0), select(-side, lateral + d * along, square > 0.0));
+}
+#endif
+#ifdef BORE
+// Overlap of the tissue around a hollow needle with its outer wall (`outside` 1) or of the core with its bore (-1).
+fn tube_wall(lever: vec3<f32>, d: vec3<f32>, s: f32, outside: f32, less: vec2<f32>) -> Overlap {
+    let rho = lever - d * s;
+    let r = length(rho);
+    let e = rho * select(0.0, 1.0 / r, r > 1e-9);
+    let growth = select(puncture.bore_radius, puncture.needle_radius, outside > 0.0) - puncture.edge_radius;
+    let t = clamp(s / puncture.tip_length, 0.0, 1.0);
+    let wall = puncture.edge_radius + growth * t * t * (3.0 - 2.0 * t);
+    let slope = growth * 6.0 * t * (1.0 - t) / puncture.tip_length;
+    return Overlap(outside * (wall - r) - less.x, (d * slope - e) * outside - d * less.y);
+}
+#endif

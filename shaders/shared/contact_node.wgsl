@@ -1,9 +1,15 @@
+#import shared/params
+#import shared/step_input
+
 // A node that the tool may touch: what is known before the run.
 struct ContactNode {
     // Rest position X [m], w unused.
     rest: vec4<f32>,
     // Grid coordinates of the node, w unused.
     grid: vec4<u32>,
+    // Of a surface that separates: side to which a slit face is pushed (unit vector); w: 1 at the outer wall of a hollow
+    // needle, -1 at its bore.
+    surface: vec4<f32>,
     node: u32,
     // Slot of `corner_force` that takes the force on this node.
     slot: u32,
@@ -26,7 +32,13 @@ struct ContactMemory {
     overlap: f32,
     axial_on: f32,
     touching: f32,
-    _pad: f32,
+    // 1 while pressed by the full shaft.
+    on_shaft: f32,
+    // On a free path: 1 where the tip has passed, and the distance from the axis there [m].
+    passed: f32,
+    rest_radius: f32,
+    _pad0: f32,
+    _pad1: f32,
 }
 
 // Sums over the steps of a frame; forces on the tissue.
@@ -62,4 +74,7 @@ fn book_contact(index: u32, tip: vec3<f32>, normal: vec3<f32>, tangential: vec3<
     contact_sums[index].spreading += dot(normal, d);
     contact_sums[index].sliding += dot(tangential, d);
     contact_sums[index].work += dot(total, step_input.velocity.xyz) * params.dt;
+#ifdef FREE_PATH
+    contact_sums[index].work += dot(cross(lever, total), angular_velocity()) * params.dt;
+#endif
 }

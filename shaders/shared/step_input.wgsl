@@ -9,7 +9,7 @@ struct DriveStep {
 
 // What one step is given from outside.
 struct StepInput {
-    // Tip of the tool [m], its velocity [m/s] and the unit vector of the insertion; w unused.
+    // Tip of the tool [m], its velocity [m/s] and the unit vector of the insertion; w: see `angular_velocity`.
     tip: vec4<f32>,
     velocity: vec4<f32>,
     direction: vec4<f32>,
@@ -25,3 +25,10 @@ struct StepInput {
 }
 
 @group(0) @binding(1) var<uniform> step_input: StepInput;
+
+#ifdef FREE_PATH
+// Angular velocity of the tool [rad/s]: its components stand beside tip, velocity and direction.
+fn angular_velocity() -> vec3<f32> {
+    return vec3<f32>(step_input.tip.w, step_input.velocity.w, step_input.direction.w);
+}
+#endif

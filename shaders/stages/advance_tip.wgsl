@@ -13,21 +13,6 @@ var<workgroup> stretches: array<f32, ANCHOR_COUNT>;
 var<workgroup> losses: array<f32, ANCHOR_COUNT>;
 var<workgroup> coordinate: f32;
 
-// Cell of a grid coordinate: lines `offset .. offset + count`.
-fn find_cell(x: f32, offset: u32, count: u32) -> u32 {
-    var low = 0u;
-    var high = count - 1u;
-    while (high - low > 1u) {
-        let middle = (low + high) / 2u;
-        if (grid_lines[offset + middle] <= x) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
 struct AnchorPlace {
     cell: vec3<u32>,
     local: vec3<f32>,
@@ -41,15 +26,22 @@ fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     let X = tip_anchors[anchor].surface.xyz + t * a;
     let y0 = params.nodes_x;
     let z0 = params.nodes_x + params.nodes_y;
+#ifdef BORE
+    let cell = vec3<u32>(tip_anchors[anchor].column.xy, find_cell(X.z, z0, params.nodes_z));
+#else
     let cell = vec3<u32>(
         find_cell(X.x, 0u, params.nodes_x),
         find_cell(X.y, y0, params.nodes_y),
         find_cell(X.z, z0, params.nodes_z),
     );
+#endif
     let low = vec3<f32>(grid_lines[cell.x], grid_lines[y0 + cell.y], grid_lines[z0 + cell.z]);
     let high = vec3<f32>(grid_lines[cell.x + 1u], grid_lines[y0 + cell.y + 1u], grid_lines[z0 + cell.z + 1u]);
     let width = high - low;
-    let local = clamp((X - low) / width, vec3<f32>(0.0), vec3<f32>(1.0));
+    var local = clamp((X - low) / width, vec3<f32>(0.0), vec3<f32>(1.0));
+#ifdef BORE
+    local = vec3<f32>(tip_anchors[anchor].local.xy, local.z);
+#endif
     let rate = t / width;
     var along = 0.0;
     var stretch = 1.0;

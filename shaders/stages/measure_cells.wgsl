@@ -37,7 +37,7 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     for (var index = thread; index < params.cell_count; index += params.measure_threads) {
         let cell = measured_cell(index);
         let energy = cell.energy;
-        sums.overstretched_cells += select(0u, 1u, cell.apart > LARGEST_DIFFERENCE);
+        sums.overstretched_cells += select(0u, 1u, cell.apart > LARGEST_DIFFERENCE && cell.volume > 0.0);
         sums.elastic += energy.elastic;
         sums.hourglass += energy.hourglass;
 #ifdef HISTORY

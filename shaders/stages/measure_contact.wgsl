@@ -14,10 +14,13 @@
 #import effects/flexible_needle
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 // Impulse of this frame on the tissue by each entry of the centre-line [N s], w unused.
-@group(3) @binding(11) var<storage, read_write> needle_loads: array<vec4<f32>, 64>;
+@group(3) @binding(16) var<storage, read_write> needle_loads: array<vec4<f32>, 64>;
 #endif
 #ifdef PUNCTURE
 @group(3) @binding(7) var<storage, read_write> tip_result: TipState;
+#endif
+#ifdef FREE_PATH
+var<workgroup> softened: array<f32, 64>;
 #endif
 
 @compute @workgroup_size(64)
@@ -48,6 +51,22 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
         contact_sums[index] = ContactSums();
     }
     contact_totals[lane] = total;
+#ifdef FREE_PATH
+    var taken = 0.0;
+    for (var index = lane; index < puncture.path_cell_count; index += 64u) {
+        taken += free_cells[index].dissipation;
+        free_cells[index].dissipation = 0.0;
+    }
+    softened[lane] = taken;
+    workgroupBarrier();
+    if (lane == 0u) {
+        tip_result = TipState(free_tip.coordinate, free_tip.dissipation, free_tip.spring_energy, 0.0);
+        free_tip.dissipation = 0.0;
+        for (var other = 0u; other < 64u; other++) {
+            tip_result.softening += softened[other];
+        }
+    }
+#else
 #ifdef PUNCTURE
     if (lane == 0u) {
         tip_result = tip_state;
@@ -57,5 +76,6 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
             path_cells[index].dissipation = 0.0;
         }
     }
+#endif
 #endif
 }

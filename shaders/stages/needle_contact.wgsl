@@ -18,6 +18,47 @@
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
 
+#ifdef FREE_PATH
+// Share of the tip springs that acts on a grid node [N]; nothing for nodes that no anchor can reach.
+fn tip_share(grid: vec3<u32>, rest: vec3<f32>) -> vec3<f32> {
+    var force = vec3<f32>(0.0);
+    let away = rest - free_tip.place.xyz;
+    let near = free_tip.inside == 1.0 && dot(away, away) <= puncture.anchor_reach * puncture.anchor_reach;
+    for (var anchor = select(ANCHOR_COUNT, 0u, near); anchor < ANCHOR_COUNT; anchor++) {
+        let cell = tip_anchor_loads[anchor].cell.xyz;
+        let local = tip_anchor_loads[anchor].local.xyz;
+        let weight = select(vec3<f32>(0.0), 1.0 - local, grid == cell)
+            + select(vec3<f32>(0.0), local, grid == cell + 1u);
+        let axial = step_input.direction.xyz * tip_anchor_loads[anchor].force;
+        force += (axial + free_tip.sway.xyz) * (weight.x * weight.y * weight.z);
+    }
+    return force;
+}
+
+// Brings what node `index` knows of the tip to this step. Returns whether it is to be kept out of the needle, and its r0.
+fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> vec2<f32> {
+    let T = free_tip.along.xyz;
+    let relative = rest - free_tip.place.xyz;
+    let ahead = dot(relative, T);
+    let radius = length(relative - T * ahead);
+    let ring = puncture.ring_radius;
+    let old = contact_memory[index].passed == 1.0;
+    let passes = ahead <= 0.0 && ahead > -ring && radius < ring;
+    let passed = free_tip.inside == 1.0 && select(passes, ahead < PASSED_MARGIN, old);
+    for (var once = select(1u, 0u, passed != old); once == 0u; once++) {
+        var fresh = ContactMemory();
+        fresh.passed = select(0.0, 1.0, passed);
+        fresh.rest_radius = select(0.0, radius, passed);
+        contact_memory[index] = fresh;
+    }
+    let rest_radius = contact_memory[index].rest_radius;
+    // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.
+    let reach = WATCHED * puncture.needle_radius;
+    let met = free_tip.inside == 1.0 && !passed && s > puncture.tip_length && dot(lever, lever) - s * s < reach * reach;
+    let kept_out = met || (passed && rest_radius > puncture.softened_radius);
+    return vec2<f32>(select(0.0, 1.0, kept_out), rest_radius);
+}
+#else
 // Share of the tip springs that acts on a grid node, along the insertion direction [N]. The loop is empty for nodes
 // that no anchor can reach.
 fn tip_share(grid: vec3<u32>, rest_axial: f32) -> f32 {
@@ -32,6 +73,27 @@ fn tip_share(grid: vec3<u32>, rest_axial: f32) -> f32 {
     }
     return force;
 }
+#endif
+
+// How deep the node lies in the needle; `less`: what fades out after the entry.
+fn overlap_of(
+    surface: vec4<f32>,
+    rest_radius: f32,
+    lever: vec3<f32>,
+    d: vec3<f32>,
+    s: f32,
+    less: vec2<f32>,
+) -> Overlap {
+#ifdef BORE
+    return tube_wall(lever, d, s, surface.w, less);
+#else
+#ifdef SLIT
+    return slit_face(lever, d, s, surface.xyz, less);
+#else
+    return opened_path(lever, d, s, rest_radius, less);
+#endif
+#endif
+}
 
 @compute @workgroup_size(64)
 fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -42,7 +104,6 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     let contact = contact_nodes[index];
     let lever = contact.rest.xyz + vec3<f32>(node_displacement[contact.node].xyz) * DISPLACEMENT_UNIT
         - step_input.tip.xyz;
-    let tip = step_input.direction.xyz * tip_share(contact.grid.xyz, contact.rest_axial);
     let d = -step_input.direction.xyz;
     let s = dot(lever, d);
 #ifdef FLEXIBLE_NEEDLE
@@ -53,30 +114,44 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     let from_axis = lever;
     let needle_velocity = step_input.velocity.xyz;
 #endif
+#ifdef FREE_PATH
+    let tip = tip_share(contact.grid.xyz, contact.rest.xyz);
+    let met = free_contact(index, contact.rest.xyz, from_axis, s);
+    let passed = met.x == 1.0 && s > 0.0;
+    let rest_radius = met.y;
+#else
+    let tip = step_input.direction.xyz * tip_share(contact.grid.xyz, contact.rest_axial);
     let passed = contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0;
+    let rest_radius = contact.rest_radius;
+#endif
     var normal = vec3<f32>(0.0);
     var tangential = vec3<f32>(0.0);
     var stored = 0.0;
+    // Stiffness that a separated face adds at its node [N/m]: it has half the mass of the others.
+    var bound = 0.0;
     // Loops that run once or not at all: software adapters skip them, where they would walk through an `if`.
     for (var once = select(1u, 0u, passed); once == 0u; once++) {
         var memory = contact_memory[index];
         if (memory.touching == 0.0) {
             memory.touching = 1.0;
-            memory.overlap = max(0.0, opened_path(from_axis, d, s, contact.rest_radius, vec2<f32>(0.0)).value);
+            memory.overlap = max(0.0, overlap_of(contact.surface, rest_radius, from_axis, d, s, vec2<f32>(0.0)).value);
             memory.axial_on = s;
         }
         // An overlap found at activation fades over `entry_fade` of travel, so that the needle does that work.
         let travel = (s - memory.axial_on) / puncture.entry_fade;
         let fading = select(0.0, -memory.overlap / puncture.entry_fade, travel > 0.0 && travel < 1.0);
         let less = vec2<f32>(memory.overlap * clamp(1.0 - travel, 0.0, 1.0), fading);
-        var overlap = opened_path(from_axis, d, s, contact.rest_radius, less);
+        var overlap = overlap_of(contact.surface, rest_radius, from_axis, d, s, less);
 #ifdef FLEXIBLE_NEEDLE
         overlap.gradient -= d * dot(overlap.gradient, bend.slope);
 #endif
         let depth = overlap.value;
         let steep = length(overlap.gradient);
         let n = overlap.gradient * (-1.0 / steep);
-        let v = node_velocity[contact.node].xyz - needle_velocity;
+        var v = node_velocity[contact.node].xyz - needle_velocity;
+#ifdef FREE_PATH
+        v -= cross(angular_velocity(), lever);
+#endif
         let vn = dot(v, n);
         let k = puncture.contact_stiffness;
         let elastic = k * depth * steep;
@@ -86,10 +161,18 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
         contact_sums[index].damping_dissipation +=
             select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
+#ifdef COHESIVE
+        bound = select(0.0, 2.0 * k * steep * steep, depth > 0.0);
+        memory.on_shaft = select(0.0, 1.0, depth > 0.0 && s >= puncture.tip_length);
+#endif
 #ifdef FRICTION
         let kt = friction.stiffness_ratio * k;
         let grown = clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);
-        let allowed = friction.coefficient * grown * pressure / kt;
+        var coefficient = friction.coefficient;
+#ifdef BORE
+        coefficient = select(puncture.bore_friction, coefficient, contact.surface.w > 0.0);
+#endif
+        let allowed = coefficient * grown * pressure / kt;
         let trial = stick_trial(memory.stick.xyz, (v - n * vn) * params.dt, n);
         let stretch = stick_return(trial, allowed);
         memory.stick = vec4<f32>(stretch, 0.0);
@@ -101,7 +184,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     }
     let total = tip + normal + tangential;
     for (var once = select(1u, 0u, dot(total, total) > 0.0); once == 0u; once++) {
-        corner_force[contact.slot] += vec4<f32>(total, 0.0);
+        corner_force[contact.slot] += vec4<f32>(total, bound);
         book_contact(index, tip, normal, tangential, lever);
 #ifdef FLEXIBLE_NEEDLE
         contact_sums[index].work += dot(total, bend.rate) * params.dt;
@@ -110,6 +193,11 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     contact_sums[index].stored = stored;
     // A node that the needle has left forgets.
     for (var once = select(0u, 1u, passed); once == 0u && contact_memory[index].touching != 0.0; once++) {
-        contact_memory[index] = ContactMemory();
+        var left = ContactMemory();
+#ifdef FREE_PATH
+        left.passed = contact_memory[index].passed;
+        left.rest_radius = contact_memory[index].rest_radius;
+#endif
+        contact_memory[index] = left;
     }
 }

@@ -138,13 +138,11 @@ pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
 }
 
 pub(super) fn uniform_mesh(cells: [usize; 3], h: f64) -> BlockMesh {
-    BlockMesh {
-        lines: std::array::from_fn(|a| {
-            let n = cells[a];
-            let start = if a == 2 { -(n as f64) * h } else { -0.5 * n as f64 * h };
-            (0..=n).map(|i| start + i as f64 * h).collect()
-        }),
-    }
+    BlockMesh::new(std::array::from_fn(|a| {
+        let n = cells[a];
+        let start = if a == 2 { -(n as f64) * h } else { -0.5 * n as f64 * h };
+        (0..=n).map(|i| start + i as f64 * h).collect()
+    }))
 }
 
 /// A prepared block that steps on request.
@@ -313,11 +311,7 @@ fn frame_overhead(gpu: Option<&Gpu>) -> Result<f64> {
 /// Time from program start to the first finished step of 20 k cells [ms] and peak memory [MB], in a fresh process.
 fn start(cold: bool, engine: EngineChoice) -> Option<(f64, f64)> {
     let mut command = std::process::Command::new(std::env::current_exe().ok()?);
-    command.arg("first-step").arg("--engine").arg(match engine {
-        EngineChoice::Auto => "auto",
-        EngineChoice::Gpu => "gpu",
-        EngineChoice::Cpu => "cpu",
-    });
+    command.arg("first-step").arg("--engine").arg(engine.key());
     if cold {
         // Drivers keep compiled shaders on disk; Mesa and NVIDIA have their own switches.
         command.env("MESA_SHADER_CACHE_DISABLE", "true").env("__GL_SHADER_DISK_CACHE", "0");

@@ -165,6 +165,9 @@ pub fn off_is_absent() -> Result<bool> {
             loaded_faces: false,
             driven_faces: false,
             regions: false,
+            bore: false,
+            slit: false,
+            free_path: false,
             tetrahedra: false,
             laws: BTreeSet::from([laws]),
         };

@@ -9,7 +9,7 @@ use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables, folder,
-    write_force_chart, write_sample_chart,
+    write_force_chart, write_parts_chart, write_sample_chart,
 };
 use crate::process;
 use crate::render;
@@ -65,7 +65,7 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         simulation.stop_after(moment.frame);
     }
     let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
-    let mut tables = Tables::create(&output, &driven)?;
+    let mut tables = Tables::create(&output, &driven, simulation.model.has_bore())?;
     let mut fields = FieldFiles::new(&output);
     let progress = Progress::new(simulation.duration());
     let device = simulation.device().cloned();
@@ -153,6 +153,9 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     if !records.is_empty() {
         let figures = CurveFigures::from_records(&records);
         write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, &records, &figures)?;
+        if scene.tool.is_some() {
+            write_parts_chart(&output.file(folder::FORCE_PARTS_CHART), &scene.title, &records)?;
+        }
         if !driven.is_empty() {
             write_sample_chart(&output.file(folder::SAMPLE_CHART), &scene.title, &driven, &records)?;
         }
@@ -189,20 +192,21 @@ fn difference(after: Option<f64>, before: Option<f64>) -> Option<f64> {
 /// The frames at which pictures and field files are due.
 fn moments(simulation: &Simulation) -> Vec<Moment> {
     let outputs = &simulation.model.scene.outputs;
+    let frame_of_time = |t: f64| (t <= simulation.duration() + simulation.dt).then(|| simulation.frame_at(t));
     let frame_of = |value: f64| match &simulation.model.kinematics {
         // A depth counts on the way in: the first time that the tool gets there.
         Some(k) => k.time_of_depth(value).map(|t| simulation.frame_at(t)),
-        None => (value <= simulation.duration() + simulation.dt).then(|| simulation.frame_at(value)),
+        None => frame_of_time(value),
     };
     let has_tool = simulation.model.kinematics.is_some();
     let name = |v: f64| if has_tool { PictureMoment::Depth(v) } else { PictureMoment::Time(v) };
-    let pictures = outputs
-        .pictures_at
-        .iter()
-        .filter_map(|v| Some(Moment { frame: frame_of(*v)?, picture: Some(name(*v)), field: false }));
-    let fields =
-        outputs.fields_at.iter().filter_map(|v| Some(Moment { frame: frame_of(*v)?, picture: None, field: true }));
-    pictures.chain(fields).collect()
+    let picture = |frame: Option<u64>, at| Some(Moment { frame: frame?, picture: Some(at), field: false });
+    let field = |frame: Option<u64>| Some(Moment { frame: frame?, picture: None, field: true });
+    let by_time = outputs.pictures_at_time.iter().map(|t| picture(frame_of_time(*t), PictureMoment::Time(*t)));
+    let pictures = outputs.pictures_at.iter().map(|v| picture(frame_of(*v), name(*v))).chain(by_time);
+    let fields = outputs.fields_at.iter().map(|v| field(frame_of(*v)));
+    let fields = fields.chain(outputs.fields_at_time.iter().map(|t| field(frame_of_time(*t))));
+    pictures.chain(fields).flatten().collect()
 }
 
 fn write_moment(
@@ -260,6 +264,17 @@ pub fn describe(summary: &Summary) -> String {
             stress * 1e-3
         );
     }
+    if let (Some(length), Some(rest), Some(mass)) =
+        (summary.core_length_m, summary.core_rest_length_m, summary.core_mass_kg)
+    {
+        text += &format!(
+            "core: {:.2} mm in the bore, {:.2} mm at rest ({:.0} % strain), {:.2} mg\n",
+            length * 1e3,
+            rest * 1e3,
+            100.0 * summary.core_strain.unwrap_or(0.0),
+            mass * 1e6
+        );
+    }
     text += &format!(
         "energy: imbalance {:.2} % of the external work, kinetic/internal {:.3} %, hourglass/internal {:.1} % (largest \
          {:.1} %); {} clamped nodes, {} inverted cells",
@@ -276,12 +291,15 @@ pub fn describe(summary: &Summary) -> String {
 /// Exit code of an interrupted run, as shells have it for Ctrl-C.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
+/// Exit code of a run that left the range in which its numbers mean something.
+pub const EXIT_DIVERGED: u8 = 3;
+
 /// Exit code of a finished run.
 pub fn exit_code(outcome: &Result<RunOutcome>) -> u8 {
     match outcome {
         Ok(o) if o.summary.status == Status::Interrupted => EXIT_INTERRUPTED,
         Ok(_) => 0,
-        Err(Error::Diverged { .. }) => 3,
+        Err(Error::Diverged { .. }) => EXIT_DIVERGED,
         Err(error) => error.exit_code(),
     }
 }

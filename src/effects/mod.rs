@@ -1,5 +1,6 @@
 //! Effects are chosen by the scene. `None` means absent: no define, no buffer, no binding, no code.
 
+pub mod cohesive;
 pub mod damage;
 pub mod fibres;
 pub mod flexible_needle;
@@ -21,6 +22,7 @@ pub struct EffectSet {
     pub fibres: Option<fibres::Params>,
     pub viscoelastic: Option<viscoelastic::Params>,
     pub damage: Option<damage::Params>,
+    pub cohesive: Option<cohesive::Params>,
     pub puncture: Option<puncture::Params>,
     pub indentation: Option<indentation::Params>,
     pub friction: Option<friction::Params>,
@@ -43,13 +45,14 @@ pub struct Effect {
 }
 
 /// All effects. The order is the order of their blocks in the stages.
-pub const EFFECTS: [Effect; 10] = [
+pub const EFFECTS: [Effect; 11] = [
     mass_scaling::EFFECT,
     gravity::EFFECT,
     plasticity::EFFECT,
     fibres::EFFECT,
     viscoelastic::EFFECT,
     damage::EFFECT,
+    cohesive::EFFECT,
     puncture::EFFECT,
     indentation::EFFECT,
     friction::EFFECT,
@@ -66,6 +69,7 @@ impl EffectSet {
             self.fibres.is_some(),
             self.viscoelastic.is_some(),
             self.damage.is_some(),
+            self.cohesive.is_some(),
             self.puncture.is_some(),
             self.indentation.is_some(),
             self.friction.is_some(),

@@ -18,8 +18,8 @@
 //! normal = (e - m d)/sqrt(1 + m^2),  m = d r_e/ds,  f = k depth - 2 zeta sqrt(k m_node) v_n, never tensile
 //! ```
 //! `s`: distance behind the tip, `d`: from tip to hub, `e`: radial. An overlap found when the tip passes fades over
-//! `entry_fade` of travel, so that the needle does that work. Range of validity: straight planned path, needle radius of one
-//! to two cells. Source: this project; F_cut = G_c w with the toughness of liver under needles, 76 to 185 J/m^2 [Azar2008],
+//! `entry_fade` of travel, so that the needle does that work. A motion that leaves one straight line has a free path
+//! (src/needle/free_path.rs). Range of validity: needle radius of one to two cells. Source: this project; F_cut = G_c w with the toughness of liver under needles, 76 to 185 J/m^2 [Azar2008],
 //! 164 J/m^2 [Gokgol2012].
 
 use super::Effect;
@@ -56,6 +56,8 @@ pub struct Params {
     pub contact_damping: f64,
     /// Travel over which an overlap found at activation fades out [m].
     pub entry_fade: f64,
+    /// Find the path while the tip moves even where it could be planned.
+    pub always_free: bool,
 }
 
 impl Default for Params {
@@ -71,6 +73,7 @@ impl Default for Params {
             contact_stiffness_factor: 2.35,
             contact_damping: 0.2,
             entry_fade: 2.0e-3,
+            always_free: false,
         }
     }
 }

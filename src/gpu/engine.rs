@@ -16,9 +16,14 @@ use crate::effects::EffectSet;
 use crate::error::{Error, Result};
 use crate::material::Isochoric;
 use crate::material_point::{Material as Constants, PointState};
-use crate::model::{ANCHOR_COUNT, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model};
+use crate::mesh::BlockMesh;
+use crate::model::{
+    ContactSurface, FreePlan, LARGEST_ANCHOR_COUNT, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model,
+};
+use crate::needle::free_path as needle;
 use crate::scene::Tool;
-use crate::solver::elements::HOURGLASS_MODULUS;
+use crate::solver::cpu::TORN_REACH;
+use crate::solver::elements::{HOURGLASS_MODULUS, PrismBase};
 use crate::solver::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State};
 use crate::solver::step::Stage;
 
@@ -34,6 +39,9 @@ const MAPPING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(10)
 /// Partial sums per face of `measure_faces`.
 const FACE_PARTS: usize = 64;
 
+/// Partial sums of `measure_separation`.
+const SEPARATION_PARTS: usize = 64;
+
 /// Partial sums of `measure_contact`.
 const CONTACT_PARTS: usize = 64;
 
@@ -46,6 +54,11 @@ pub struct Features {
     pub regions: bool,
     /// Tetrahedra instead of the block.
     pub tetrahedra: bool,
+    /// The tissue separates around a hollow needle, or on a slit before a solid one.
+    pub bore: bool,
+    pub slit: bool,
+    /// The path of the needle is found while the tip moves.
+    pub free_path: bool,
     /// Keys of the elastic laws that occur.
     pub laws: BTreeSet<&'static str>,
 }
@@ -57,6 +70,9 @@ impl Features {
             driven_faces: model.has_driven_faces(),
             regions: !model.cell_material.is_empty(),
             tetrahedra: model.mesh.as_tets().is_some(),
+            bore: model.has_surface(|s| matches!(s, ContactSurface::OuterWall | ContactSurface::Bore)),
+            slit: model.has_surface(|s| matches!(s, ContactSurface::Slit { .. })),
+            free_path: model.puncture.as_ref().is_some_and(|p| p.free.is_some()),
             laws: model.materials.iter().map(|m| m.law.isochoric.key()).collect(),
         }
     }
@@ -72,12 +88,12 @@ pub const LAWS: [(&str, &str); 5] = [
 ];
 
 /// Effects of tools, which work on the block only.
-const BLOCK_EFFECTS: [&str; 4] = ["puncture", "indentation", "friction", "flexible_needle"];
+const BLOCK_EFFECTS: [&str; 5] = ["cohesive", "puncture", "indentation", "friction", "flexible_needle"];
 
 /// Names that are defined for the shaders.
 pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
-    // A flexible needle acts by the contact of `puncture`.
-    let bends = effects.puncture.is_some();
+    // A flexible needle acts by the contact of `puncture`, on a planned path.
+    let bends = effects.puncture.is_some() && !features.free_path;
     let works =
         |key: &str| (!features.tetrahedra || !BLOCK_EFFECTS.contains(&key)) && (key != "flexible_needle" || bends);
     let mut defines: BTreeSet<&'static str> = effects.active().filter(|e| works(e.key)).map(|e| e.define).collect();
@@ -93,6 +109,10 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     define("NODE_WORK", loaded || driven);
     define("REGIONS", features.regions);
     define("TETRAHEDRA", features.tetrahedra);
+    let separates = !features.tetrahedra && effects.cohesive.is_some() && effects.puncture.is_some();
+    define("BORE", features.bore && separates);
+    define("SLIT", features.slit && separates);
+    define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
     // The bulk stiffness of a cell is not that of all others.
     define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || effects.damage.is_some()));
     define("HISTORY", effects.plasticity.is_some() || effects.viscoelastic.is_some() || effects.damage.is_some());
@@ -109,8 +129,14 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     let (block, tetrahedra) = (!features.tetrahedra, features.tetrahedra);
     let puncture = block && effects.puncture.is_some();
     let indentation = block && effects.indentation.is_some();
+    let cohesive = block && effects.cohesive.is_some();
     let wanted = |stage: &Stage| match stage {
-        Stage::AdvanceTip | Stage::SoftenPath | Stage::NeedleContact => puncture,
+        // Where faces separate no cell is softened, but a core is severed.
+        Stage::SoftenPath => puncture && (!cohesive || features.bore) && !features.free_path,
+        Stage::CohesiveForces | Stage::MeasureSeparation => cohesive,
+        Stage::AdvanceTip => puncture && !features.free_path,
+        Stage::AdvanceFreeTip | Stage::SoftenFreePath => puncture && features.free_path,
+        Stage::NeedleContact => puncture,
         Stage::IndenterContact => indentation,
         Stage::MeasureContact => puncture || indentation,
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
@@ -200,7 +226,7 @@ impl GpuEngine {
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
         let results: Vec<ResultRange> =
-            ["cell_sums", "node_sums", "contact_totals", "face_sums", "needle_loads", "tip_result"]
+            ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "needle_loads", "tip_result"]
                 .into_iter()
                 .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
                 .map(|(name, size)| {
@@ -371,6 +397,13 @@ impl GpuEngine {
                         *load = DVec3::new(s[0].into(), s[1].into(), s[2].into());
                     }
                 }
+                "separation_sums" => {
+                    for s in read_all::<SeparationSums>(bytes) {
+                        sums.cohesive_dissipation += f64::from(s.dissipation);
+                        sums.cohesive_energy += f64::from(s.stored);
+                        sums.torn_area += f64::from(s.torn_area);
+                    }
+                }
                 "contact_totals" => {
                     for s in read_all::<ContactSums>(bytes) {
                         let vector = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
@@ -479,7 +512,8 @@ fn measure_threads(model: &Model) -> u32 {
 /// Threads that a stage needs.
 fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -> u32 {
     match stage {
-        Stage::AdvanceTip => 32,
+        Stage::AdvanceTip | Stage::AdvanceFreeTip => 32,
+        Stage::SoftenFreePath => free_plan(model).map_or(1, |f| f.cell_count() as u32),
         Stage::SoftenPath => model.puncture.as_ref().map_or(1, |p| p.cells.len() as u32),
         Stage::MeasureDilatation | Stage::TetrahedronForces => model.mesh.cell_count() as u32,
         Stage::AveragePressure => model.mesh.node_count() as u32,
@@ -487,13 +521,20 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
         Stage::NeedleContact | Stage::IndenterContact => model.contact_nodes.len() as u32,
         Stage::IntegrateNodes => model.mesh.node_count() as u32,
         Stage::MeasureCells | Stage::MeasureNodes => measure_threads,
+        Stage::CohesiveForces => model.separation.pairs.len() as u32,
+        Stage::MeasureSeparation => SEPARATION_PARTS as u32,
         Stage::MeasureContact => CONTACT_PARTS as u32,
         Stage::MeasureFaces => 6 * FACE_PARTS as u32,
     }
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 47] = [
+const BUFFERS: [&str; 54] = [
+    "cohesive",
+    "face_pairs",
+    "pair_states",
+    "separation_sums",
+    "tied_nodes",
     "params",
     STEP_INPUT,
     "gravity",
@@ -519,6 +560,8 @@ const BUFFERS: [&str; 47] = [
     "cell_stiffness",
     "tip_state",
     "tip_anchor_loads",
+    "free_tip",
+    "free_cells",
     "contact_memory",
     "contact_sums",
     "face_sums",
@@ -582,8 +625,13 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "centre_line" => zeros(1, size_of::<CentreLine>()),
         "needle_loads" => zeros(CONTACT_PARTS as u64, 16),
         "indentation" => bytes_of(&[indentation_params(model)]),
+        "cohesive" => bytes_of(&[cohesive_params(model)]),
+        "face_pairs" => bytes_of(&face_pairs(model, layout)),
+        "pair_states" => zeros(model.separation.pairs.len().max(1) as u64, size_of::<PairState>()),
+        "separation_sums" => zeros(SEPARATION_PARTS as u64, size_of::<SeparationSums>()),
+        "tied_nodes" => bytes_of(&tied_nodes(model)),
         "cell_edges" => {
-            let edges: Vec<CellEdge> = model
+            let mut edges: Vec<CellEdge> = model
                 .mesh
                 .block()
                 .lines
@@ -592,10 +640,14 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
                 .map(|d| CellEdge {
                     length: d as f32,
                     cube_root: d.cbrt() as f32,
-                    quarter_inverse: (0.25 / d) as f32,
+                    // A gap between two copies of a line carries nothing.
+                    quarter_inverse: if d > 0.0 { (0.25 / d) as f32 } else { 0.0 },
                     _pad: 0.0,
                 })
                 .collect();
+            if model.mesh.block().bore.is_some() {
+                edges.extend(bent_columns(model.mesh.block()));
+            }
             bytes_of(&edges)
         }
         "node_mass" => bytes_of(&model.node_mass.iter().map(|m| *m as f32).collect::<Vec<_>>()),
@@ -605,7 +657,12 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "tip_anchors" => {
             let plan = model.puncture.as_ref();
             let anchors = plan.map_or(&[][..], |p| &p.anchors);
-            bytes_of(&anchors.iter().map(|a| TipAnchor { surface: vec4(a.surface) }).collect::<Vec<_>>())
+            let block = model.mesh.block();
+            let anchor = |a: &crate::model::TipAnchor| {
+                let ([i, j, _], local) = block.locate(a.surface);
+                TipAnchor { surface: vec4(a.surface), column: [i as u32, j as u32, 0, 0], local: vec4(local) }
+            };
+            bytes_of(&anchors.iter().map(anchor).collect::<Vec<_>>())
         }
         "path_cells" => {
             let plan = model.puncture.as_ref();
@@ -638,7 +695,9 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "node_sums" => zeros(measure_threads.into(), size_of::<NodeSums>()),
         "cell_stiffness" => bytes_of(&vec![1.0f32; model.mesh.cell_count()]),
         "tip_state" | "tip_result" => zeros(1, size_of::<TipState>()),
-        "tip_anchor_loads" => zeros(ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
+        "tip_anchor_loads" => zeros(LARGEST_ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
+        "free_tip" => bytes_of(&[free_tip(&model.free_tip())]),
+        "free_cells" => bytes_of(&free_cells(model, &[])),
         "contact_memory" => zeros(contacts, size_of::<ContactMemory>()),
         "contact_sums" => zeros(contacts, size_of::<ContactSums>()),
         "face_sums" => zeros(6 * FACE_PARTS as u64, 16),
@@ -870,7 +929,25 @@ fn puncture_params(model: &Model) -> PunctureParams {
             *out = [s.start as f32, c.puncture_force as f32, c.cutting_force as f32, 0.0];
         }
         let tallest = model.mesh.block().lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-        let anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
+        let mut anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
+        let (mut free_low, mut free_count, mut path_cell_count) = ([0; 4], [0; 4], plan.cells.len());
+        if let Some(free) = &plan.free {
+            let mesh = model.mesh.block();
+            let diagonal = |index: usize| {
+                let [i, j, k] = free.cell(index);
+                mesh.cell_size(mesh.cell_index(i, j, k)).length()
+            };
+            // An anchor acts on the corners of its cell.
+            anchor_reach = 1.001 * (plan.needle.radius + (0..free.cell_count()).map(diagonal).fold(0.0, f64::max));
+            for (out, value) in free_low.iter_mut().zip(free.low).chain(free_count.iter_mut().zip(free.count)) {
+                *out = value as u32;
+            }
+            for (out, i) in segments.iter_mut().zip(0..) {
+                let c = free.cuttings.get(i).unwrap_or(&free.cuttings[0]);
+                *out = [0.0, c.puncture_force as f32, c.cutting_force as f32, 0.0];
+            }
+            path_cell_count = free.cell_count();
+        }
         PunctureParams {
             transition_length: p.transition_length as f32,
             tip_stiffness: p.tip_stiffness as f32,
@@ -881,12 +958,59 @@ fn puncture_params(model: &Model) -> PunctureParams {
             needle_radius: plan.needle.radius as f32,
             tip_length: plan.needle.tip_length as f32,
             anchor_reach: anchor_reach as f32,
-            path_cell_count: plan.cells.len() as u32,
+            path_cell_count: path_cell_count as u32,
+            softened_radius: p.softened_radius as f32,
+            ring_radius: p.ring_radius as f32,
             shift: vec4(plan.profile.shift),
+            edge_radius: plan.profile.bore.map_or(0.0, |b| b.edge as f32),
+            bore_radius: plan.profile.bore.map_or(0.0, |b| b.radius as f32),
+            bore_friction: plan.needle.bore.map_or(0.0, |b| b.friction as f32),
+            reference: vec4(plan.path.direction),
+            free_low,
+            free_count,
             segments,
             ..Zeroable::zeroed()
         }
     })
+}
+
+fn free_plan(model: &Model) -> Option<&FreePlan> {
+    model.puncture.as_ref().and_then(|p| p.free.as_ref())
+}
+
+fn free_tip(tip: &needle::FreeTip) -> FreeTip {
+    FreeTip {
+        place: vec4(tip.place),
+        along: vec4(tip.along),
+        across: vec4(tip.across),
+        coordinate: tip.coordinate as f32,
+        entry: tip.entry as f32,
+        advance: tip.advance as f32,
+        inside: if tip.inside { 1.0 } else { 0.0 },
+        material: tip.material as u32,
+        ..Zeroable::zeroed()
+    }
+}
+
+/// The cells of the box of a free path with their marked samples; without any where `samples` is empty.
+fn free_cells(model: &Model, samples: &[u64]) -> Vec<FreeCell> {
+    let (Some(free), Some(mesh)) = (free_plan(model), model.mesh.as_block()) else { return Vec::new() };
+    (0..free.cell_count())
+        .map(|index| {
+            let [i, j, k] = free.cell(index);
+            let cell = mesh.cell_index(i, j, k);
+            let marked = samples.get(index).copied().unwrap_or(0);
+            FreeCell {
+                low: vec4(DVec3::new(mesh.lines[0][i], mesh.lines[1][j], mesh.lines[2][k])),
+                size: vec4(mesh.cell_size(cell)),
+                cell: cell as u32,
+                material: model.material_index(cell) as u32,
+                marked_low: marked as u32,
+                marked_high: (marked >> 32) as u32,
+                ..Zeroable::zeroed()
+            }
+        })
+        .collect()
 }
 
 fn indentation_params(model: &Model) -> IndentationParams {
@@ -906,6 +1030,87 @@ fn indentation_params(model: &Model) -> IndentationParams {
     }
 }
 
+/// Two vectors per column, in the layout that `shared/bent_column` reads.
+fn bent_columns(block: &BlockMesh) -> Vec<CellEdge> {
+    let [nx, ny, _] = block.cells();
+    let vector = |v: [f64; 4]| {
+        let [length, cube_root, quarter_inverse, _pad] = v.map(|v| v as f32);
+        CellEdge { length, cube_root, quarter_inverse, _pad }
+    };
+    (0..nx * ny)
+        .flat_map(|cell| {
+            let base = PrismBase::new(block, cell);
+            let [xi, eta] = base.gradients;
+            [vector([xi.x, xi.y, eta.x, eta.y]), vector([base.taper.x, base.taper.y, base.area, base.area.cbrt()])]
+        })
+        .collect()
+}
+
+fn cohesive_params(model: &Model) -> CohesiveParams {
+    let Some(law) = model.cohesion else { return CohesiveParams::zeroed() };
+    let h = model.scene.tissue.cell_size;
+    CohesiveParams {
+        onset: (law.strength / law.penalty) as f32,
+        shear_onset: (law.shear_strength / law.penalty) as f32,
+        energy: (2.0 * law.energy / law.penalty) as f32,
+        shear_energy: (2.0 * law.shear_energy / law.penalty) as f32,
+        exponent: law.exponent as f32,
+        penalty: law.penalty as f32,
+        inverse_ramp: (1.0 / h) as f32,
+        torn_reach: (TORN_REACH * h) as f32,
+        pair_count: model.separation.pairs.len() as u32,
+        ..Zeroable::zeroed()
+    }
+}
+
+fn face_pairs(model: &Model, layout: &Layout) -> Vec<FacePair> {
+    // Farther than any path [m].
+    const NEVER: f64 = 1e6;
+    let Some(block) = model.mesh.as_block() else { return Vec::new() };
+    let contact_of = |node: u32| model.contact_nodes.binary_search_by_key(&node, |c| c.node).ok();
+    let untouched = model.contact_nodes.iter().position(|c| !c.pushed).unwrap_or(0);
+    let mut pairs: Vec<FacePair> = model
+        .separation
+        .pairs
+        .iter()
+        .map(|pair| {
+            let [a, b] = pair.nodes;
+            let slot = |n: u32| {
+                let at = block.node_coordinates(n as usize);
+                layout.strips().pair_slot(at, block.cells(), pair.axis)
+            };
+            let way = |[from, to]: [u32; 2], w: f64| {
+                let d = block.rest_position(to as usize) - block.rest_position(from as usize);
+                [d.x as f32, d.y as f32, d.z as f32, w as f32]
+            };
+            let [first, second] = pair.ring;
+            let touched = contact_of(a).zip(contact_of(b)).filter(|_| pair.tip_driven.is_some());
+            let (ca, cb) = touched.unwrap_or((untouched, untouched));
+            FacePair {
+                nodes: [a, b, slot(a), slot(b)],
+                ring: [first[0], first[1], second[0], second[1]],
+                first_way_and_area: way(first, pair.area),
+                second_way_and_start: way(second, pair.tip_driven.unwrap_or(NEVER)),
+                contacts: [ca as u32, cb as u32, 0, 0],
+            }
+        })
+        .collect();
+    pairs.resize(pairs.len().max(1), FacePair::zeroed());
+    pairs
+}
+
+fn tied_nodes(model: &Model) -> Vec<[u32; 4]> {
+    (0..model.mesh.node_count())
+        .map(|node| {
+            let mut copies = [u32::MAX; 4];
+            let own = [node as u32];
+            let tied = model.separation.tied(node).unwrap_or(&own);
+            copies.iter_mut().zip(tied).for_each(|(place, copy)| *place = *copy);
+            copies
+        })
+        .collect()
+}
+
 fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
     let cells = model.mesh.block().cells();
     let mut nodes: Vec<ContactNode> = model
@@ -917,6 +1122,12 @@ fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
             ContactNode {
                 rest: vec4(model.mesh.rest_position(node)),
                 grid: [i as u32, j as u32, k as u32, 0],
+                surface: match c.surface {
+                    ContactSurface::OpenedPath => [0.0; 4],
+                    ContactSurface::Slit { side } => vec4(side),
+                    ContactSurface::OuterWall => [0.0, 0.0, 0.0, 1.0],
+                    ContactSurface::Bore => [0.0, 0.0, 0.0, -1.0],
+                },
                 node: c.node,
                 slot: layout.strips().owned_slot([i, j, k], cells),
                 pushed: c.pushed.into(),
@@ -962,9 +1173,11 @@ fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) ->
         ..StepInput::zeroed()
     };
     if let Some(pose) = input.pose {
-        out.tip = vec4(pose.tip);
-        out.velocity = vec4(pose.velocity);
-        out.direction = vec4(pose.direction);
+        let with = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
+        let spin = pose.angular_velocity;
+        out.tip = with(pose.tip, spin.x);
+        out.velocity = with(pose.velocity, spin.y);
+        out.direction = with(pose.direction, spin.z);
         out.depth = pose.depth as f32;
     }
     for (out, drive) in out.drives.iter_mut().zip(&input.drives) {
@@ -1038,8 +1251,17 @@ impl Engine for GpuEngine {
     }
 
     fn read_state(&mut self) -> Result<State> {
-        const OPTIONAL: [&str; 6] =
-            ["cell_stiffness", "tip_state", "contact_memory", "plastic_state", "viscous_state", "point_history"];
+        const OPTIONAL: [&str; 9] = [
+            "pair_states",
+            "cell_stiffness",
+            "tip_state",
+            "free_tip",
+            "free_cells",
+            "contact_memory",
+            "plastic_state",
+            "viscous_state",
+            "point_history",
+        ];
         let names: Vec<&'static str> = ["node_displacement", "node_velocity"]
             .into_iter()
             .chain(OPTIONAL.into_iter().filter(|name| self.buffers.contains_key(name)))
@@ -1062,6 +1284,25 @@ impl Engine for GpuEngine {
                 "tip_state" => {
                     state.tip_coordinate = read_all::<TipState>(bytes).next().map_or(0.0, |t| t.coordinate.into());
                 }
+                "free_tip" => {
+                    for t in read_all::<FreeTip>(bytes) {
+                        state.tip_coordinate = t.coordinate.into();
+                        state.tip = needle::FreeTip {
+                            place: vector(t.place),
+                            along: vector(t.along),
+                            across: vector(t.across),
+                            coordinate: t.coordinate.into(),
+                            entry: t.entry.into(),
+                            advance: t.advance.into(),
+                            material: t.material as usize,
+                            inside: t.inside != 0.0,
+                        };
+                    }
+                }
+                "free_cells" => {
+                    let marked = |c: FreeCell| u64::from(c.marked_low) | u64::from(c.marked_high) << 32;
+                    state.cut_samples = read_all::<FreeCell>(bytes).map(marked).collect();
+                }
                 "contact_memory" => {
                     state.contact = read_all::<ContactMemory>(bytes)
                         .map(|m| ContactState {
@@ -1069,8 +1310,15 @@ impl Engine for GpuEngine {
                             overlap: m.overlap.into(),
                             axial_on: m.axial_on.into(),
                             touching: m.touching != 0.0,
+                            on_shaft: m.on_shaft != 0.0,
+                            rest_radius: m.rest_radius.into(),
+                            passed: m.passed != 0.0,
                         })
                         .collect();
+                }
+                "pair_states" => {
+                    let count = self.model.separation.pairs.len();
+                    state.pairs = read_all::<PairState>(bytes).map(|p| p.damage.into()).take(count).collect();
                 }
                 "plastic_state" => {
                     for (point, p) in state.points.iter_mut().zip(read_all::<PlasticState>(bytes)) {
@@ -1115,6 +1363,8 @@ impl Engine for GpuEngine {
         write("cell_stiffness", bytemuck::cast_slice(&stiffness));
         let tip = TipState { coordinate: state.tip_coordinate as f32, ..TipState::zeroed() };
         write("tip_state", bytemuck::bytes_of(&tip));
+        write("free_tip", bytemuck::bytes_of(&free_tip(&state.tip)));
+        write("free_cells", bytemuck::cast_slice(&free_cells(&self.model, &state.cut_samples)));
         let memory: Vec<ContactMemory> = state
             .contact
             .iter()
@@ -1123,10 +1373,16 @@ impl Engine for GpuEngine {
                 overlap: c.overlap as f32,
                 axial_on: c.axial_on as f32,
                 touching: if c.touching { 1.0 } else { 0.0 },
-                _pad: 0.0,
+                on_shaft: if c.on_shaft { 1.0 } else { 0.0 },
+                passed: if c.passed { 1.0 } else { 0.0 },
+                rest_radius: c.rest_radius as f32,
+                ..Zeroable::zeroed()
             })
             .collect();
         write("contact_memory", bytemuck::cast_slice(&memory));
+        let pairs: Vec<PairState> =
+            state.pairs.iter().map(|d| PairState { damage: *d as f32, ..Zeroable::zeroed() }).collect();
+        write("pair_states", bytemuck::cast_slice(&pairs));
         let column = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
         let plastic: Vec<PlasticState> = state
             .points

@@ -175,14 +175,23 @@ shared_structs! {
         tip_length: f32,
         anchor_reach: f32,
         path_cell_count: u32,
-        _pad0: u32,
-        _pad1: u32,
+        softened_radius: f32,
+        ring_radius: f32,
         shift: [f32; 4],
+        edge_radius: f32,
+        bore_radius: f32,
+        bore_friction: f32,
+        _pad2: u32,
+        reference: [f32; 4],
+        free_low: [u32; 4],
+        free_count: [u32; 4],
         segments: [[f32; 4]; 16],
     }
     /// shaders/effects/puncture.wgsl
     struct TipAnchor {
         surface: [f32; 4],
+        column: [u32; 4],
+        local: [f32; 4],
     }
     /// shaders/effects/puncture.wgsl
     struct TipAnchorLoad {
@@ -210,6 +219,71 @@ shared_structs! {
         material: u32,
         _pad0: u32,
         _pad1: u32,
+    }
+    /// shaders/effects/cohesive.wgsl
+    struct CohesiveParams {
+        onset: f32,
+        shear_onset: f32,
+        energy: f32,
+        shear_energy: f32,
+        exponent: f32,
+        penalty: f32,
+        inverse_ramp: f32,
+        torn_reach: f32,
+        pair_count: u32,
+        _pad0: u32,
+        _pad1: u32,
+        _pad2: u32,
+    }
+    /// shaders/effects/cohesive.wgsl
+    struct FacePair {
+        nodes: [u32; 4],
+        ring: [u32; 4],
+        first_way_and_area: [f32; 4],
+        second_way_and_start: [f32; 4],
+        contacts: [u32; 4],
+    }
+    /// shaders/effects/cohesive.wgsl
+    struct PairState {
+        damage: f32,
+        dissipation: f32,
+        stored: f32,
+        _pad: f32,
+    }
+    /// shaders/stages/measure_separation.wgsl
+    struct SeparationSums {
+        dissipation: f32,
+        stored: f32,
+        torn_area: f32,
+        _pad: f32,
+    }
+    /// shaders/effects/free_path.wgsl
+    struct FreeTip {
+        place: [f32; 4],
+        along: [f32; 4],
+        across: [f32; 4],
+        sway: [f32; 4],
+        coordinate: f32,
+        entry: f32,
+        advance: f32,
+        inside: f32,
+        material: u32,
+        dissipation: f32,
+        spring_energy: f32,
+        _pad: f32,
+    }
+    /// shaders/effects/free_path.wgsl
+    struct FreeCell {
+        low: [f32; 4],
+        size: [f32; 4],
+        cell: u32,
+        material: u32,
+        marked_low: u32,
+        marked_high: u32,
+        dissipation: f32,
+        _pad0: f32,
+        _pad1: f32,
+        _pad2: f32,
     }
     /// shaders/effects/friction.wgsl
     struct FrictionParams {
@@ -242,6 +316,7 @@ shared_structs! {
     struct ContactNode {
         rest: [f32; 4],
         grid: [u32; 4],
+        surface: [f32; 4],
         node: u32,
         slot: u32,
         pushed: u32,
@@ -257,7 +332,11 @@ shared_structs! {
         overlap: f32,
         axial_on: f32,
         touching: f32,
-        _pad: f32,
+        on_shaft: f32,
+        passed: f32,
+        rest_radius: f32,
+        _pad0: f32,
+        _pad1: f32,
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactSums {

@@ -4,63 +4,53 @@ pub mod banded;
 pub mod beam;
 pub mod centre_line;
 pub mod flexible;
-
+pub mod free_path;
 pub mod gap;
 
 use glam::DVec3;
 
-use crate::scene::{Motion, Phase, Vibration};
+use crate::scene::motion::{Leg, Placement};
+use crate::scene::{Motion, Vibration};
 
 /// Position and velocity of the tool tip at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolPose {
     /// Tip position [m].
     pub tip: DVec3,
-    /// Velocity [m/s].
+    /// Velocity of the tip [m/s].
     pub velocity: DVec3,
     /// Unit vector of the insertion.
     pub direction: DVec3,
+    /// Angular velocity [rad/s]: a point of the tool at the lever l from the tip moves with v + omega x l.
+    pub angular_velocity: DVec3,
     /// Depth along the direction from the entry point [m].
     pub depth: f64,
     /// Index of the phase.
     pub phase: usize,
 }
 
-/// Depth of the tool over time: piecewise linear, one piece per phase; a vibration of the hub on top.
+/// Pose of the tool over time, one leg per phase; a vibration of the hub on top.
 #[derive(Debug, Clone)]
 pub struct Kinematics {
-    entry: DVec3,
-    direction: DVec3,
-    /// Start time [s], start depth [m] and velocity along the direction [m/s] of each phase.
-    pieces: Vec<(f64, f64, f64)>,
+    /// Direction at the beginning: the tool is turned out of it without spin.
+    reference: DVec3,
+    /// Start time [s] and leg of each phase.
+    legs: Vec<(f64, Leg)>,
     end: f64,
-    end_depth: f64,
+    at_end: Placement,
     vibration: Option<Vibration>,
 }
 
 impl Kinematics {
     /// Strings the phases together; the tool starts with its tip on the surface.
     pub fn new(motion: &Motion) -> Self {
-        let (mut time, mut depth) = (0.0, 0.0);
-        let mut pieces = Vec::with_capacity(motion.phases.len());
-        for phase in &motion.phases {
-            let (target, rate, duration): (f64, f64, f64) = match *phase {
-                Phase::Insert { speed, depth: to } => (to, speed, (to - depth) / speed),
-                Phase::Hold { duration } => (depth, 0.0, duration),
-                Phase::Withdraw { speed, depth: to } => (to, -speed, (depth - to) / speed),
-            };
-            pieces.push((time, depth, rate));
-            time += duration;
-            depth = target;
+        let mut time = 0.0;
+        let mut legs = Vec::with_capacity(motion.phases.len());
+        for leg in motion.legs() {
+            legs.push((time, leg));
+            time += leg.duration;
         }
-        Kinematics {
-            entry: motion.entry,
-            direction: motion.direction,
-            pieces,
-            end: time,
-            end_depth: depth,
-            vibration: motion.vibration,
-        }
+        Kinematics { reference: motion.direction, legs, end: time, at_end: motion.end(), vibration: motion.vibration }
     }
 
     /// Length of the motion [s].
@@ -70,32 +60,59 @@ impl Kinematics {
 
     /// First time at which the tool gets as deep as `depth` [s]; `None` where it never does.
     pub fn time_of_depth(&self, depth: f64) -> Option<f64> {
-        let ends = self.pieces.iter().skip(1).map(|p| p.0).chain([self.end]);
-        self.pieces.iter().zip(ends).find_map(|(&(start, from, rate), end)| {
-            let reached = from + rate * (end - start) >= depth - 1e-9;
-            (rate > 0.0 && from <= depth && reached).then(|| (start + (depth - from) / rate).min(end))
+        // The depth along a needle that turns is not linear in time.
+        const PARTS: u32 = 64;
+        self.legs.iter().find_map(|(start, leg)| {
+            (0..PARTS).find_map(|i| {
+                let time = |i: u32| leg.duration * f64::from(i) / f64::from(PARTS);
+                let (from, to) = (leg.at(time(i)).depth, leg.at(time(i + 1)).depth);
+                let reached = to > from && from <= depth && to >= depth - 1e-9;
+                reached.then(|| {
+                    let part = ((depth - from) / (to - from)).min(1.0);
+                    start + time(i) + part * leg.duration / f64::from(PARTS)
+                })
+            })
         })
     }
 
     /// Pose at `time` [s]; after the end the phases stand still.
     pub fn pose(&self, time: f64) -> ToolPose {
-        let last = self.pieces.len().saturating_sub(1);
-        let phase = self.pieces.iter().rposition(|p| time >= p.0).unwrap_or(0);
-        let (depth, rate) = if time >= self.end || self.pieces.is_empty() {
-            (self.end_depth, 0.0)
+        let last = self.legs.len().saturating_sub(1);
+        let phase = self.legs.iter().rposition(|p| time >= p.0).unwrap_or(0);
+        let at = if time >= self.end || self.legs.is_empty() {
+            self.at_end
         } else {
-            let (start, depth, rate) = self.pieces[phase];
-            (depth + rate * (time - start), rate)
+            let (start, leg) = self.legs[phase];
+            leg.at(time - start)
         };
         let (offset, shaking) = self.vibration.map_or((DVec3::ZERO, DVec3::ZERO), |v| v.at(time));
         ToolPose {
-            tip: self.entry + self.direction * depth + offset,
-            velocity: self.direction * rate + shaking,
-            direction: self.direction,
-            depth: depth + offset.dot(self.direction),
+            tip: at.tip + offset,
+            velocity: at.velocity + shaking,
+            direction: at.direction,
+            angular_velocity: swing_rate(self.reference, at.direction, at.turning),
+            depth: at.depth + offset.dot(at.direction),
             phase: phase.min(last),
         }
     }
+}
+
+/// The rotation without spin that brings the unit vector `from` to `to`, applied to `v`.
+pub fn swing(from: DVec3, to: DVec3, v: DVec3) -> DVec3 {
+    let w = from.cross(to);
+    v + w.cross(v) + w.cross(w.cross(v)) / (1.0 + from.dot(to)).max(1e-6)
+}
+
+/// Angular velocity of [`swing`] when `to` changes at the rate `turning` [1/s]: twice the vector part of dQ/dt Q^-1 of the
+/// quaternion Q = (1 + from.to, from x to).
+fn swing_rate(from: DVec3, to: DVec3, turning: DVec3) -> DVec3 {
+    if turning == DVec3::ZERO {
+        return DVec3::ZERO;
+    }
+    let (real, vector) = (1.0 + from.dot(to), from.cross(to));
+    let (real_rate, vector_rate) = (from.dot(turning), from.cross(turning));
+    let square = (real * real + vector.length_squared()).max(1e-9);
+    (vector_rate * real - vector * real_rate - vector_rate.cross(vector)) * (2.0 / square)
 }
 
 /// Two unit vectors that complete `direction` to an orthonormal frame.
@@ -122,5 +139,24 @@ impl PlannedPath {
         let axial = relative.dot(self.direction);
         let radial = (relative - self.direction * axial).length();
         (radial, x.z / self.direction.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// d/dt of a vector that swings with the needle is omega x vector.
+    #[test]
+    fn the_angular_velocity_is_that_of_the_swing() {
+        let (from, spin) = (DVec3::new(0.1, 0.2, -0.9).normalize(), DVec3::new(0.4, -0.7, 0.2));
+        let to = |t: f64| glam::DQuat::from_scaled_axis(spin * t) * DVec3::new(0.5, -0.1, -0.7).normalize();
+        let v = DVec3::new(0.3, 0.8, 0.1);
+        let h = 1e-6;
+        let rate = (swing(from, to(h), v) - swing(from, to(-h), v)) / (2.0 * h);
+        let omega = swing_rate(from, to(0.0), spin.cross(to(0.0)));
+        assert!((rate - omega.cross(swing(from, to(0.0), v))).length() < 1e-8);
+        assert!((omega.cross(to(0.0)) - spin.cross(to(0.0))).length() < 1e-12);
+        assert!((swing(from, to(0.0), from) - to(0.0)).length() < 1e-12);
     }
 }

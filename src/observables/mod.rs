@@ -19,6 +19,29 @@ pub struct ForceParts {
     pub torque: DVec3,
 }
 
+/// One addend of the axial force, as tables, charts and reports show it.
+#[derive(Debug, Clone, Copy)]
+pub struct ForcePart {
+    /// Name in legends.
+    pub name: &'static str,
+    /// Column of `force.csv`.
+    pub column: &'static str,
+    /// Red, green, blue; people with colour-blindness tell the parts apart (Okabe and Ito 2008).
+    pub colour: [u8; 3],
+    /// Its share of the axial force [N].
+    pub of: fn(&ForceParts) -> f64,
+}
+
+impl ForceParts {
+    /// The parts that add up to `axial`, from the bottom of a stack to its top. A new part is one line here: columns,
+    /// charts and reports follow this list.
+    pub const PARTS: [ForcePart; 3] = [
+        ForcePart { name: "cutting", column: "cutting_force_n", colour: [204, 121, 167], of: |f| f.cutting },
+        ForcePart { name: "spreading", column: "spreading_force_n", colour: [0, 158, 115], of: |f| f.spreading },
+        ForcePart { name: "friction", column: "friction_force_n", colour: [230, 159, 0], of: |f| f.friction },
+    ];
+}
+
 /// Energies [J] at the end of a frame. Work and dissipation are totals since t = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EnergyAccount {
@@ -35,6 +58,8 @@ pub struct EnergyAccount {
     pub friction: f64,
     /// Dissipated by the tip law and by the softening of the path.
     pub cutting: f64,
+    /// Dissipated by faces that separate, plus what they store.
+    pub cohesive: f64,
     /// Dissipated by plastic flow, by damage and by the viscous terms.
     pub plastic: f64,
     pub damage: f64,
@@ -56,6 +81,7 @@ impl EnergyAccount {
             + self.damping
             + self.friction
             + self.cutting
+            + self.cohesive
             + self.plastic
             + self.damage
             + self.viscous
@@ -134,6 +160,8 @@ pub struct FrameRecord {
     /// Zero without a flexible needle.
     pub needle: NeedleRecord,
     pub health: Health,
+    /// What the bore of a hollow needle holds.
+    pub core: Option<CoreSample>,
 }
 
 /// Fields of one moment, for VTU files and pictures.
@@ -165,6 +193,8 @@ pub struct FieldSnapshot {
     pub material: Vec<f64>,
 }
 
+mod core_sample;
 mod recorder;
 
+pub use core_sample::{CoreSample, cells_inside};
 pub use recorder::Recorder;

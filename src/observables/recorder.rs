@@ -11,6 +11,7 @@ use crate::solver::engine::FrameSums;
 pub struct Recorder {
     totals: EnergyAccount,
     contact_dissipation: f64,
+    cohesive_dissipation: f64,
     step: u64,
 }
 
@@ -30,6 +31,8 @@ impl Recorder {
         e.damping += sums.damping_dissipation;
         e.friction += sums.friction_dissipation;
         e.cutting += sums.tip_dissipation + sums.softening_dissipation;
+        self.cohesive_dissipation += sums.cohesive_dissipation;
+        e.cohesive = sums.cohesive_energy + self.cohesive_dissipation;
         e.plastic += sums.plastic_dissipation;
         e.damage += sums.damage_dissipation;
         e.viscous = sums.viscous_dissipation;
@@ -57,6 +60,7 @@ impl Recorder {
             reactions: sums.reactions,
             energy: *e,
             needle: Default::default(),
+            core: None,
             health: Health {
                 min_j: sums.min_j,
                 min_corner_j: sums.min_corner_j,

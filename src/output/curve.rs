@@ -63,13 +63,13 @@ impl CurveFigures {
             force_at_max_depth: Some(at_end.iter().sum::<f64>() / at_end.len() as f64),
             ..Self::default()
         };
-        if let Some(puncture) = find_puncture(&curve, peak_force) {
-            let peak = curve[puncture];
-            let after = window_after(&curve, puncture).iter().map(|p| p.force).fold(peak.force, f64::min);
-            figures.puncture_force = Some(peak.force);
-            figures.puncture_depth = Some(peak.depth);
-            figures.force_after_puncture = Some(after);
-            figures.drop_fraction = Some((peak.force - after) / peak.force);
+        if let Some(puncture) =
+            find_drops(&curve, &median_of_three(&curve), DROP_FRACTION, NOISE_FACTOR * frame_noise(&curve), 1).first()
+        {
+            figures.puncture_force = Some(puncture.force);
+            figures.puncture_depth = Some(puncture.depth);
+            figures.force_after_puncture = Some(puncture.force_after);
+            figures.drop_fraction = Some(puncture.fraction());
         }
         let linear_from = if end.depth >= LINEAR_FROM + LINEAR_AT_LEAST {
             Some(LINEAR_FROM)
@@ -87,6 +87,38 @@ impl CurveFigures {
         }
         figures
     }
+}
+
+/// A sudden fall of the axial force on the way in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForceDrop {
+    /// Depth of the peak [m].
+    pub depth: f64,
+    /// Axial force at the peak [N].
+    pub force: f64,
+    /// Smallest axial force within [`DROP_TRAVEL`] after it [N].
+    pub force_after: f64,
+}
+
+impl ForceDrop {
+    /// Fall over the force at the peak.
+    pub fn fraction(&self) -> f64 {
+        (self.force - self.force_after) / self.force
+    }
+}
+
+/// All falls by at least `fraction` within [`DROP_TRAVEL`], from the depths [m] and axial forces [N] of a run in order of
+/// time. Every frame counts as it is, unlike in the search for the puncture.
+pub fn sudden_drops(curve: &[(f64, f64)], fraction: f64) -> Vec<ForceDrop> {
+    let mut deepest = f64::NEG_INFINITY;
+    let mut points = Vec::new();
+    for &(depth, force) in curve {
+        if depth.is_finite() && depth > deepest && force.is_finite() {
+            deepest = depth;
+            points.push(Point { depth, force });
+        }
+    }
+    find_drops(&points, &points, fraction, 0.0, usize::MAX)
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -116,45 +148,66 @@ fn window_after(curve: &[Point], i: usize) -> &[Point] {
     &rest[..within.max(1).min(rest.len())]
 }
 
-/// Index of the first peak after which the force falls by [`DROP_FRACTION`] within [`DROP_TRAVEL`], before it rises
-/// above the peak again. Sought on the median of three frames, so that one stray frame is no peak.
-fn find_puncture(curve: &[Point], largest: f64) -> Option<usize> {
-    if curve.len() < 3 {
-        return None;
-    }
-    let noise = frame_noise(curve);
-    let smooth: Vec<Point> = (0..curve.len())
+/// The median of each frame and its neighbours, so that one stray frame is no peak.
+fn median_of_three(curve: &[Point]) -> Vec<Point> {
+    (0..curve.len())
         .map(|i| {
             let mut force = match i {
-                0 => [curve[0].force; 3],
-                _ if i + 1 == curve.len() => [curve[i].force; 3],
+                _ if i == 0 || i + 1 == curve.len() => [curve[i].force; 3],
                 _ => [curve[i - 1].force, curve[i].force, curve[i + 1].force],
             };
             force.sort_by(f64::total_cmp);
             Point { depth: curve[i].depth, force: force[1] }
         })
-        .collect();
-    let candidate = (0..smooth.len()).find(|&i| {
-        let here = smooth[i];
-        if here.force <= 0.0 || here.force < LEAST_PEAK * largest {
-            return false;
+        .collect()
+}
+
+/// The first `at_most` peaks after which the force falls by `fraction`, and by at least `least` [N], within
+/// [`DROP_TRAVEL`], before it rises above the peak again. Sought on `smooth`, which has the points of `curve`; read off
+/// the curve.
+fn find_drops(curve: &[Point], smooth: &[Point], fraction: f64, least: f64, at_most: usize) -> Vec<ForceDrop> {
+    let mut drops = Vec::new();
+    if curve.len() < 3 {
+        return drops;
+    }
+    let largest = curve.iter().map(|p| p.force).fold(f64::NEG_INFINITY, f64::max);
+    // The bottom of the last drop: what lies before it belongs to that drop.
+    let mut from = 0;
+    while drops.len() < at_most {
+        let falls_after = |&i: &usize| {
+            let here = smooth[i];
+            if here.force <= 0.0 || here.force < LEAST_PEAK * largest {
+                return false;
+            }
+            let before = smooth[from..i].iter().rev().take_while(|p| p.depth >= here.depth - DROP_TRAVEL);
+            if before.map(|p| p.force).any(|force| force > here.force) {
+                return false;
+            }
+            let drop = (fraction * here.force).max(least);
+            window_after(smooth, i).iter().take_while(|p| p.force <= here.force).any(|p| p.force <= here.force - drop)
+        };
+        let Some(candidate) = (from..smooth.len()).find(falls_after) else { break };
+        // The median flattens a sharp peak: take the largest of the three frames themselves.
+        let nearby = candidate.saturating_sub(1)..=(candidate + 1).min(curve.len() - 1);
+        let peak = nearby.max_by(|&a, &b| curve[a].force.total_cmp(&curve[b].force)).unwrap_or(candidate);
+        let (mut bottom, mut force_after) = (peak, curve[peak].force);
+        for (i, p) in window_after(curve, peak).iter().enumerate() {
+            if p.force < force_after {
+                (bottom, force_after) = (peak + 1 + i, p.force);
+            }
         }
-        let above_before =
-            smooth[..i].iter().rev().take_while(|p| p.depth >= here.depth - DROP_TRAVEL).any(|p| p.force > here.force);
-        if above_before {
-            return false;
-        }
-        let drop = (DROP_FRACTION * here.force).max(NOISE_FACTOR * noise);
-        window_after(&smooth, i).iter().take_while(|p| p.force <= here.force).any(|p| p.force <= here.force - drop)
-    })?;
-    // The median flattens a sharp peak: take the largest of the three frames themselves.
-    let nearby = candidate.saturating_sub(1)..=(candidate + 1).min(curve.len() - 1);
-    nearby.max_by(|&a, &b| curve[a].force.total_cmp(&curve[b].force))
+        drops.push(ForceDrop { depth: curve[peak].depth, force: curve[peak].force, force_after });
+        from = bottom.max(candidate + 1);
+    }
+    drops
 }
 
 /// Standard deviation of the frame-to-frame noise [N], from the median size of the second differences: a smooth curve
 /// contributes little to them, and the few frames around a puncture do not move a median.
 fn frame_noise(curve: &[Point]) -> f64 {
+    if curve.len() < 3 {
+        return 0.0;
+    }
     let mut second: Vec<f64> = curve.windows(3).map(|w| (w[0].force - 2.0 * w[1].force + w[2].force).abs()).collect();
     second.sort_by(f64::total_cmp);
     // 1.4826: median of |x| to standard deviation; the second difference of white noise has variance 6.
@@ -290,6 +343,28 @@ mod tests {
         };
         let figures = CurveFigures::from_records(&insertion(12e-3, second));
         near(figures.puncture_depth, 3e-3, 1e-9);
+    }
+
+    #[test]
+    fn all_drops_of_a_saw_are_counted() {
+        // Teeth of 1 mm: up by 0.5 N, down by 0.2 N within 0.1 mm.
+        let saw = |d: f64| {
+            let (tooth, within) = ((d / 1e-3).floor(), (d / 1e-3).fract());
+            0.3 * tooth + if within <= 0.9 { 0.5 * within / 0.9 } else { 0.5 - 0.2 * (within - 0.9) / 0.1 }
+        };
+        let curve: Vec<(f64, f64)> = insertion(6.05e-3, saw)
+            .iter()
+            .chain(&insertion(3e-3, |_| -1.0))
+            .map(|r| (r.depth, r.force.axial))
+            .collect();
+        let drops = sudden_drops(&curve, 0.05);
+        assert_eq!(drops.len(), 6, "{drops:?}");
+        for (tooth, drop) in drops.iter().enumerate() {
+            near(Some(drop.depth), 1e-3 * tooth as f64 + 0.9e-3, 0.06e-3);
+            near(Some(drop.force - drop.force_after), 0.2, 0.08);
+        }
+        assert_eq!(sudden_drops(&curve, 0.3).len(), 1);
+        assert!(sudden_drops(&[], 0.1).is_empty());
     }
 
     #[test]

@@ -101,6 +101,14 @@ pub struct Summary {
     pub peak_nominal_stress_pa: Option<f64>,
     pub stretch_at_peak: Option<f64>,
 
+    /// Core in the bore of a hollow needle at the end: length and rest length [m], mass [kg], axial strain; and its rest length
+    /// over the length that was cut.
+    pub core_length_m: Option<f64>,
+    pub core_rest_length_m: Option<f64>,
+    pub core_mass_kg: Option<f64>,
+    pub core_strain: Option<f64>,
+    pub core_yield: Option<f64>,
+
     /// Largest |external work - accounted energy| of a frame over the largest external work of the run; not a number
     /// (`null`) if any frame had none.
     #[serde(deserialize_with = "null_is_nan")]
@@ -140,6 +148,13 @@ impl Summary {
         self.max_depth_m = figures.max_depth;
         self.slope_after_puncture_n_per_m = figures.slope_after_puncture;
         self.linear_fit_r2 = figures.r2;
+        if let Some((last, core)) = records.last().and_then(|r| Some((r, r.core?))) {
+            self.core_length_m = Some(core.length);
+            self.core_rest_length_m = Some(core.rest_length);
+            self.core_mass_kg = Some(core.mass);
+            self.core_strain = Some(core.strain());
+            self.core_yield = (last.tip_coordinate > 0.0).then(|| core.rest_length / last.tip_coordinate);
+        }
 
         let scale = records.iter().map(|r| r.energy.external_max).fold(0.0, f64::max);
         let residual = |r: &FrameRecord| (r.energy.external - r.energy.accounted()).abs();

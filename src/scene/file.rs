@@ -36,6 +36,7 @@ pub struct SceneFile {
     /// Motion of the tool; required with a tool.
     pub motion: Option<MotionTable>,
     pub puncture: Option<PunctureTable>,
+    pub cohesive: Option<CohesiveTable>,
     pub friction: Option<FrictionTable>,
     pub flexible_needle: Option<FlexibleNeedleTable>,
     pub indentation: Option<IndentationTable>,
@@ -325,6 +326,12 @@ pub struct NeedleTable {
     pub bevel_angle_deg: Option<f64>,
     /// Heading of the apex of a bevel seen from the axis [deg]; for a vertical needle from +x towards +y; default 0.
     pub bevel_heading_deg: Option<f64>,
+    /// Diameter of the bore of a hollow needle that takes a core [mm]; needs the effects `puncture` and `cohesive`.
+    pub bore_diameter_mm: Option<f64>,
+    /// Where the cutting edge of a hollow needle lies in its wall: 0 at the bore, 1 at the outer diameter.
+    pub cutting_edge: Option<f64>,
+    /// Friction coefficient of the bore.
+    pub bore_friction: Option<f64>,
     /// Needle material: a name in the library or a table; default "steel-304". It decides how the needle bends with the
     /// effect `flexible_needle`.
     pub material: Option<NeedleMaterialEntry>,
@@ -371,7 +378,7 @@ pub struct FlatPunchTable {
     pub bonded: bool,
 }
 
-/// Motion of the tool along a straight line. Depth is counted along it from the entry point.
+/// Motion of the tool. Depth is counted along the needle from the point where its axis meets z = 0.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MotionTable {
@@ -406,14 +413,28 @@ pub struct VibrationTable {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhaseTable {
-    /// What the tool does.
+    /// What the tool does. With move, turn or reposition the path is not planned but found while the tip moves.
     pub kind: PhaseKind,
-    /// Speed [mm/s]; for insert and withdraw.
+    /// Speed of the tip [mm/s]; for insert, withdraw and move.
     pub speed_mm_s: Option<f64>,
     /// Depth at the end of the phase [mm]; for insert and withdraw.
     pub depth_mm: Option<f64>,
     /// Duration [s]; for hold.
     pub duration_s: Option<f64>,
+    /// Where the tip goes on a straight line, in the coordinates of the block [mm]; for move.
+    pub to_mm: Option<[f64; 3]>,
+    /// Direction of the needle at the end, any length; for move (default: as before), turn and reposition.
+    pub direction: Option<[f64; 3]>,
+    /// The same as an angle to the downward vertical, 0 to 80 [deg].
+    pub angle_deg: Option<f64>,
+    /// Heading that belongs to `angle_deg` [deg]; default 0.
+    pub azimuth_deg: Option<f64>,
+    /// How fast the needle turns [deg/s]; for turn.
+    pub rate_deg_s: Option<f64>,
+    /// Point fixed in space about which it turns [mm]; for turn; default: the tip.
+    pub pivot_mm: Option<[f64; 3]>,
+    /// New entry point on the top face, x and y [mm]; for reposition, outside the tissue.
+    pub entry_mm: Option<[f64; 2]>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -422,6 +443,17 @@ pub enum PhaseKind {
     Insert,
     Hold,
     Withdraw,
+    Move,
+    Turn,
+    Reposition,
+}
+
+/// How the path of the needle is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PathWord {
+    Auto,
+    Free,
 }
 
 /// Parameters of the effect `puncture`.
@@ -448,6 +480,8 @@ pub struct PunctureTable {
     pub contact_damping: Option<f64>,
     /// Travel over which an overlap found at activation fades out [mm].
     pub entry_fade_mm: Option<f64>,
+    /// "auto" (default): planned before the run for a straight motion, else free; "free": always found while the tip moves.
+    pub path: Option<PathWord>,
 }
 
 /// Parameters of the effect `friction`.
@@ -474,6 +508,40 @@ pub struct FlexibleNeedleTable {
     pub inner_diameter_mm: Option<f64>,
     /// Acceleration of free fall on the needle [m/s^2]; default: that of the effect `gravity` if it is on, else none.
     pub gravity_m_s2: Option<[f64; 3]>,
+}
+
+/// Parameters of the effect `cohesive`: faces that separate. With a needle that cuts, its path opens on them: on a slit
+/// before a solid needle, on the ring of its cutting edge before a hollow one.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CohesiveTable {
+    /// Strength in opening [kPa].
+    pub strength_kpa: Option<f64>,
+    /// Strength in shear [kPa]; default: that in opening.
+    pub shear_strength_kpa: Option<f64>,
+    /// Fracture energy in opening [J/m^2].
+    pub energy_j_m2: Option<f64>,
+    /// Fracture energy in shear [J/m^2]; default: that in opening.
+    pub shear_energy_j_m2: Option<f64>,
+    /// Exponent of the mode mixity (Benzeggagh and Kenane).
+    pub exponent: Option<f64>,
+    /// Penalty stiffness over E/h; or give `penalty_pa_m`.
+    pub penalty_factor: Option<f64>,
+    /// Penalty stiffness [Pa/m].
+    pub penalty_pa_m: Option<f64>,
+    /// Planes across the whole block that may separate.
+    #[serde(default)]
+    pub plane: Vec<CohesivePlaneTable>,
+}
+
+/// A plane that may separate; the nearest grid line is moved there.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CohesivePlaneTable {
+    /// Axis of its normal: "x", "y" or "z".
+    pub axis: String,
+    /// Coordinate [mm]; z is negative below the top face.
+    pub at_mm: f64,
 }
 
 /// Parameters of the effect `indentation`.
@@ -596,9 +664,9 @@ pub struct OutputsTable {
     pub pictures_at_depth_mm: Option<Vec<f64>>,
     /// Depths on the way in at which a VTU file is written [mm]; scenes with a tool.
     pub fields_at_depth_mm: Option<Vec<f64>>,
-    /// Times at which a picture is drawn [s]; scenes without a tool.
+    /// Times at which a picture is drawn [s]; scenes without a tool or with a free motion.
     pub pictures_at_s: Option<Vec<f64>>,
-    /// Times at which a VTU file is written [s]; scenes without a tool.
+    /// Times at which a VTU file is written [s]; scenes without a tool or with a free motion.
     pub fields_at_s: Option<Vec<f64>>,
     /// Width of a picture in pixels, 64 to 8192; default 900.
     pub picture_width_px: Option<u32>,

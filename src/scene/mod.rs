@@ -6,12 +6,15 @@
 mod convert;
 pub(crate) mod document;
 pub mod file;
+pub mod motion;
 pub mod presets;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
+
+pub use motion::{Motion, Phase, Vibration};
 
 use crate::effects::{self, EffectSet};
 use crate::material::ElasticLaw;
@@ -53,6 +56,28 @@ impl Scene {
     /// replace values of the file. Every error is an [`Error::Scene`] with file, line, excerpt and way out.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
         convert::load(path, overrides).map_err(Error::Scene)
+    }
+
+    /// The needle, if the tool is one.
+    pub fn needle(&self) -> Option<&NeedleShape> {
+        match &self.tool {
+            Some(Tool::Needle(needle)) => Some(needle),
+            _ => None,
+        }
+    }
+
+    /// True where the tissue separates around a hollow needle.
+    pub fn has_bore(&self) -> bool {
+        self.effects.cohesive.is_some() && self.needle().is_some_and(|n| n.bore.is_some())
+    }
+
+    /// Axis of the normal of the plane that a solid needle slits: 0 where the direction has no x, 1 where it has no y.
+    pub fn slit_axis(&self) -> Option<usize> {
+        let solid = self.needle().is_some_and(|n| n.bore.is_none());
+        if self.effects.cohesive.is_none() || !solid || crate::model::has_free_path(self) {
+            return None;
+        }
+        (0..2).find(|a| self.motion.direction[*a].abs() < 1e-9)
     }
 
     /// JSON schema of the scene file, for editors and for the `schema` command.
@@ -287,6 +312,8 @@ pub struct NeedleShape {
     pub tip_length: f64,
     /// Shape of the tip.
     pub tip: TipShape,
+    /// What makes it hollow.
+    pub bore: Option<BoreShape>,
     /// Name of the needle material.
     pub material: String,
     /// Young's modulus [Pa] and density [kg/m^3] of the material, and diameter of the bore [m] (0: solid): how a flexible
@@ -294,6 +321,17 @@ pub struct NeedleShape {
     pub youngs_modulus: f64,
     pub density: f64,
     pub inner_diameter: f64,
+}
+
+/// The inside of a hollow needle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoreShape {
+    /// Radius of the bore [m].
+    pub radius: f64,
+    /// Radius of the cutting edge, between bore and outer radius [m].
+    pub edge: f64,
+    /// Friction coefficient of the bore (dimensionless).
+    pub friction: f64,
 }
 
 /// Shape of the tip of a needle.
@@ -324,80 +362,13 @@ impl NeedleShape {
             radius,
             tip_length,
             tip: TipShape::Cone,
+            bore: None,
             material: "steel-304".into(),
             youngs_modulus: 193e9,
             density: 7900.0,
             inner_diameter: 0.0,
         }
     }
-}
-
-/// Motion of the tool along a straight line.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Motion {
-    /// Entry point on the top face [m] (z = 0).
-    pub entry: DVec3,
-    /// Unit vector of the insertion, into the tissue (z < 0).
-    pub direction: DVec3,
-    pub phases: Vec<Phase>,
-    /// What the hub does beside the phases.
-    pub vibration: Option<Vibration>,
-}
-
-/// A sinusoidal motion of the hub from t = 0 on: `amplitude sin(2 pi frequency t)`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Vibration {
-    /// Amplitude [m].
-    pub amplitude: f64,
-    /// Frequency [Hz].
-    pub frequency: f64,
-    /// Unit vector of the motion.
-    pub direction: DVec3,
-}
-
-impl Vibration {
-    /// Offset [m] and its exact derivative [m/s] at `time` [s].
-    pub fn at(&self, time: f64) -> (DVec3, DVec3) {
-        let rate = std::f64::consts::TAU * self.frequency;
-        let (sine, cosine) = (rate * time).sin_cos();
-        (self.direction * (self.amplitude * sine), self.direction * (self.amplitude * rate * cosine))
-    }
-}
-
-impl Motion {
-    /// Largest depth of all phases along the direction [m].
-    pub fn deepest(&self) -> f64 {
-        self.phases.iter().fold(0.0, |deepest, phase| match *phase {
-            Phase::Insert { depth, .. } => depth.max(deepest),
-            _ => deepest,
-        })
-    }
-
-    /// Where the tip is at the largest depth [m].
-    pub fn deepest_point(&self) -> DVec3 {
-        self.entry + self.direction * self.deepest()
-    }
-
-    /// Largest speed of all phases, that of the vibration on top [m/s].
-    pub fn largest_speed(&self) -> f64 {
-        let shaking = self.vibration.map_or(0.0, |v| v.at(0.0).1.length());
-        shaking
-            + self.phases.iter().fold(0.0, |largest, phase| match *phase {
-                Phase::Insert { speed, .. } | Phase::Withdraw { speed, .. } => speed.max(largest),
-                Phase::Hold { .. } => largest,
-            })
-    }
-}
-
-/// One phase of the motion. Depth is measured along the direction from the entry point [m].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Phase {
-    /// Advance to `depth` at `speed` [m/s].
-    Insert { speed: f64, depth: f64 },
-    /// Stand still for `duration` [s].
-    Hold { duration: f64 },
-    /// Go back to `depth` (>= 0 or slightly negative: out of the tissue) at `speed` [m/s].
-    Withdraw { speed: f64, depth: f64 },
 }
 
 /// Numbers of the time integration.
@@ -426,6 +397,9 @@ pub struct Outputs {
     pub pictures_at: Vec<f64>,
     /// Depths on the way in at which a VTU file is written [m], or times [s] in a scene without a tool.
     pub fields_at: Vec<f64>,
+    /// Times of pictures and field files in a scene with a tool on a free path [s].
+    pub pictures_at_time: Vec<f64>,
+    pub fields_at_time: Vec<f64>,
     /// Width of a picture in pixels.
     pub picture_width: u32,
     /// Upper end of the colour bar [Pa]; `None`: the largest value in the picture, rounded up.

@@ -7,6 +7,7 @@ use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::ToolPose;
 use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
+use crate::needle::free_path::FreeTip;
 use crate::scene::Face;
 
 /// What is given to one step from outside: the only place where user input enters.
@@ -100,6 +101,11 @@ pub struct FrameSums {
     pub damage_dissipation: f64,
     /// Total: dissipated by the Prony terms [J].
     pub viscous_dissipation: f64,
+    /// Dissipated by cohesive faces [J]; total: stored in them [J].
+    pub cohesive_dissipation: f64,
+    pub cohesive_energy: f64,
+    /// Total: torn area, damage times area over all pairs [m^2].
+    pub torn_area: f64,
     /// What each face exerts on the tissue at the last step [N]; zero without driven faces.
     pub reactions: [DVec3; 6],
     /// Total: stored in contact, stick and tip springs [J].
@@ -141,9 +147,15 @@ pub struct State {
     pub stiffness: Vec<f64>,
     /// Material coordinate of the tip [m].
     pub tip_coordinate: f64,
+    /// Tip on a free path; at rest on a planned one.
+    pub tip: FreeTip,
+    /// Marked sample points per cell of the box of a free path, bit = x + 4 y + 16 z; empty on a planned one.
+    pub cut_samples: Vec<u64>,
     /// Memory per contact node: stretch of the stick spring [m], overlap at activation [m], axial position at
     /// activation [m]; `touching` tells whether the last two are set.
     pub contact: Vec<ContactState>,
+    /// Damage D of every pair of copies that may separate.
+    pub pairs: Vec<f64>,
     /// History per cell; empty without `plasticity` and `viscoelastic`.
     pub points: Vec<PointState>,
 }
@@ -155,6 +167,11 @@ pub struct ContactState {
     pub overlap: f64,
     pub axial_on: f64,
     pub touching: bool,
+    /// True while it is pressed by the full shaft.
+    pub on_shaft: bool,
+    /// On a free path: distance r0 from the axis where the tip passed [m], and whether it has.
+    pub rest_radius: f64,
+    pub passed: bool,
 }
 
 /// What an engine tells about itself.

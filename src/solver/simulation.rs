@@ -17,7 +17,7 @@ use crate::material_point::PointState;
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
 use crate::needle::flexible::FlexibleNeedle;
-use crate::observables::{FieldSnapshot, FrameRecord, NeedleRecord, Recorder};
+use crate::observables::{CoreSample, FieldSnapshot, FrameRecord, NeedleRecord, Recorder};
 use crate::scene::Scene;
 
 /// Which engine the user wants.
@@ -28,6 +28,17 @@ pub enum EngineChoice {
     Auto,
     Gpu,
     Cpu,
+}
+
+impl EngineChoice {
+    /// As the command line has it.
+    pub fn key(self) -> &'static str {
+        match self {
+            EngineChoice::Auto => "auto",
+            EngineChoice::Gpu => "gpu",
+            EngineChoice::Cpu => "cpu",
+        }
+    }
 }
 
 impl FromStr for EngineChoice {
@@ -148,6 +159,12 @@ impl Simulation {
                 limit * 1e6
             ));
         }
+        if model.scene.motion.is_free() && model.puncture.is_some() {
+            notices.push(
+                "the motion leaves one straight line: the path is not planned but found while the tip moves (free path)"
+                    .into(),
+            );
+        }
         if let Some(mach) = tool_mach(&model).filter(|m| *m > 0.1) {
             notices.push(format!(
                 "the tool moves at {mach:.2} of the scaled shear wave speed: inertia will show in the force; lower \
@@ -240,8 +257,10 @@ impl Simulation {
     }
 
     fn may_start(&self, frame: u64) -> bool {
-        let waits =
-            self.watch_stretch || self.needle.is_some() || self.stops.range(self.collected..frame).next().is_some();
+        let waits = self.watch_stretch
+            || self.needle.is_some()
+            || self.model.has_bore()
+            || self.stops.range(self.collected..frame).next().is_some();
         frame < self.frames && frame - self.collected <= AHEAD && (!waits || frame == self.collected)
     }
 
@@ -277,6 +296,11 @@ impl Simulation {
         let cell_steps = record.step.max(self.steps_per_frame) as f64 * self.model.mesh.cell_count() as f64;
         if too_many_return_failures(self.return_failures, cell_steps) {
             return Err(self.flow_lost(&record, self.return_failures as f64 / cell_steps));
+        }
+        if self.model.has_bore() {
+            let state = self.engine.read_state()?;
+            let pose = self.model.kinematics.as_ref().map(|k| k.pose(record.time));
+            record.core = pose.and_then(|pose| CoreSample::of(&self.model, &state, &pose));
         }
         if self.watch_stretch {
             self.check_stretch(&record)?;

@@ -7,6 +7,10 @@ pub enum Stage {
     AdvanceTip,
     /// Cells that the tip has passed lose stiffness; their energy is booked as cutting.
     SoftenPath,
+    /// The same tip law on a free path: the tip finds its material point, and whether it is in open material.
+    AdvanceFreeTip,
+    /// Sample points that the tip of a free path has passed are marked; their cells lose stiffness.
+    SoftenFreePath,
     /// J and volumetric stiffness of every tetrahedron.
     MeasureDilatation,
     /// Dilatation and pressure of every node of a tetrahedral mesh.
@@ -15,6 +19,8 @@ pub enum Stage {
     TetrahedronForces,
     /// Stress, hourglass force and stiffness bound of every hexahedron, as forces on its corners.
     ElementForces,
+    /// Traction and damage of faces that separate.
+    CohesiveForces,
     /// Contact of cone and shaft with the opened path, friction, and tip springs on the nodes.
     NeedleContact,
     /// Contact of a sphere or flat punch with the top face.
@@ -29,17 +35,22 @@ pub enum Stage {
     MeasureContact,
     /// Reactions of the six faces (once per frame).
     MeasureFaces,
+    /// Energies and torn area of faces that separate (once per frame).
+    MeasureSeparation,
 }
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 13] = [
+    pub const ALL: [Stage; 17] = [
         Stage::AdvanceTip,
         Stage::SoftenPath,
+        Stage::AdvanceFreeTip,
+        Stage::SoftenFreePath,
         Stage::MeasureDilatation,
         Stage::AveragePressure,
         Stage::TetrahedronForces,
         Stage::ElementForces,
+        Stage::CohesiveForces,
         Stage::NeedleContact,
         Stage::IndenterContact,
         Stage::IntegrateNodes,
@@ -47,6 +58,7 @@ impl Stage {
         Stage::MeasureNodes,
         Stage::MeasureContact,
         Stage::MeasureFaces,
+        Stage::MeasureSeparation,
     ];
 
     /// File stem and label.
@@ -54,10 +66,13 @@ impl Stage {
         match self {
             Stage::AdvanceTip => "advance_tip",
             Stage::SoftenPath => "soften_path",
+            Stage::AdvanceFreeTip => "advance_free_tip",
+            Stage::SoftenFreePath => "soften_free_path",
             Stage::MeasureDilatation => "measure_dilatation",
             Stage::AveragePressure => "average_pressure",
             Stage::TetrahedronForces => "tetrahedron_forces",
             Stage::ElementForces => "element_forces",
+            Stage::CohesiveForces => "cohesive_forces",
             Stage::NeedleContact => "needle_contact",
             Stage::IndenterContact => "indenter_contact",
             Stage::IntegrateNodes => "integrate_nodes",
@@ -65,6 +80,7 @@ impl Stage {
             Stage::MeasureNodes => "measure_nodes",
             Stage::MeasureContact => "measure_contact",
             Stage::MeasureFaces => "measure_faces",
+            Stage::MeasureSeparation => "measure_separation",
         }
     }
 
@@ -81,6 +97,13 @@ impl Stage {
 
     /// True for the stages that run once per frame, after its last step.
     pub fn once_per_frame(self) -> bool {
-        matches!(self, Stage::MeasureCells | Stage::MeasureNodes | Stage::MeasureContact | Stage::MeasureFaces)
+        matches!(
+            self,
+            Stage::MeasureCells
+                | Stage::MeasureNodes
+                | Stage::MeasureContact
+                | Stage::MeasureFaces
+                | Stage::MeasureSeparation
+        )
     }
 }

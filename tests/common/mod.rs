@@ -127,7 +127,7 @@ pub fn graded_mesh(cells: [usize; 3]) -> BlockMesh {
         lines.iter_mut().for_each(|l| *l -= shift);
         lines
     };
-    BlockMesh { lines: [lines(0), lines(1), lines(2)] }
+    BlockMesh::new([lines(0), lines(1), lines(2)])
 }
 
 /// Advances an engine by `steps` steps in one frame; `step` counts the steps since t = 0.

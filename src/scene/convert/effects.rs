@@ -1,7 +1,7 @@
 //! The effects of a scene: which are on, what they need, their parameters.
 
 use super::super::file::*;
-use super::super::{FaceCondition, Motion, TissueMaterial, Tool};
+use super::super::{FaceCondition, Motion, NeedleShape, TissueMaterial, Tool};
 use super::{Check, MM, Within, parameters};
 use crate::effects::{self, EFFECTS, EffectSet};
 use crate::needle::beam::{BeamParams, Section};
@@ -71,7 +71,7 @@ impl Check<'_> {
             );
         }
         if file.tissue.mesh.is_some() {
-            for key in ["puncture", "indentation"] {
+            for key in ["puncture", "indentation", "cohesive"] {
                 if listed(key) {
                     self.needs_block(&place(key), &format!("effect `{key}`"));
                 }
@@ -85,6 +85,7 @@ impl Check<'_> {
         }
         for (key, present) in [
             ("puncture", file.puncture.is_some()),
+            ("cohesive", file.cohesive.is_some()),
             ("friction", file.friction.is_some()),
             ("flexible_needle", file.flexible_needle.is_some()),
             ("indentation", file.indentation.is_some()),
@@ -118,8 +119,27 @@ impl Check<'_> {
                 .push("`solver.mass_scaling` has no effect: `mass_scaling` is not in the list `effects`.".into());
         }
         let puncture = self.puncture(&file.puncture.clone().unwrap_or_default());
+        let cohesive = self.cohesive(&file.cohesive.clone().unwrap_or_default(), &file.tissue);
+        if listed("cohesive") {
+            self.check_cohesive(&place("cohesive"), tool, motion, &cohesive, listed("puncture"));
+        } else if let Some(Tool::Needle(NeedleShape { bore: Some(_), .. })) = tool {
+            self.problems.report(
+                "needle.bore_diameter_mm",
+                "a hollow needle needs the effect `cohesive`: its core separates on the ring of the cutting edge",
+                "no separation in this scene",
+                "add \"cohesive\" to the list `effects`, or remove bore_diameter_mm",
+            );
+        }
         let friction = self.friction(&file.friction.clone().unwrap_or_default());
         let indentation = self.indentation(&file.indentation.clone().unwrap_or_default());
+        if listed("flexible_needle") && (motion.is_free() || puncture.always_free) {
+            self.problems.report(
+                &place("flexible_needle"),
+                "a flexible needle keeps to its planned path",
+                "with a free motion or puncture.path = \"free\"",
+                "move along one straight line, or remove the effect",
+            );
+        }
         let flexible = listed("flexible_needle").then(|| {
             let weight =
                 if listed("gravity") { file.gravity.clone().unwrap_or_default() } else { GravityTable::none() };
@@ -150,6 +170,7 @@ impl Check<'_> {
             damage: listed("damage").then(|| {
                 parameters::damage_over(&file.damage.clone().unwrap_or_default(), Default::default(), plasticity)
             }),
+            cohesive: listed("cohesive").then_some(cohesive),
             puncture: listed("puncture").then_some(puncture),
             indentation: listed("indentation").then_some(indentation),
             friction: listed("friction").then_some(friction),
@@ -299,6 +320,7 @@ impl Check<'_> {
                 NotNegative(1.0),
             ),
             entry_fade: self.optional(&at("entry_fade_mm"), t.entry_fade_mm, MM, d.entry_fade, Positive(100.0)),
+            always_free: t.path == Some(PathWord::Free),
         };
         if params.softened_radius >= params.ring_radius {
             let key = if t.softened_radius_mm.is_some() { "softened_radius_mm" } else { "ring_radius_mm" };
@@ -320,6 +342,103 @@ impl Check<'_> {
             ));
         }
         params
+    }
+
+    fn cohesive(&mut self, t: &CohesiveTable, tissue: &TissueTable) -> effects::cohesive::Params {
+        use Within::{Between, Positive};
+        let d = effects::cohesive::Params::default();
+        let at = |key: &str| format!("cohesive.{key}");
+        let strength = self.optional(&at("strength_kpa"), t.strength_kpa, 1e3, d.strength, Positive(1e6));
+        let energy = self.optional(&at("energy_j_m2"), t.energy_j_m2, 1.0, d.energy, Positive(1e6));
+        let penalty = t.penalty_pa_m.map(|value| self.number(&at("penalty_pa_m"), value, Positive(1e15)));
+        if t.penalty_factor.is_some() && penalty.is_some() {
+            self.problems.report(
+                &at("penalty_factor"),
+                "the faces have two penalty stiffnesses",
+                "`penalty_factor` and `penalty_pa_m`",
+                "keep one of them",
+            );
+        }
+        let size = tissue.size_mm.unwrap_or([1000.0; 3]);
+        let planes = t
+            .plane
+            .iter()
+            .enumerate()
+            .filter_map(|(index, plane)| {
+                let path = at(&format!("plane.{index}"));
+                let Some(axis) = ["x", "y", "z"].iter().position(|a| *a == plane.axis) else {
+                    self.unknown_name(&format!("{path}.axis"), "axis", &plane.axis, &["x", "y", "z"]);
+                    return None;
+                };
+                let half = 0.5 * size[axis];
+                let (low, high) = if axis == 2 { (-size[2], 0.0) } else { (-half, half) };
+                let margin = 1e-3 * (high - low);
+                let value = self.number(&format!("{path}.at_mm"), plane.at_mm, Between(low + margin, high - margin));
+                Some(effects::cohesive::Plane { axis, at: value * MM })
+            })
+            .collect();
+        effects::cohesive::Params {
+            strength,
+            shear_strength: self.optional(
+                &at("shear_strength_kpa"),
+                t.shear_strength_kpa,
+                1e3,
+                strength,
+                Positive(1e6),
+            ),
+            energy,
+            shear_energy: self.optional(&at("shear_energy_j_m2"), t.shear_energy_j_m2, 1.0, energy, Positive(1e6)),
+            exponent: self.optional(&at("exponent"), t.exponent, 1.0, d.exponent, Between(0.1, 10.0)),
+            penalty,
+            penalty_factor: self.optional(
+                &at("penalty_factor"),
+                t.penalty_factor,
+                1.0,
+                d.penalty_factor,
+                Positive(1e6),
+            ),
+            planes,
+        }
+    }
+
+    /// What the effect `cohesive` needs around it.
+    fn check_cohesive(
+        &mut self,
+        place: &str,
+        tool: &Option<Tool>,
+        motion: &Motion,
+        params: &effects::cohesive::Params,
+        cuts: bool,
+    ) {
+        let needle = match tool {
+            Some(Tool::Needle(needle)) if cuts => Some(needle),
+            _ => None,
+        };
+        if needle.is_none() && params.planes.is_empty() {
+            self.problems.report(
+                place,
+                "effect `cohesive` has no face to separate",
+                "no needle that cuts and no plane",
+                "add [needle] with the effect `puncture`, or [[cohesive.plane]] with axis = \"z\" and at_mm = -5",
+            );
+        }
+        let Some(needle) = needle else { return };
+        let tilted = |axis: usize| motion.direction[axis].abs() > 1e-9;
+        if needle.bore.is_some() && (tilted(0) || tilted(1)) {
+            self.problems.report(
+                "motion",
+                "a hollow needle goes straight down: the grid follows its bore in vertical prisms",
+                "inclined direction",
+                "write direction = [0, 0, -1], or use a solid needle",
+            );
+        } else if tilted(0) && tilted(1) {
+            self.problems.report(
+                "motion",
+                "a slit lies on a grid plane that holds the direction of the needle",
+                "direction neither in the xz nor in the yz plane",
+                "turn the azimuth to 0 or 90 degrees, or remove \"cohesive\" (the path then opens by softening)",
+            );
+        }
     }
 
     fn friction(&mut self, table: &FrictionTable) -> effects::friction::Params {

@@ -496,11 +496,12 @@ impl Check<'_> {
             ("pictures_at_s", &table.pictures_at_s, false),
             ("fields_at_s", &table.fields_at_s, false),
         ];
-        let mut values = [Vec::new(), Vec::new()];
+        let mut values = [Vec::new(), Vec::new(), Vec::new(), Vec::new()];
         for (slot, (key, list, by_depth)) in lists.into_iter().enumerate() {
             let Some(list) = list else { continue };
             let path = format!("outputs.{key}");
-            if by_depth != has_tool {
+            let by_time_too = has_tool && motion.is_free();
+            if by_depth != has_tool && !(by_time_too && !by_depth) {
                 let (has, other) = if has_tool { ("a tool", "depth_mm") } else { ("no tool", "s") };
                 let stem = key.trim_end_matches("_depth_mm").trim_end_matches("_s");
                 self.problems.report(
@@ -518,19 +519,22 @@ impl Check<'_> {
                 if value > reach * (1.0 + 1e-9) {
                     self.notices.push(format!("`{path}` holds {}, which the run never reaches.", value / unit));
                 }
-                values[slot % 2].push(value);
+                // In a scene with a tool times stand beside depths, elsewhere in their place.
+                values[if has_tool { slot } else { slot % 2 }].push(value);
             }
         }
         for list in &mut values {
             list.sort_by(f64::total_cmp);
             list.dedup();
         }
-        let [pictures_at, fields_at] = values;
+        let [pictures_at, fields_at, pictures_at_time, fields_at_time] = values;
         let width = table.picture_width_px.unwrap_or(900);
         self.number("outputs.picture_width_px", width as f64, Within::Between(64.0, 8192.0));
         Outputs {
             pictures_at,
             fields_at,
+            pictures_at_time,
+            fields_at_time,
             picture_width: width,
             stress_scale: table
                 .stress_scale_kpa
@@ -552,6 +556,10 @@ impl Check<'_> {
                 "outside the block",
                 format!("choose entry_mm inside {range}"),
             );
+            return;
+        }
+        if motion.is_free() {
+            self.free_geometry(tissue, tool, motion);
             return;
         }
         let end = motion.deepest_point();
@@ -602,6 +610,46 @@ impl Check<'_> {
                     (tissue.size.z - PATH_MARGIN) / -motion.direction.z / MM
                 ),
             );
+        }
+    }
+
+    /// A free motion stays inside the block: the tip, and the needle where it enters the surface.
+    fn free_geometry(&mut self, tissue: &Tissue, tool: &Tool, motion: &Motion) {
+        let half = tissue.size * 0.5;
+        let radius = match tool {
+            Tool::Needle(shape) => shape.radius,
+            Tool::Sphere { .. } | Tool::FlatPunch { .. } => 0.0,
+        };
+        let margin = PATH_MARGIN + radius;
+        for (index, leg) in motion.legs().into_iter().enumerate() {
+            const PARTS: u32 = 50;
+            let samples = (0..=PARTS).map(|i| leg.at(leg.duration * f64::from(i) / f64::from(PARTS)));
+            let beyond = |x: DVec3| x.x.abs() > half.x - margin || x.y.abs() > half.y - margin;
+            let leaves = samples.filter(|p| p.depth > 0.0).find_map(|p| {
+                let surface = p.tip - p.direction * p.depth;
+                let bottom = p.tip.z < PATH_MARGIN - tissue.size.z;
+                if beyond(p.tip) || bottom { Some(p.tip) } else { beyond(surface).then_some(surface) }
+            });
+            let Some(x) = leaves else { continue };
+            self.problems.report(
+                &format!("motion.phase.{index}"),
+                format!(
+                    "the needle passes ({:.3}, {:.3}, {:.3}) mm, less than {:.3} mm from a side or {:.3} mm from the bottom",
+                    x.x / MM,
+                    x.y / MM,
+                    x.z / MM,
+                    margin / MM,
+                    PATH_MARGIN / MM
+                ),
+                "the path leaves the block",
+                format!(
+                    "keep it within x +-{:.3}, y +-{:.3} mm above z = {:.3} mm, or enlarge tissue.size_mm",
+                    (half.x - margin) / MM,
+                    (half.y - margin) / MM,
+                    (PATH_MARGIN - tissue.size.z) / MM
+                ),
+            );
+            return;
         }
     }
 

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::super::file::*;
-use super::super::{Motion, NeedleShape, Phase, TipShape, Tool, Vibration, presets};
+use super::super::motion::Placement;
+use super::super::{BoreShape, Motion, NeedleShape, Phase, TipShape, Tool, Vibration, presets};
 use super::{Check, MM, Within};
 use crate::material::four_digits;
 
@@ -64,8 +65,11 @@ impl Check<'_> {
         }
         let radius = 0.5 * diameter;
         let (tip, tip_length) = self.needle_tip(table, radius);
+        let bore = self.bore(table, radius);
         let steel = NeedleShape::cone(&name, radius, tip_length);
-        let shape = NeedleShape { tip, inner_diameter, ..steel };
+        // The bore that takes a core is that of the tube.
+        let inner_diameter = bore.map_or(inner_diameter, |b| 2.0 * b.radius);
+        let shape = NeedleShape { tip, bore, inner_diameter, ..steel };
         match &table.material {
             None => shape,
             Some(NeedleMaterialEntry::Preset(name)) => match presets::needle_material(name) {
@@ -86,6 +90,38 @@ impl Check<'_> {
                 NeedleShape { material: "constants".into(), youngs_modulus, density, ..shape }
             }
         }
+    }
+
+    /// What makes the needle hollow.
+    fn bore(&mut self, table: &NeedleTable, radius: f64) -> Option<BoreShape> {
+        let edge = self.optional("needle.cutting_edge", table.cutting_edge, 1.0, 0.25, Within::Between(0.0, 1.0));
+        let friction = self.optional("needle.bore_friction", table.bore_friction, 1.0, 0.05, Within::NotNegative(2.0));
+        let Some(diameter) = table.bore_diameter_mm else {
+            for (key, given) in [("cutting_edge", table.cutting_edge), ("bore_friction", table.bore_friction)] {
+                if given.is_some() {
+                    self.notices.push(format!("`needle.{key}` has no effect without needle.bore_diameter_mm."));
+                }
+            }
+            return None;
+        };
+        let inner = 0.5 * self.number("needle.bore_diameter_mm", diameter, Within::Between(0.02, 20.0)) * MM;
+        if inner >= radius {
+            self.problems.report(
+                "needle.bore_diameter_mm",
+                format!("the bore of {diameter} mm does not fit into the needle of {} mm", 2e3 * radius),
+                "must be smaller than the outer diameter",
+                "write e.g. bore_diameter_mm = 1.194 for 16G",
+            );
+        }
+        if table.bevel_angle_deg.is_some() {
+            self.problems.report(
+                "needle.bevel_angle_deg",
+                "a hollow needle has a ring for a tip, no bevel",
+                "bevel and bore",
+                "write tip_length_mm = 1.0 for the length of the ground edge",
+            );
+        }
+        Some(BoreShape { radius: inner, edge: inner + edge * (radius - inner), friction })
     }
 
     /// Shape and length of the tip.
@@ -196,9 +232,10 @@ impl Check<'_> {
             self.number(&format!("motion.entry_mm.{index}"), *value, Within::Between(-1000.0, 1000.0));
         }
         let direction = self.direction(table);
-        let phases = self.phases(&table.phase);
+        let entry = DVec3::new(entry[0], entry[1], 0.0) * MM;
+        let phases = self.phases(&table.phase, entry, direction);
         let vibration = table.vibration.as_ref().map(|v| self.vibration(v, direction));
-        Motion { entry: DVec3::new(entry[0], entry[1], 0.0) * MM, direction, phases, vibration }
+        Motion { entry, direction, phases, vibration }
     }
 
     fn vibration(&mut self, table: &VibrationTable, insertion: DVec3) -> Vibration {
@@ -227,46 +264,60 @@ impl Check<'_> {
     }
 
     fn direction(&mut self, table: &MotionTable) -> DVec3 {
-        match (table.direction, table.angle_deg) {
+        self.stated_direction("motion", table.direction, table.angle_deg, table.azimuth_deg).unwrap_or(DVec3::NEG_Z)
+    }
+
+    /// The direction that a table states as a vector or by angles; `None` where it states none.
+    fn stated_direction(
+        &mut self,
+        table: &str,
+        direction: Option<[f64; 3]>,
+        angle_deg: Option<f64>,
+        azimuth_deg: Option<f64>,
+    ) -> Option<DVec3> {
+        let at = |key: &str| format!("{table}.{key}");
+        match (direction, angle_deg) {
             (Some(_), Some(_)) => {
                 self.problems.report(
-                    "motion.angle_deg",
+                    &at("angle_deg"),
                     "the motion has two directions",
                     "`direction` and `angle_deg`",
                     "keep one of them",
                 );
-                DVec3::NEG_Z
+                None
             }
             (Some(vector), None) => {
-                let vector = self.vector("motion.direction", vector, 1e6);
+                let vector = self.vector(&at("direction"), vector, 1e6);
                 let unit = vector.normalize_or_zero();
                 // 80 degrees from the vertical, as for angle_deg.
                 if unit.z > -(80.0_f64.to_radians().cos()) {
                     self.problems.report(
-                        "motion.direction",
+                        &at("direction"),
                         "the direction does not lead into the tissue",
                         "must point down, at most 80 degrees from the vertical",
                         "write a vector with a negative z, e.g. direction = [0, 0, -1]",
                     );
-                    return DVec3::NEG_Z;
+                    return None;
                 }
-                unit
+                Some(unit)
             }
-            (None, angle) => {
-                if angle.is_none() && table.azimuth_deg.is_some() {
-                    self.notices.push("`motion.azimuth_deg` has no effect without motion.angle_deg.".into());
+            (None, None) => {
+                if azimuth_deg.is_some() {
+                    self.notices.push(format!("`{}` has no effect without {}.", at("azimuth_deg"), at("angle_deg")));
                 }
-                let angle =
-                    angle.map_or(0.0, |value| self.number("motion.angle_deg", value, Within::Between(0.0, 80.0)));
-                let azimuth =
-                    self.optional("motion.azimuth_deg", table.azimuth_deg, 1.0, 0.0, Within::Between(-360.0, 360.0));
-                let (angle, azimuth) = (angle.to_radians(), azimuth.to_radians());
-                DVec3::new(angle.sin() * azimuth.cos(), angle.sin() * azimuth.sin(), -angle.cos())
+                None
+            }
+            (None, Some(angle)) => {
+                let angle = self.number(&at("angle_deg"), angle, Within::Between(0.0, 80.0)).to_radians();
+                let azimuth = self
+                    .optional(&at("azimuth_deg"), azimuth_deg, 1.0, 0.0, Within::Between(-360.0, 360.0))
+                    .to_radians();
+                Some(DVec3::new(angle.sin() * azimuth.cos(), angle.sin() * azimuth.sin(), -angle.cos()))
             }
         }
     }
 
-    fn phases(&mut self, tables: &[PhaseTable]) -> Vec<Phase> {
+    fn phases(&mut self, tables: &[PhaseTable], entry: DVec3, direction: DVec3) -> Vec<Phase> {
         if tables.is_empty() {
             self.problems.report(
                 "motion",
@@ -275,80 +326,175 @@ impl Check<'_> {
                 "add [[motion.phase]] with kind = \"insert\", speed_mm_s = 2, depth_mm = 12",
             );
         }
-        let mut phases = Vec::new();
-        let mut reached = 0.0;
+        let mut motion = Motion { entry, direction, phases: Vec::new(), vibration: None };
         for (index, table) in tables.iter().enumerate() {
-            let at = |key: &str| format!("motion.phase.{index}.{key}");
-            if table.kind == PhaseKind::Hold {
-                if table.speed_mm_s.is_some() || table.depth_mm.is_some() {
-                    let key = if table.speed_mm_s.is_some() { "speed_mm_s" } else { "depth_mm" };
-                    self.problems.report(
-                        &at(key),
-                        "a hold has no speed and no depth",
-                        "not for hold",
-                        "remove this key",
-                    );
+            self.keys_of_other_kinds(index, table);
+            let begin = motion.end();
+            let phase = match table.kind {
+                PhaseKind::Hold => self.hold(index, table),
+                PhaseKind::Insert => self.insertion(index, table, begin.depth),
+                PhaseKind::Withdraw => {
+                    let inserted = motion.phases.iter().any(|p| !matches!(p, Phase::Hold { .. }));
+                    self.withdrawal(index, table, begin.depth, inserted)
                 }
-                let Some(duration) = table.duration_s else {
-                    self.missing_in_phase(index, "duration_s", "duration_s = 0.5");
-                    continue;
-                };
-                phases
-                    .push(Phase::Hold { duration: self.number(&at("duration_s"), duration, Within::Positive(600.0)) });
-                continue;
-            }
-            if table.duration_s.is_some() {
-                self.problems.report(
-                    &at("duration_s"),
-                    "speed and depth fix how long this phase takes",
-                    "for hold only",
-                    "remove this key",
-                );
-            }
-            let (Some(speed), Some(depth)) = (table.speed_mm_s, table.depth_mm) else {
-                if table.speed_mm_s.is_none() {
-                    self.missing_in_phase(index, "speed_mm_s", "speed_mm_s = 2");
-                }
-                if table.depth_mm.is_none() {
-                    self.missing_in_phase(index, "depth_mm", "depth_mm = 12");
-                }
-                continue;
+                PhaseKind::Move => self.free_move(index, table, &begin),
+                PhaseKind::Turn => self.turn(index, table, &begin),
+                PhaseKind::Reposition => self.reposition(index, table, &begin),
             };
-            let speed = self.number(&at("speed_mm_s"), speed, Within::Positive(1000.0)) * MM;
-            if table.kind == PhaseKind::Insert {
-                let depth = self.number(&at("depth_mm"), depth, Within::Positive(1000.0));
-                if depth <= reached {
-                    self.problems.report(
-                        &at("depth_mm"),
-                        format!("an insertion to {depth} mm from {reached} mm does not go deeper"),
-                        "not deeper than where the tool stands",
-                        format!("write a depth above {reached}, or kind = \"withdraw\""),
-                    );
-                }
-                reached = depth;
-                phases.push(Phase::Insert { speed, depth: depth * MM });
-            } else {
-                let depth = self.number(&at("depth_mm"), depth, Within::Between(-100.0, 1000.0));
-                if !phases.iter().any(|phase| matches!(phase, Phase::Insert { .. })) {
-                    self.problems.report(
-                        &at("kind"),
-                        "the motion withdraws before it inserts",
-                        "no insertion before this phase",
-                        "put a phase with kind = \"insert\" first",
-                    );
-                } else if depth >= reached {
-                    self.problems.report(
-                        &at("depth_mm"),
-                        format!("a withdrawal to {depth} mm from {reached} mm does not go back"),
-                        "not shallower than where the tool stands",
-                        format!("write a depth below {reached}, or kind = \"insert\""),
-                    );
-                }
-                reached = depth;
-                phases.push(Phase::Withdraw { speed, depth: depth * MM });
+            motion.phases.extend(phase);
+        }
+        motion.phases
+    }
+
+    /// Keys that mean nothing for the kind of a phase.
+    fn keys_of_other_kinds(&mut self, index: usize, table: &PhaseTable) {
+        use PhaseKind::{Hold, Insert, Move, Reposition, Turn, Withdraw};
+        let turning = [Move, Turn, Reposition];
+        let keys: [(&str, bool, &[PhaseKind], &str); 10] = [
+            ("speed_mm_s", table.speed_mm_s.is_some(), &[Insert, Withdraw, Move], "for insert, withdraw and move"),
+            ("depth_mm", table.depth_mm.is_some(), &[Insert, Withdraw], "for insert and withdraw"),
+            ("duration_s", table.duration_s.is_some(), &[Hold], "for hold only"),
+            ("to_mm", table.to_mm.is_some(), &[Move], "for move only"),
+            ("direction", table.direction.is_some(), &turning, "for move, turn and reposition"),
+            ("angle_deg", table.angle_deg.is_some(), &turning, "for move, turn and reposition"),
+            ("azimuth_deg", table.azimuth_deg.is_some(), &turning, "for move, turn and reposition"),
+            ("rate_deg_s", table.rate_deg_s.is_some(), &[Turn], "for turn only"),
+            ("pivot_mm", table.pivot_mm.is_some(), &[Turn], "for turn only"),
+            ("entry_mm", table.entry_mm.is_some(), &[Reposition], "for reposition only"),
+        ];
+        for (key, present, kinds, label) in keys {
+            if !present || kinds.contains(&table.kind) {
+                continue;
+            }
+            let message = match (table.kind, key) {
+                (Hold, "speed_mm_s" | "depth_mm") => "a hold has no speed and no depth".to_string(),
+                (Insert | Withdraw, "duration_s") => "speed and depth fix how long this phase takes".into(),
+                _ => format!("`{key}` means nothing in this kind of phase"),
+            };
+            let label = if table.kind == Hold { "not for hold" } else { label };
+            self.problems.report(&format!("motion.phase.{index}.{key}"), message, label, "remove this key");
+        }
+    }
+
+    /// A number that a phase cannot do without.
+    fn needed(&mut self, index: usize, key: &str, value: Option<f64>, example: &str, within: Within) -> Option<f64> {
+        match value {
+            Some(value) => Some(self.number(&format!("motion.phase.{index}.{key}"), value, within)),
+            None => {
+                self.missing_in_phase(index, key, example);
+                None
             }
         }
-        phases
+    }
+
+    fn hold(&mut self, index: usize, table: &PhaseTable) -> Option<Phase> {
+        let duration =
+            self.needed(index, "duration_s", table.duration_s, "duration_s = 0.5", Within::Positive(600.0))?;
+        Some(Phase::Hold { duration })
+    }
+
+    /// Speed [m/s] and depth [mm] of an insertion or a withdrawal.
+    fn speed_and_depth(&mut self, index: usize, table: &PhaseTable, within: Within) -> Option<(f64, f64)> {
+        let speed = self.needed(index, "speed_mm_s", table.speed_mm_s, "speed_mm_s = 2", Within::Positive(1000.0));
+        let depth = self.needed(index, "depth_mm", table.depth_mm, "depth_mm = 12", within);
+        Some((speed? * MM, depth?))
+    }
+
+    fn insertion(&mut self, index: usize, table: &PhaseTable, from: f64) -> Option<Phase> {
+        let (speed, depth) = self.speed_and_depth(index, table, Within::Positive(1000.0))?;
+        if depth * MM <= from * (1.0 + 1e-12) {
+            let reached = four_digits(from / MM);
+            self.problems.report(
+                &format!("motion.phase.{index}.depth_mm"),
+                format!("an insertion to {depth} mm from {reached} mm does not go deeper"),
+                "not deeper than where the tool stands",
+                format!("write a depth above {reached}, or kind = \"withdraw\""),
+            );
+        }
+        Some(Phase::Insert { speed, depth: depth * MM })
+    }
+
+    fn withdrawal(&mut self, index: usize, table: &PhaseTable, from: f64, inserted: bool) -> Option<Phase> {
+        let (speed, depth) = self.speed_and_depth(index, table, Within::Between(-100.0, 1000.0))?;
+        if !inserted {
+            self.problems.report(
+                &format!("motion.phase.{index}.kind"),
+                "the motion withdraws before it inserts",
+                "no insertion before this phase",
+                "put a phase with kind = \"insert\" first",
+            );
+        } else if depth * MM >= from * (1.0 - 1e-12) {
+            let reached = four_digits(from / MM);
+            self.problems.report(
+                &format!("motion.phase.{index}.depth_mm"),
+                format!("a withdrawal to {depth} mm from {reached} mm does not go back"),
+                "not shallower than where the tool stands",
+                format!("write a depth below {reached}, or kind = \"insert\""),
+            );
+        }
+        Some(Phase::Withdraw { speed, depth: depth * MM })
+    }
+
+    fn free_move(&mut self, index: usize, table: &PhaseTable, begin: &Placement) -> Option<Phase> {
+        let place = format!("motion.phase.{index}");
+        let speed = self.needed(index, "speed_mm_s", table.speed_mm_s, "speed_mm_s = 2", Within::Positive(1000.0));
+        let Some(to) = table.to_mm else {
+            self.missing_in_phase(index, "to_mm", "to_mm = [3, 0, -8], where the tip goes");
+            return None;
+        };
+        let to = self.vector(&format!("{place}.to_mm"), to, 1000.0) * MM;
+        if to.distance(begin.tip) < 1e-9 {
+            self.problems.report(
+                &format!("{place}.to_mm"),
+                "the tip is there already",
+                "a move of no length",
+                "write another place, or kind = \"turn\" to change the direction alone",
+            );
+        }
+        let direction = self.stated_direction(&place, table.direction, table.angle_deg, table.azimuth_deg);
+        Some(Phase::Move { to, speed: speed? * MM, direction: direction.unwrap_or(begin.direction) })
+    }
+
+    fn turn(&mut self, index: usize, table: &PhaseTable, begin: &Placement) -> Option<Phase> {
+        let place = format!("motion.phase.{index}");
+        let rate = self.needed(index, "rate_deg_s", table.rate_deg_s, "rate_deg_s = 10", Within::Positive(3600.0));
+        let direction = self.stated_direction(&place, table.direction, table.angle_deg, table.azimuth_deg);
+        let Some(direction) = direction else {
+            self.missing_in_phase(index, "angle_deg", "angle_deg = 20 or a direction");
+            return None;
+        };
+        if direction.angle_between(begin.direction) < 1e-6 {
+            self.problems.report(
+                &place,
+                "the needle has this direction already",
+                "a turn of no angle",
+                "write another direction, or remove this phase",
+            );
+        }
+        let pivot = table.pivot_mm.map(|p| self.vector(&format!("{place}.pivot_mm"), p, 1000.0) * MM);
+        Some(Phase::Turn { direction, rate: rate?.to_radians(), pivot: pivot.unwrap_or(begin.tip) })
+    }
+
+    fn reposition(&mut self, index: usize, table: &PhaseTable, begin: &Placement) -> Option<Phase> {
+        let place = format!("motion.phase.{index}");
+        if begin.depth > 0.0 {
+            self.problems.report(
+                &format!("{place}.kind"),
+                format!("the needle is {} mm deep in the tissue", four_digits(begin.depth / MM)),
+                "outside the tissue only",
+                "put a phase with kind = \"withdraw\", depth_mm = -3 before it, or write kind = \"move\"",
+            );
+        }
+        let Some([x, y]) = table.entry_mm else {
+            self.missing_in_phase(index, "entry_mm", "entry_mm = [3, 0]");
+            return None;
+        };
+        for (axis, value) in [x, y].into_iter().enumerate() {
+            self.number(&format!("{place}.entry_mm.{axis}"), value, Within::Between(-1000.0, 1000.0));
+        }
+        let direction = self.stated_direction(&place, table.direction, table.angle_deg, table.azimuth_deg);
+        let entry = DVec3::new(x, y, 0.0) * MM;
+        Some(Phase::Reposition { entry, direction: direction.unwrap_or(begin.direction) })
     }
 
     fn missing_in_phase(&mut self, index: usize, key: &str, example: &str) {

@@ -1,8 +1,12 @@
 //! The CPU engine: f64, rayon, written from the equations. Reference for the tests and fallback without an adapter.
 
+mod cohesive_forces;
+mod free_tip;
 mod indenter_contact;
 mod needle_contact;
 mod tip;
+
+pub use cohesive_forces::TORN_REACH;
 
 use std::sync::Arc;
 
@@ -41,8 +45,12 @@ pub struct CpuEngine {
     state: State,
     cells: Vec<CellForces>,
     external: Vec<DVec3>,
+    /// Stiffness bound that cohesive faces add at a node [N/m].
+    added_bound: Vec<f64>,
     tip_forces: Vec<(f64, [usize; 8], [f64; 8])>,
     tip_energy: f64,
+    /// Force across the needle on every anchor of a free tip [N].
+    tip_sway: DVec3,
     contact_energy: f64,
     /// Plastic and damage dissipation that earlier frames have told [J].
     booked: (f64, f64),
@@ -64,7 +72,10 @@ impl CpuEngine {
             velocity: vec![DVec3::ZERO; nodes],
             stiffness: if model.puncture.is_some() { vec![1.0; cells] } else { Vec::new() },
             tip_coordinate: 0.0,
+            tip: model.free_tip(),
+            cut_samples: vec![0; model.puncture.as_ref().and_then(|p| p.free.as_ref()).map_or(0, |f| f.cell_count())],
             contact: vec![ContactState::default(); model.contact_nodes.len()],
+            pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
         };
         let bytes = nodes * (3 * size_of::<DVec3>() + 8)
@@ -85,8 +96,10 @@ impl CpuEngine {
             state,
             cells: vec![CellForces::default(); cells],
             external: vec![DVec3::ZERO; nodes],
+            added_bound: vec![0.0; nodes],
             tip_forces: Vec::new(),
             tip_energy: 0.0,
+            tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
             booked: (0.0, 0.0),
             centre_line: None,
@@ -102,10 +115,20 @@ impl CpuEngine {
         let model = self.model.clone();
         self.external.fill(DVec3::ZERO);
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
-            self.advance_tip(plan, &pose);
-            self.soften_path(plan);
+            match &plan.free {
+                None => {
+                    self.advance_tip(plan, &pose);
+                    self.soften_path(plan, &pose);
+                }
+                Some(free) => {
+                    self.advance_free_tip(plan, free, &pose);
+                    self.soften_free_path(plan, free);
+                }
+            }
         }
         self.element_forces(input);
+        self.added_bound.fill(0.0);
+        self.cohesive_forces();
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             self.needle_contact(plan, &pose, input.step);
         }
@@ -156,7 +179,7 @@ impl CpuEngine {
         let selective = model.effects.mass_scaling.is_some();
         let gravity = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling());
         let (cells, elements) = (&self.cells, &self.elements);
-        let external = &self.external;
+        let (external, added_bound) = (&self.external, &self.added_bound);
         let result: (f64, f64, u32, u32) = self
             .state
             .displacement
@@ -165,13 +188,20 @@ impl CpuEngine {
             .enumerate()
             .with_min_len(256)
             .map(|(node, (u, v))| {
-                let (mut force, bound) = elements.gather(mesh, cells, node);
-                let scaled = model.node_mass[node];
-                let mut load = gravity * scaled;
-                if let Some(f) = model.node_load.get(node) {
-                    load += *f * input.load_factor;
+                let own = [node as u32];
+                // Tied copies move as one node: every copy sums over all of them and books its share of the mass.
+                let copies = model.separation.tied(node).unwrap_or(&own);
+                let (mut force, mut bound, mut scaled, mut load) = (DVec3::ZERO, 0.0, 0.0, DVec3::ZERO);
+                for copy in copies.iter().map(|n| *n as usize) {
+                    let (f, k) = elements.gather(mesh, cells, copy);
+                    force += f + external[copy];
+                    bound += k + added_bound[copy];
+                    scaled += model.node_mass[copy];
+                    load += gravity * model.node_mass[copy];
+                    load += model.node_load.get(copy).map_or(DVec3::ZERO, |f| *f * input.load_factor);
                 }
-                force += external[node] + load;
+                force += load;
+                let share = if copies.len() > 1 { model.node_mass[node] / scaled } else { 1.0 };
                 let mut mass = scaled;
                 let mut raised = 0;
                 if selective {
@@ -215,7 +245,7 @@ impl CpuEngine {
                 work += load.dot(mid) * dt;
                 *v = new;
                 *u += new * dt;
-                (alpha * mass * free_mid.length_squared() * dt, work, clamped, raised)
+                (share * alpha * mass * free_mid.length_squared() * dt, share * work, clamped, raised)
             })
             .reduce(|| (0.0, 0.0, 0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3));
         self.sums.damping_dissipation += result.0;
@@ -256,6 +286,8 @@ impl CpuEngine {
         if model.has_driven_faces() {
             sums.reactions = face_reactions(model, &elements.nodal_forces(&model.mesh, &self.cells));
         }
+        let torn = state.pairs.iter().zip(&model.separation.pairs).map(|(d, p)| d * p.area);
+        sums.torn_area = torn.sum();
         sums.kinetic = state.velocity.iter().zip(&model.node_mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
         sums.max_speed = state.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
         sums.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
@@ -272,7 +304,7 @@ impl FrameSums {
         self.friction_impulse += c.friction.dot(pose.direction) * dt;
         self.impulse += total * dt;
         self.angular_impulse += c.torque * dt;
-        self.tool_work += total.dot(pose.velocity) * dt;
+        self.tool_work += (total.dot(pose.velocity) + c.torque.dot(pose.angular_velocity)) * dt;
         self.friction_dissipation += c.friction_work;
         self.contact_dissipation += c.damping_power * dt;
     }

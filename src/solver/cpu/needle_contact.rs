@@ -3,10 +3,11 @@
 use glam::DVec3;
 
 use super::{ContactSums, CpuEngine};
-use crate::model::PuncturePlan;
-use crate::needle::ToolPose;
+use crate::model::{ContactSurface, PuncturePlan};
 use crate::needle::centre_line::Bend;
-use crate::needle::gap::Overlap;
+use crate::needle::free_path::{FreeTip, PASSED_MARGIN, WATCHED};
+use crate::needle::gap::{Overlap, Profile};
+use crate::needle::{ToolPose, swing};
 use crate::solver::engine::ContactState;
 
 impl CpuEngine {
@@ -17,14 +18,16 @@ impl CpuEngine {
         let d = -pose.direction;
         let k = plan.contact_stiffness;
         let a = self.state.tip_coordinate;
-        let profile = plan.profile;
+        let turned = swing(plan.path.direction, pose.direction, plan.profile.shift);
+        let profile = Profile { shift: turned, ..plan.profile };
+        let tip = self.state.tip;
         let cone = profile.tip_length;
         let mut stored = self.tip_energy;
         let line = self.centre_line;
-        let mut tip_on_node: std::collections::HashMap<usize, f64> = Default::default();
+        let mut tip_on_node: std::collections::HashMap<usize, DVec3> = Default::default();
         for (force, nodes, weights) in &self.tip_forces {
             for (n, w) in nodes.iter().zip(weights) {
-                *tip_on_node.entry(*n).or_default() += force * w;
+                *tip_on_node.entry(*n).or_default() += (pose.direction * *force + self.tip_sway) * *w;
             }
         }
         for (index, (contact, memory)) in model.contact_nodes.iter().zip(&mut self.state.contact).enumerate() {
@@ -32,16 +35,27 @@ impl CpuEngine {
             let x = model.mesh.rest_position(node) + self.state.displacement[node];
             let mut sums = ContactSums::default();
             if let Some(f) = tip_on_node.get(&node) {
-                sums.tip = pose.direction * *f;
+                sums.tip = *f;
             }
             let relative = x - pose.tip;
             let s = relative.dot(d);
             let bend = line.map_or(Bend::default(), |l| l.at(s, (step - l.first_step) as f64 * self.dt));
             let from_axis = relative - bend.offset;
-            if !(contact.pushed && contact.rest_axial < a && s > 0.0) {
-                *memory = ContactState::default();
+            let (passed, rest_radius) = match &plan.free {
+                None => (contact.pushed && contact.rest_axial < a, contact.rest_radius),
+                Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, from_axis, s, d),
+            };
+            if !(passed && s > 0.0) {
+                *memory =
+                    ContactState { rest_radius: memory.rest_radius, passed: memory.passed, ..ContactState::default() };
             } else {
-                let free = profile.opened_path(from_axis, d, contact.rest_radius, (0.0, 0.0));
+                let overlap = |less: (f64, f64)| match contact.surface {
+                    ContactSurface::OpenedPath => profile.opened_path(from_axis, d, rest_radius, less),
+                    ContactSurface::Slit { side } => profile.slit_face(from_axis, d, side, less),
+                    ContactSurface::OuterWall => profile.tube_wall(from_axis, d, false, less),
+                    ContactSurface::Bore => profile.tube_wall(from_axis, d, true, less),
+                };
+                let free = overlap((0.0, 0.0));
                 if !memory.touching {
                     memory.touching = true;
                     memory.overlap = free.value.max(0.0);
@@ -50,11 +64,11 @@ impl CpuEngine {
                 let travel = (s - memory.axial_on) / plan.params.entry_fade;
                 let fading = if travel > 0.0 && travel < 1.0 { -memory.overlap / plan.params.entry_fade } else { 0.0 };
                 let less = (memory.overlap * (1.0 - travel).clamp(0.0, 1.0), fading);
-                let Overlap { value: depth, gradient } = profile.opened_path(from_axis, d, contact.rest_radius, less);
+                let Overlap { value: depth, gradient } = overlap(less);
                 let gradient = gradient - d * gradient.dot(bend.slope);
                 let steep = gradient.length();
                 let n = -gradient / steep;
-                let v = self.state.velocity[node] - pose.velocity - bend.rate;
+                let v = self.state.velocity[node] - pose.velocity - pose.angular_velocity.cross(relative) - bend.rate;
                 let vn = v.dot(n);
                 let mass = model.node_mass[node];
                 let damping = 2.0 * plan.params.contact_damping * (k * mass).sqrt();
@@ -65,10 +79,19 @@ impl CpuEngine {
                     sums.stored = 0.5 * k * depth * depth;
                     sums.damping_power = (elastic - normal) * vn;
                 }
+                if depth > 0.0 && contact.surface != ContactSurface::OpenedPath {
+                    // A separated face has half the mass of other nodes.
+                    self.added_bound[node] += 2.0 * k * steep * steep;
+                }
+                memory.on_shaft = depth > 0.0 && s >= cone;
                 memory.stick = match model.effects.friction {
                     Some(friction) if normal > 0.0 => {
                         let kt = friction.stiffness_ratio * k;
-                        let mu = friction.coefficient * ((s - cone) / friction.fade_length).clamp(0.0, 1.0);
+                        let coefficient = match (contact.surface, plan.needle.bore) {
+                            (ContactSurface::Bore, Some(bore)) => bore.friction,
+                            _ => friction.coefficient,
+                        };
+                        let mu = coefficient * ((s - cone) / friction.fade_length).clamp(0.0, 1.0);
                         let trial = memory.stick + (v - n * vn) * self.dt;
                         let trial = trial - n * trial.dot(n);
                         let length = trial.length();
@@ -105,4 +128,31 @@ impl CpuEngine {
             line.share(&mut self.sums.needle_loads, (pose.tip - x).dot(pose.direction), std::mem::take(impulse));
         }
     }
+}
+
+/// On a free path: brings what the node knows of the tip to this step, and tells whether it is to be kept out of the needle
+/// and with which r0 [m]. `lever` from the tip, `s` behind it along `d`.
+fn free_contact(
+    plan: &PuncturePlan,
+    tip: &FreeTip,
+    rest: DVec3,
+    memory: &mut ContactState,
+    lever: DVec3,
+    s: f64,
+    d: DVec3,
+) -> (bool, f64) {
+    let ring = plan.params.ring_radius;
+    let relative = rest - tip.place;
+    let ahead = relative.dot(tip.along);
+    let radius = (relative - tip.along * ahead).length();
+    let passes = ahead <= 0.0 && ahead > -ring && radius < ring;
+    let passed = tip.inside && if memory.passed { ahead < PASSED_MARGIN } else { passes };
+    if passed != memory.passed {
+        *memory = ContactState { passed, rest_radius: if passed { radius } else { 0.0 }, ..ContactState::default() };
+    }
+    let needle = plan.profile;
+    // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.
+    let reach = WATCHED * needle.radius;
+    let met = tip.inside && !passed && s > needle.tip_length && (lever - d * s).length_squared() < reach * reach;
+    (met || (passed && memory.rest_radius > plan.params.softened_radius), memory.rest_radius)
 }

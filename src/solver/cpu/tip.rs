@@ -9,17 +9,12 @@ use crate::needle::ToolPose;
 use crate::solver::elements::{CORNERS, CellStates};
 
 impl CpuEngine {
-    /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction`.
-    pub(super) fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> ([usize; 8], [f64; 8], [f64; 8]) {
-        let (mut c, mut xi, mut width) = ([0; 3], [0.0; 3], [0.0; 3]);
-        for a in 0..3 {
-            let lines = &mesh.lines[a];
-            let i = lines.partition_point(|l| *l <= x[a]).clamp(1, lines.len() - 1) - 1;
-            c[a] = i;
-            width[a] = lines[i + 1] - lines[i];
-            xi[a] = ((x[a] - lines[i]) / width[a]).clamp(0.0, 1.0);
-        }
-        let nodes = mesh.cell_nodes(mesh.cell_index(c[0], c[1], c[2]));
+    /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction` (in a bent grid the
+    /// direction of its axis).
+    fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> ([usize; 8], [f64; 8], [f64; 8]) {
+        let ([i, j, k], xi) = mesh.locate(x);
+        let cell = mesh.cell_index(i, j, k);
+        let width = mesh.cell_size(cell);
         let (mut weight, mut slope) = ([0.0; 8], [0.0; 8]);
         for (i, signs) in CORNERS.iter().enumerate() {
             let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (xi[a] - 0.5));
@@ -27,7 +22,7 @@ impl CpuEngine {
             weight[i] = n[0] * n[1] * n[2];
             slope[i] = d[0] * n[1] * n[2] + n[0] * d[1] * n[2] + n[0] * n[1] * d[2];
         }
-        (nodes, weight, slope)
+        (mesh.cell_nodes(cell), weight, slope)
     }
 
     /// Stage `advance_tip`: each anchor k carries a spring between the tip plane and the material point at `a`.
@@ -81,27 +76,40 @@ impl CpuEngine {
     }
 
     /// Stage `soften_path`: factor `max(residual, 1 - phi ramp(a))`; the energy that a cell loses is dissipated.
-    pub(super) fn soften_path(&mut self, plan: &PuncturePlan) {
+    pub(super) fn soften_path(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
         let a = self.state.tip_coordinate;
         for path_cell in &plan.cells {
             let cell = path_cell.cell as usize;
             let length = path_cell.axial_end - path_cell.axial_start;
             let ramp = ((a - path_cell.axial_start) / length.max(1e-9)).clamp(0.0, 1.0);
-            let factor = (1.0 - path_cell.fraction * ramp).max(plan.params.residual_stiffness);
-            let old = self.state.stiffness[cell];
-            if factor < old {
-                // Half a step back: the mean of the energies before and after the step, as the leapfrog work has it.
-                let half = 0.5 * self.dt;
-                let mut u = [DVec3::ZERO; 8];
-                for (u, n) in u.iter_mut().zip(self.model.mesh.cell_nodes(cell).iter()) {
-                    *u = self.state.displacement[*n] - self.state.velocity[*n] * half;
+            let factor = match plan.needle.bore {
+                // The core tears off where the tip stands when the needle begins to go back.
+                Some(_) => {
+                    let here = (path_cell.axial_start..path_cell.axial_end).contains(&a);
+                    if here && pose.velocity.dot(pose.direction) < 0.0 { 0.0 } else { 1.0 }
                 }
-                let intact = CellStates { points: &self.state.points, stiffness: &[] };
-                let m = self.elements.measure_corners(&self.model, cell, &u, None, intact);
-                // What Prony terms hold is booked with their work, which the softening does not touch.
-                self.sums.softening_dissipation += (old - factor) * (m.elastic - m.held + m.hourglass);
-                self.state.stiffness[cell] = factor;
-            }
+                None => (1.0 - path_cell.fraction * ramp).max(plan.params.residual_stiffness),
+            };
+            self.soften_cell(cell, factor);
         }
+    }
+
+    /// Leaves a cell the part `factor` of its stiffness, if that is less than it has, and books the energy that it loses.
+    pub(super) fn soften_cell(&mut self, cell: usize, factor: f64) {
+        let old = self.state.stiffness[cell];
+        if factor >= old {
+            return;
+        }
+        // Half a step back: the mean of the energies before and after the step, as the leapfrog work has it.
+        let half = 0.5 * self.dt;
+        let mut u = [DVec3::ZERO; 8];
+        for (u, n) in u.iter_mut().zip(self.model.mesh.cell_nodes(cell).iter()) {
+            *u = self.state.displacement[*n] - self.state.velocity[*n] * half;
+        }
+        let intact = CellStates { points: &self.state.points, stiffness: &[] };
+        let m = self.elements.measure_corners(&self.model, cell, &u, None, intact);
+        // What Prony terms hold is booked with their work, which the softening does not touch.
+        self.sums.softening_dissipation += (old - factor) * (m.elastic - m.held + m.hourglass);
+        self.state.stiffness[cell] = factor;
     }
 }

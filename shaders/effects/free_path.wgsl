@@ -1,0 +1,78 @@
+// A path that is found while the tip moves: state and pure functions. Equations: src/needle/free_path.rs.
+
+// Where the tip is in the material.
+struct FreeTip {
+    // Material point X of the tip [m]; direction T of its advance; axis of the anchors' angles, normal to T; w unused.
+    place: vec4<f32>,
+    along: vec4<f32>,
+    across: vec4<f32>,
+    // Force across the needle on every anchor [N], w unused.
+    sway: vec4<f32>,
+    // Way since the surface a [m], its value where the tip entered the present material.
+    coordinate: f32,
+    entry: f32,
+    // Way through the material in this step that marks cells [m].
+    advance: f32,
+    // 1 in the tissue.
+    inside: f32,
+    // Index of the material at the tip.
+    material: u32,
+    // Dissipated by the tip law in this frame [J]; stored in the tip springs now [J].
+    dissipation: f32,
+    spring_energy: f32,
+    _pad: f32,
+}
+
+// A cell of the box that the tip may open.
+struct FreeCell {
+    // Lowest corner and edges at rest [m], w unused.
+    low: vec4<f32>,
+    size: vec4<f32>,
+    cell: u32,
+    // Index of its material.
+    material: u32,
+    // Sample points that have been cut, bit = x + 4 y + 16 z: the first and the last 32.
+    marked_low: u32,
+    marked_high: u32,
+    // Energy that softening took in this frame [J].
+    dissipation: f32,
+    _pad0: f32,
+    _pad1: f32,
+    _pad2: f32,
+}
+
+@group(3) @binding(11) var<storage, read_write> free_tip: FreeTip;
+@group(3) @binding(12) var<storage, read_write> free_cells: array<FreeCell>;
+
+// Constants of src/needle/free_path.rs.
+const SAMPLES: f32 = 4.0;
+const SLACK: f32 = 0.2e-3;
+const MARKED_BEHIND: f32 = 0.5;
+const LOOK_AHEAD: f32 = 1.05;
+const PASSED_MARGIN: f32 = 0.05e-3;
+const WATCHED: f32 = 1.5;
+const SLIP_CAP: f32 = 13e-6;
+
+// Place of an anchor in the tip's plane, along `across` and along T x `across` [m].
+fn anchor_offset(anchor: u32) -> vec2<f32> {
+    let inner = anchor < 7u;
+    let count = select(12.0, 6.0, inner);
+    let number = f32(anchor) - select(7.0, 1.0, inner);
+    let angle = 6.2831853 * number / count;
+    let radius = select(puncture.needle_radius, 0.5 * puncture.needle_radius, inner);
+    return vec2<f32>(cos(angle), sin(angle)) * select(radius, 0.0, anchor == 0u);
+}
+
+// The rotation without spin that brings the unit vector `a` to `b`, applied to `v`.
+fn swing(a: vec3<f32>, b: vec3<f32>, v: vec3<f32>) -> vec3<f32> {
+    let w = cross(a, b);
+    return v + cross(w, v) + cross(w, cross(w, v)) / max(1.0 + dot(a, b), 1e-6);
+}
+
+// Columns of the inverse of F, transposed, times v; v itself where the material is turned inside out.
+fn pulled_back(fx: vec3<f32>, fy: vec3<f32>, fz: vec3<f32>, v: vec3<f32>) -> vec3<f32> {
+    let cx = cross(fy, fz);
+    let j = dot(fx, cx);
+    let back = vec3<f32>(dot(cx, v), dot(cross(fz, fx), v), dot(cross(fx, fy), v));
+    return select(v, back / select(1.0, j, j > 0.02), j > 0.02);
+}

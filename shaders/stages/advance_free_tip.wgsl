@@ -1,0 +1,261 @@
+// Stage advance_free_tip: springs of the tip on a free path; the tip advances, slips sideways or draws back through the
+// material. One workgroup. Equations: src/needle/free_path.rs and CpuEngine::advance_free_tip.
+#import shared/params
+#import shared/step_input
+#import shared/displacement
+#import shared/grid_lines
+#import effects/puncture
+#import effects/free_path
+
+@group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
+
+var<workgroup> gaps: array<f32, ANCHOR_COUNT>;
+var<workgroup> sways: array<vec3<f32>, ANCHOR_COUNT>;
+var<workgroup> columns_x: array<vec3<f32>, ANCHOR_COUNT>;
+var<workgroup> columns_y: array<vec3<f32>, ANCHOR_COUNT>;
+var<workgroup> columns_z: array<vec3<f32>, ANCHOR_COUNT>;
+var<workgroup> old_sway: vec3<f32>;
+var<workgroup> moved: f32;
+
+struct GridPlace {
+    cell: vec3<u32>,
+    // Local coordinates 0..1 and edges of the cell [m].
+    local: vec3<f32>,
+    width: vec3<f32>,
+}
+
+struct MaterialPlace {
+    grid: GridPlace,
+    // x(X) [m] and the columns of F there.
+    position: vec3<f32>,
+    fx: vec3<f32>,
+    fy: vec3<f32>,
+    fz: vec3<f32>,
+}
+
+// The rest position itself or the nearest one in the block.
+fn within_block(X: vec3<f32>) -> vec3<f32> {
+    let y0 = params.nodes_x;
+    let z0 = y0 + params.nodes_y;
+    let low = vec3<f32>(grid_lines[0], grid_lines[y0], grid_lines[z0]);
+    let high = vec3<f32>(grid_lines[y0 - 1u], grid_lines[z0 - 1u], grid_lines[z0 + params.nodes_z - 1u]);
+    return clamp(X, low, high);
+}
+
+fn grid_place(X: vec3<f32>) -> GridPlace {
+    let y0 = params.nodes_x;
+    let z0 = y0 + params.nodes_y;
+    let cell = vec3<u32>(
+        find_cell(X.x, 0u, params.nodes_x),
+        find_cell(X.y, y0, params.nodes_y),
+        find_cell(X.z, z0, params.nodes_z),
+    );
+    let low = vec3<f32>(grid_lines[cell.x], grid_lines[y0 + cell.y], grid_lines[z0 + cell.z]);
+    let high = vec3<f32>(grid_lines[cell.x + 1u], grid_lines[y0 + cell.y + 1u], grid_lines[z0 + cell.z + 1u]);
+    let width = high - low;
+    return GridPlace(cell, clamp((X - low) / width, vec3<f32>(0.0), vec3<f32>(1.0)), width);
+}
+
+fn material_place(X: vec3<f32>) -> MaterialPlace {
+    let grid = grid_place(X);
+    var place = MaterialPlace(
+        grid, X, vec3<f32>(1.0, 0.0, 0.0), vec3<f32>(0.0, 1.0, 0.0), vec3<f32>(0.0, 0.0, 1.0),
+    );
+    for (var corner = 0u; corner < 8u; corner++) {
+        let bit = vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
+        let at = grid.cell + bit;
+        let node = (at.z * params.nodes_y + at.y) * params.nodes_x + at.x;
+        let upper = bit == vec3<u32>(1u);
+        let n = select(1.0 - grid.local, grid.local, upper);
+        let rate = select(vec3<f32>(-1.0), vec3<f32>(1.0), upper) / grid.width
+            * vec3<f32>(n.y * n.z, n.z * n.x, n.x * n.y);
+        let u = vec3<f32>(node_displacement[node].xyz) * DISPLACEMENT_UNIT;
+        place.position += u * (n.x * n.y * n.z);
+        place.fx += u * rate.x;
+        place.fy += u * rate.y;
+        place.fz += u * rate.z;
+    }
+    return place;
+}
+
+// Where an anchor is with the tip as it stands now; fills the lanes of the workgroup. Returns the cell.
+fn place_anchor(anchor: u32, lane: u32) -> GridPlace {
+    let T = free_tip.along.xyz;
+    let across = free_tip.across.xyz;
+    let X0 = free_tip.place.xyz;
+    let offset = anchor_offset(anchor);
+    let X = within_block(X0 + across * offset.x + cross(T, across) * offset.y);
+    let place = material_place(X);
+    let lever = step_input.tip.xyz - place.position;
+    if (lane < ANCHOR_COUNT) {
+        gaps[lane] = dot(lever, step_input.direction.xyz) + dot(X - X0, T);
+        sways[lane] = lever + (X - X0);
+        columns_x[lane] = place.fx;
+        columns_y[lane] = place.fy;
+        columns_z[lane] = place.fz;
+    }
+    return place.grid;
+}
+
+// Outside: one step of Newton's iteration for the point of the block that the tip is at; through the top face a track
+// begins.
+fn look_for_surface() {
+    let X = free_tip.place.xyz;
+    let near = within_block(X);
+    let place = material_place(near);
+    let away = step_input.tip.xyz - place.position - (X - near);
+    let next = X + pulled_back(place.fx, place.fy, place.fz, away);
+    let on_top = vec3<f32>(next.xy, 0.0);
+    let over = all(within_block(on_top) == on_top);
+    // Nearer than a tenth of a millimetre: far from the solution a step may end anywhere.
+    let enters = over && next.z <= 1e-9 && dot(away, away) < 1e-8;
+    free_tip.place = vec4<f32>(select(next, on_top, enters), 0.0);
+    let t = step_input.direction.xyz;
+    let guess = select(vec3<f32>(0.0, 1.0, 0.0), vec3<f32>(1.0, 0.0, 0.0), abs(t.x) < 0.9);
+    free_tip.along = vec4<f32>(t, 0.0);
+    free_tip.across = vec4<f32>(normalize(guess - t * dot(guess, t)), 0.0);
+    free_tip.coordinate = 0.0;
+    free_tip.entry = 0.0;
+    free_tip.material = 0u;
+    free_tip.inside = select(0.0, 1.0, enters);
+}
+
+// Number of a cell in the box of free cells; the length of the box outside it.
+fn free_index(cell: vec3<u32>) -> u32 {
+    let low = puncture.free_low.xyz;
+    let count = puncture.free_count.xyz;
+    let part = cell - low;
+    let inside = all(cell >= low) && all(part < count);
+    return select(puncture.path_cell_count, (part.z * count.y + part.y) * count.x + part.x, inside);
+}
+
+// Moves the tip through the material. The gaps, sways and columns of F are those before.
+fn move_tip() {
+    let t = step_input.direction.xyz;
+    let spring = puncture.tip_stiffness / f32(ANCHOR_COUNT);
+    var force = 0.0;
+    var gap = 0.0;
+    var sway = vec3<f32>(0.0);
+    var fx = vec3<f32>(0.0);
+    var fy = vec3<f32>(0.0);
+    var fz = vec3<f32>(0.0);
+    for (var i = 0u; i < ANCHOR_COUNT; i++) {
+        force += spring * max(gaps[i], 0.0);
+        gap += gaps[i] / f32(ANCHOR_COUNT);
+        sway += sways[i] / f32(ANCHOR_COUNT);
+        fx += columns_x[i] / f32(ANCHOR_COUNT);
+        fy += columns_y[i] / f32(ANCHOR_COUNT);
+        fz += columns_z[i] / f32(ANCHOR_COUNT);
+    }
+    sway -= t * dot(sway, t);
+    old_sway = sway;
+    let back = pulled_back(fx, fy, fz, t);
+    let turned = dot(back, back) > 1e-6;
+    let direction = select(free_tip.along.xyz, back * inverseSqrt(max(dot(back, back), 1e-12)), turned);
+    let stretch = clamp(dot(fx * direction.x + fy * direction.y + fz * direction.z, t), 0.2, 3.0);
+
+    // What lies just ahead: farther than a sample that the tip's plane has marked.
+    let X = free_tip.place.xyz;
+    let here = grid_place(within_block(X));
+    let look = LOOK_AHEAD * 0.5 / SAMPLES * dot(abs(direction), here.width);
+    let ahead = grid_place(within_block(X + direction * look));
+    let sample = min(vec3<u32>(ahead.local * SAMPLES), vec3<u32>(3u));
+    let bit = sample.x + 4u * sample.y + 16u * sample.z;
+    let index = free_index(ahead.cell);
+    let known = free_index(here.cell) < puncture.path_cell_count && index < puncture.path_cell_count;
+    let cell = min(index, puncture.path_cell_count - 1u);
+    let word = select(free_cells[cell].marked_low, free_cells[cell].marked_high, bit >= 32u);
+    let open = known && (word >> (bit & 31u) & 1u) == 1u;
+    let material = select(free_tip.material, free_cells[cell].material, known);
+    var entry = select(free_tip.entry, free_tip.coordinate, material != free_tip.material);
+    let forces = puncture.segments[material];
+    let fading = max(0.0, 1.0 - (free_tip.coordinate - entry) / puncture.transition_length);
+    let threshold = select(forces.z + (forces.y - forces.z) * fading, 0.0, open);
+
+    let at_surface = free_tip.coordinate == 0.0;
+    let speed = length(step_input.velocity.xyz) + puncture.needle_radius * length(angular_velocity());
+    let travel = speed * params.dt;
+    // A stab travels more than the least cap in one step.
+    let cap = min(max(select(13e-6, 5e-6, at_surface), 1.25 * travel), 4.0 * travel);
+    let slip_cap = 4.0 * travel + SLIP_CAP;
+    let advance = clamp((force - threshold) / (puncture.tip_stiffness * stretch), 0.0, cap);
+    let retreat = clamp((-SLACK - gap) / stretch, 0.0, slip_cap);
+    let size = length(sway);
+    let held = min(threshold, force) / puncture.tip_stiffness;
+    let excess = sway * select(0.0, 1.0 - held / size, size > held);
+    var slip = pulled_back(fx, fy, fz, excess);
+    let slipped = length(slip);
+    slip *= select(1.0, slip_cap / slipped, slipped > slip_cap);
+    // Not through the surface yet: the tip glides on it.
+    slip.z = select(slip.z, 0.0, at_surface);
+    let goes = advance > 0.0 || retreat > 0.0 || any(slip != vec3<f32>(0.0));
+    moved = select(0.0, 1.0, goes);
+    let next = X + direction * (advance - retreat) + slip;
+    let coordinate = max(free_tip.coordinate + advance - retreat, 0.0);
+    let leaves = retreat > 0.0 && next.z > 0.0;
+    let across = free_tip.across.xyz;
+    free_tip.material = material;
+    free_tip.advance = select(0.0, advance + length(slip), retreat == 0.0 && coordinate > 0.0);
+    free_tip.inside = select(1.0, 0.0, leaves);
+    free_tip.coordinate = select(coordinate, 0.0, leaves);
+    free_tip.entry = select(entry, 0.0, leaves);
+    free_tip.place = vec4<f32>(select(within_block(next), next, leaves), 0.0);
+    free_tip.along = select(free_tip.along, vec4<f32>(direction, 0.0), goes);
+    free_tip.across = vec4<f32>(
+        select(across, normalize(across - direction * dot(across, direction)), goes),
+        0.0,
+    );
+}
+
+@compute @workgroup_size(32)
+fn advance_free_tip(@builtin(local_invocation_index) lane: u32) {
+    let anchor = min(lane, ANCHOR_COUNT - 1u);
+    let spring = puncture.tip_stiffness / f32(ANCHOR_COUNT);
+    if (lane == 0u) {
+        free_tip.advance = 0.0;
+        moved = 0.0;
+        if (free_tip.inside == 0.0) {
+            look_for_surface();
+        }
+    }
+    storageBarrier();
+    workgroupBarrier();
+    var grid = place_anchor(anchor, lane);
+    workgroupBarrier();
+    let old_gap = max(gaps[anchor], 0.0);
+    if (lane == 0u && free_tip.inside == 1.0) {
+        move_tip();
+    }
+    storageBarrier();
+    workgroupBarrier();
+    let inside = free_tip.inside;
+    grid = place_anchor(anchor, lane);
+    let gap = max(gaps[anchor], 0.0) * inside;
+    workgroupBarrier();
+    if (lane < ANCHOR_COUNT) {
+        tip_anchor_loads[lane].cell = vec4<u32>(grid.cell, 0u);
+        tip_anchor_loads[lane].local = vec4<f32>(grid.local, 0.0);
+        tip_anchor_loads[lane].force = spring * gap;
+        // Energy and, with the force after the move (trapezoidal rule of the leapfrog work), loss of this spring.
+        gaps[lane] = 0.5 * spring * gap * gap;
+        columns_x[lane] = vec3<f32>(spring * gap * (old_gap - gap), 0.0, 0.0);
+    }
+    workgroupBarrier();
+    if (lane == 0u) {
+        let t = step_input.direction.xyz;
+        var stored = 0.0;
+        var lost = 0.0;
+        var sway = vec3<f32>(0.0);
+        for (var i = 0u; i < ANCHOR_COUNT; i++) {
+            stored += gaps[i];
+            lost += columns_x[i].x;
+            sway += sways[i] * (inside / f32(ANCHOR_COUNT));
+        }
+        sway -= t * dot(sway, t);
+        stored += 0.5 * puncture.tip_stiffness * dot(sway, sway);
+        lost += puncture.tip_stiffness * dot(sway, old_sway - sway);
+        free_tip.sway = vec4<f32>(sway * spring, 0.0);
+        free_tip.spring_energy = stored;
+        free_tip.dissipation += select(0.0, lost, moved == 1.0);
+    }
+}

@@ -1,0 +1,84 @@
+//! The free path: where the needle has gone through the material is found while it goes.
+//!
+//! A planned path has material coordinates (r0, s0) that are known before the run. A motion with another direction inside, a
+//! second track or a sideways move has none, so the state of the tip holds its material point `X` (rest position [m]) and
+//! the direction `T` of its advance through the material; x(X) = X + u(X) and F are those of the mesh at X, F the mean over
+//! the anchors.
+//! ```text
+//! anchors   X_k = X + o_k, o_k in the plane through X normal to T (not above the surface), k = 1..N
+//! gaps      g_k = (p - x(X_k)).t + (X_k - X).T,  force k_tip/N max(0, g_k) along t
+//! sway      l = (1 - t t)(p - <x(X_k)> + <X_k - X>),  force k_tip/N l on every anchor: the tissue holds the tip
+//! advance   where F = sum of the forces > F_c:  X += T da,  T = F^-1 t/|F^-1 t|,  da as in the tip law
+//! slip      where k_tip |l| > min(F, F_c):  X += F^-1 (the part of l that is too long)
+//! retreat   where <g_k> < -SLACK:  X -= T (-SLACK - <g_k>)/lambda, without force: the needle draws back in its own track
+//! ```
+//! What the springs lose in these three moves is dissipated. `F_c(a)` as in the tip law, `a` [m] the way since the surface,
+//! with the forces of the material at the tip, and 0 where the material just ahead has been cut before: a re-insertion along
+//! an open track needs no cutting force until it comes to the end of the track.
+//!
+//! Material that has been cut: 4^3 sample points per cell, marked when they come to lie behind the tip within a0. Their
+//! number is the fraction phi of the softened path. "Just ahead" is farther than any sample that the tip's own plane can
+//! have marked, else the tip would find its own cut before it.
+//!
+//! Nodes. When the plane through X normal to T passes a node within the ring radius, its distance from the axis becomes its
+//! r0; when the tip draws back over it, it is forgotten. Nodes with a0 < r0 keep to the opened path as in the planned case.
+//! A node that the tip has not passed, met sideways by the shaft, stays outside the bare shaft, r >= R.
+//!
+//! A track begins where the tip comes through the top face, and ends where it comes out of it; outside there is no force. The
+//! tip springs pull along t and sideways with their exact gradients; with v + omega x lever as the velocity of the needle the
+//! work of a turning needle is force . v + torque . omega. Source: this project.
+
+use glam::DVec3;
+
+/// Sample points of a cell along each axis.
+pub const SAMPLES: usize = 4;
+
+/// Gap between the retreating tip and the material point that it leaves behind [m].
+pub const SLACK: f64 = 0.2e-3;
+
+/// Depth behind the tip's plane in which samples are marked, in softened radii.
+pub const MARKED_BEHIND: f64 = 0.5;
+
+/// How far ahead cut material is looked for, in extents of half a sample spacing along T.
+pub const LOOK_AHEAD: f64 = 1.05;
+
+/// How far a node may come before the tip's plane again until it counts as not passed [m].
+pub const PASSED_MARGIN: f64 = 0.05e-3;
+
+/// Distance from the needle's axis, in needle radii, from which a node that the tip has not passed is watched.
+pub const WATCHED: f64 = 1.5;
+
+/// Largest sideways slip and retreat in one step beside what the needle travels [m].
+pub const SLIP_CAP: f64 = 13e-6;
+
+/// Where the tip is in the material.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FreeTip {
+    /// Material point X of the tip, a rest position [m].
+    pub place: DVec3,
+    /// Direction T of the advance through the material (unit), and the axis of the anchors' angles, normal to it.
+    pub along: DVec3,
+    pub across: DVec3,
+    /// Way since the surface a [m], and its value where the tip entered the present material.
+    pub coordinate: f64,
+    pub entry: f64,
+    /// Way through the material in this step that marks cells, forwards or sideways [m].
+    pub advance: f64,
+    /// Index of the material at the tip.
+    pub material: usize,
+    /// True in the tissue.
+    pub inside: bool,
+}
+
+/// Place of an anchor in the tip's plane, along `across` and along T x `across` [m]: one on the axis, 6 at R/2, 12 at R.
+pub fn anchor_offset(anchor: usize, radius: f64) -> (f64, f64) {
+    let on_ring = |i: usize, count: usize, r: f64| {
+        let angle = std::f64::consts::TAU * i as f64 / count as f64;
+        (r * angle.cos(), r * angle.sin())
+    };
+    match anchor {
+        0 => (0.0, 0.0),
+        1..=6 => on_ring(anchor - 1, 6, 0.5 * radius),
+        _ => on_ring(anchor - 7, 12, radius),
+    }
+}

@@ -1,0 +1,239 @@
+//! Stages `advance_free_tip` and `soften_free_path` in f64. Equations: src/needle/free_path.rs.
+
+use glam::{DMat3, DVec3};
+
+use super::CpuEngine;
+use crate::material::kinematics::cofactor;
+use crate::mesh::BlockMesh;
+use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
+use crate::needle::ToolPose;
+use crate::needle::free_path::{FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SLACK, SLIP_CAP, anchor_offset};
+use crate::solver::elements::CORNERS;
+
+/// A material point in the deformed mesh.
+struct MaterialPlace {
+    nodes: [usize; 8],
+    weights: [f64; 8],
+    /// x(X) [m] and F there.
+    position: DVec3,
+    gradient: DMat3,
+}
+
+/// The springs of the tip at one place.
+struct TipSprings {
+    /// Raw gap of every anchor [m], with nodes and weights.
+    anchors: Vec<(f64, [usize; 8], [f64; 8])>,
+    /// Mean raw gap and sway l [m].
+    mean_gap: f64,
+    sway: DVec3,
+    /// Mean F.
+    gradient: DMat3,
+}
+
+/// Cell and local coordinates of a rest position inside the block.
+fn grid_place(mesh: &BlockMesh, x: DVec3) -> ([usize; 3], DVec3, DVec3) {
+    let (mut cell, mut local, mut width) = ([0; 3], DVec3::ZERO, DVec3::ZERO);
+    for a in 0..3 {
+        let lines = &mesh.lines[a];
+        let i = lines.partition_point(|l| *l <= x[a]).clamp(1, lines.len() - 1) - 1;
+        cell[a] = i;
+        width[a] = lines[i + 1] - lines[i];
+        local[a] = ((x[a] - lines[i]) / width[a]).clamp(0.0, 1.0);
+    }
+    (cell, local, width)
+}
+
+/// The rest position itself or the nearest one in the block.
+fn within_block(mesh: &BlockMesh, x: DVec3) -> DVec3 {
+    let end = |a: usize| mesh.lines[a][mesh.lines[a].len() - 1];
+    let first = |a: usize| mesh.lines[a][0];
+    x.clamp(DVec3::new(first(0), first(1), first(2)), DVec3::new(end(0), end(1), end(2)))
+}
+
+fn material_place(mesh: &BlockMesh, u: &[DVec3], x: DVec3) -> MaterialPlace {
+    let (cell, local, width) = grid_place(mesh, x);
+    let nodes = mesh.cell_nodes(mesh.cell_index(cell[0], cell[1], cell[2]));
+    let (mut weights, mut position, mut gradient) = ([0.0; 8], x, DMat3::IDENTITY);
+    for (i, signs) in CORNERS.iter().enumerate() {
+        let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (local[a] - 0.5));
+        let rate = DVec3::from(*signs) / width * DVec3::new(n[1] * n[2], n[2] * n[0], n[0] * n[1]);
+        weights[i] = n[0] * n[1] * n[2];
+        let u = u[nodes[i]];
+        position += u * weights[i];
+        gradient += DMat3::from_cols(u * rate.x, u * rate.y, u * rate.z);
+    }
+    MaterialPlace { nodes, weights, position, gradient }
+}
+
+/// F^-1 v, and v itself where the material is turned inside out.
+fn pulled_back(f: DMat3, v: DVec3) -> DVec3 {
+    let cofactor = cofactor(f);
+    let j = f.x_axis.dot(cofactor.x_axis);
+    if j > 0.02 { cofactor.transpose() * v / j } else { v }
+}
+
+fn tip_springs(mesh: &BlockMesh, u: &[DVec3], radius: f64, tip: &FreeTip, pose: &ToolPose) -> TipSprings {
+    let other = tip.along.cross(tip.across);
+    let t = pose.direction;
+    let mut springs = TipSprings { anchors: Vec::new(), mean_gap: 0.0, sway: DVec3::ZERO, gradient: DMat3::ZERO };
+    let part = 1.0 / ANCHOR_COUNT as f64;
+    for anchor in 0..ANCHOR_COUNT {
+        let (a, b) = anchor_offset(anchor, radius);
+        let x = within_block(mesh, tip.place + tip.across * a + other * b);
+        let at = material_place(mesh, u, x);
+        let offset = x - tip.place;
+        let gap = (pose.tip - at.position).dot(t) + offset.dot(tip.along);
+        springs.anchors.push((gap, at.nodes, at.weights));
+        springs.mean_gap += part * gap;
+        springs.sway += (pose.tip - at.position + offset) * part;
+        springs.gradient += at.gradient * part;
+    }
+    springs.sway -= t * springs.sway.dot(t);
+    springs
+}
+
+impl CpuEngine {
+    /// Stage `advance_free_tip`.
+    pub(super) fn advance_free_tip(&mut self, plan: &PuncturePlan, free: &FreePlan, pose: &ToolPose) {
+        let model = self.model.clone();
+        let mesh = model.mesh.block();
+        let u = &self.state.displacement;
+        let p = &plan.params;
+        let radius = plan.needle.radius;
+        let spring = p.tip_stiffness / ANCHOR_COUNT as f64;
+        let t = pose.direction;
+        let mut tip = self.state.tip;
+        tip.advance = 0.0;
+        if !tip.inside {
+            // One step of Newton's iteration: the needle moves little from step to step.
+            let at = material_place(mesh, u, within_block(mesh, tip.place));
+            let away = pose.tip - at.position - (tip.place - within_block(mesh, tip.place));
+            tip.place += pulled_back(at.gradient, away);
+            let over = within_block(mesh, tip.place.with_z(0.0)) == tip.place.with_z(0.0);
+            // Nearer than a tenth of a millimetre: far from the solution a step may end anywhere.
+            if over && tip.place.z <= 1e-9 && away.length() < 1e-4 {
+                tip = FreeTip {
+                    place: tip.place.with_z(0.0),
+                    along: t,
+                    across: crate::needle::lateral_axes(t).0,
+                    inside: true,
+                    ..FreeTip::default()
+                };
+            }
+        }
+        let before = tip_springs(mesh, u, radius, &tip, pose);
+        let force: f64 = before.anchors.iter().map(|a| spring * a.0.max(0.0)).sum();
+        let mut moved = false;
+        if tip.inside {
+            let f = before.gradient;
+            let direction = pulled_back(f, t);
+            let direction = if direction.length() > 1e-3 { direction.normalize() } else { tip.along };
+            let stretch = (f * direction).dot(t).clamp(0.2, 3.0);
+            // What lies just ahead: farther than a sample that the tip's plane has marked.
+            let (cell, _, width) = grid_place(mesh, within_block(mesh, tip.place));
+            let samples = SAMPLES as f64;
+            let look = LOOK_AHEAD * 0.5 * direction.abs().dot(width / samples);
+            let (cell, local, _) = match free.index(cell) {
+                Some(_) => grid_place(mesh, within_block(mesh, tip.place + direction * look)),
+                None => (cell, DVec3::ZERO, width),
+            };
+            let sample: [usize; 3] = std::array::from_fn(|a| ((local[a] * samples) as usize).min(SAMPLES - 1));
+            let bit = sample[0] + SAMPLES * (sample[1] + SAMPLES * sample[2]);
+            let open = free.index(cell).is_some_and(|i| self.state.cut_samples[i] >> bit & 1 == 1);
+            let material = model.material_index(mesh.cell_index(cell[0], cell[1], cell[2]));
+            if material != tip.material {
+                (tip.material, tip.entry) = (material, tip.coordinate);
+            }
+            let cutting = free.cuttings[material];
+            let fading = (1.0 - (tip.coordinate - tip.entry) / p.transition_length).max(0.0);
+            let threshold = match open {
+                true => 0.0,
+                false => cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * fading,
+            };
+            let travel = (pose.velocity.length() + radius * pose.angular_velocity.length()) * self.dt;
+            let least = if tip.coordinate == 0.0 { 0.005e-3 } else { 0.013e-3 };
+            // A stab travels more than that in one step.
+            let cap = f64::min(f64::max(least, 1.25 * travel), 4.0 * travel);
+            let slip_cap = 4.0 * travel + SLIP_CAP;
+            let advance = ((force - threshold) / (p.tip_stiffness * stretch)).clamp(0.0, cap);
+            let retreat = ((-SLACK - before.mean_gap) / stretch).clamp(0.0, slip_cap);
+            let sway = before.sway.length();
+            let held = threshold.min(force) / p.tip_stiffness;
+            let excess = if sway > held { before.sway * (1.0 - held / sway) } else { DVec3::ZERO };
+            let mut slip = pulled_back(f, excess);
+            if slip.length() > slip_cap {
+                slip *= slip_cap / slip.length();
+            }
+            if tip.coordinate == 0.0 {
+                // Not through the surface yet: the tip glides on it.
+                slip.z = 0.0;
+            }
+            moved = advance > 0.0 || retreat > 0.0 || slip != DVec3::ZERO;
+            if moved {
+                tip.place += direction * (advance - retreat) + slip;
+                tip.coordinate = (tip.coordinate + advance - retreat).max(0.0);
+                tip.along = direction;
+                tip.across = (tip.across - direction * tip.across.dot(direction)).normalize();
+                if retreat == 0.0 && tip.coordinate > 0.0 {
+                    tip.advance = advance + slip.length();
+                }
+                if retreat > 0.0 && tip.place.z > 0.0 {
+                    tip = FreeTip { inside: false, advance: 0.0, coordinate: 0.0, entry: 0.0, ..tip };
+                }
+                tip.place = if tip.inside { within_block(mesh, tip.place) } else { tip.place };
+            }
+        }
+        let after = match (tip.inside, moved) {
+            (true, true) => tip_springs(mesh, u, radius, &tip, pose),
+            _ => TipSprings { anchors: before.anchors.clone(), ..before },
+        };
+        let on = if tip.inside { 1.0 } else { 0.0 };
+        let sway = after.sway * on;
+        if moved {
+            let pairs = before.anchors.iter().zip(&after.anchors);
+            let lost: f64 = pairs.map(|(b, a)| on * spring * a.0.max(0.0) * (b.0.max(0.0) - a.0.max(0.0))).sum();
+            self.sums.tip_dissipation += lost + p.tip_stiffness * sway.dot(before.sway - sway);
+        }
+        self.tip_sway = sway * spring;
+        self.tip_energy = 0.5 * p.tip_stiffness * sway.length_squared()
+            + after.anchors.iter().map(|a| on * 0.5 * spring * a.0.max(0.0).powi(2)).sum::<f64>();
+        self.tip_forces = after.anchors.into_iter().map(|a| (on * spring * a.0.max(0.0), a.1, a.2)).collect();
+        self.state.tip_coordinate = tip.coordinate;
+        self.state.tip = tip;
+    }
+
+    /// Stage `soften_free_path`: factor `max(residual, 1 - marked/64)`; the energy that a cell loses is dissipated.
+    pub(super) fn soften_free_path(&mut self, plan: &PuncturePlan, free: &FreePlan) {
+        let tip = self.state.tip;
+        if tip.advance == 0.0 {
+            return;
+        }
+        let model = self.model.clone();
+        let mesh = model.mesh.block();
+        let a0 = plan.params.softened_radius;
+        for index in 0..free.cell_count() {
+            let at = free.cell(index);
+            let cell = mesh.cell_index(at[0], at[1], at[2]);
+            let size = mesh.cell_size(cell);
+            let low = DVec3::new(mesh.lines[0][at[0]], mesh.lines[1][at[1]], mesh.lines[2][at[2]]);
+            let reach = 0.5 * size.length();
+            if (low + 0.5 * size - tip.place).length() > a0.hypot(MARKED_BEHIND * a0) + reach {
+                continue;
+            }
+            let mut marked = self.state.cut_samples[index];
+            for bit in 0..SAMPLES.pow(3) {
+                let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
+                let at = DVec3::new(part(bit % SAMPLES), part(bit / SAMPLES % SAMPLES), part(bit / SAMPLES.pow(2)));
+                let relative = low + at * size - tip.place;
+                let ahead = relative.dot(tip.along);
+                let square = relative.length_squared() - ahead * ahead;
+                if ahead <= 0.0 && ahead > -MARKED_BEHIND * a0 && square < a0 * a0 {
+                    marked |= 1 << bit;
+                }
+            }
+            self.state.cut_samples[index] = marked;
+            let fraction = f64::from(marked.count_ones()) / SAMPLES.pow(3) as f64;
+            self.soften_cell(cell, (1.0 - fraction).max(plan.params.residual_stiffness));
+        }
+    }
+}
