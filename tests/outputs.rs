@@ -140,6 +140,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
             entry: DVec3::ZERO,
             direction: direction.normalize(),
             phases: vec![Phase::Insert { speed: 2e-3, depth: 6e-3 }],
+            vibration: None,
         },
         effects: EffectSet::default(),
         solver: SolverSettings {

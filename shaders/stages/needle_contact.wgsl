@@ -11,6 +11,9 @@
 #ifdef FRICTION
 #import effects/friction
 #endif
+#ifdef FLEXIBLE_NEEDLE
+#import effects/flexible_needle
+#endif
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
@@ -103,9 +106,17 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         - step_input.tip.xyz;
     let d = -step_input.direction.xyz;
     let s = dot(lever, d);
+#ifdef FLEXIBLE_NEEDLE
+    let bend = bend_at(s);
+    let from_axis = lever - bend.offset;
+    let needle_velocity = step_input.velocity.xyz + bend.rate;
+#else
+    let from_axis = lever;
+    let needle_velocity = step_input.velocity.xyz;
+#endif
 #ifdef FREE_PATH
     let tip = tip_share(contact.grid.xyz, contact.rest.xyz);
-    let met = free_contact(index, contact.rest.xyz, lever, s);
+    let met = free_contact(index, contact.rest.xyz, from_axis, s);
     let passed = met.x == 1.0 && s > 0.0;
     let rest_radius = met.y;
 #else
@@ -123,18 +134,21 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         var memory = contact_memory[index];
         if (memory.touching == 0.0) {
             memory.touching = 1.0;
-            memory.overlap = max(0.0, overlap_of(contact.surface, rest_radius, lever, d, s, vec2<f32>(0.0)).value);
+            memory.overlap = max(0.0, overlap_of(contact.surface, rest_radius, from_axis, d, s, vec2<f32>(0.0)).value);
             memory.axial_on = s;
         }
         // An overlap found at activation fades over `entry_fade` of travel, so that the needle does that work.
         let travel = (s - memory.axial_on) / puncture.entry_fade;
         let fading = select(0.0, -memory.overlap / puncture.entry_fade, travel > 0.0 && travel < 1.0);
         let less = vec2<f32>(memory.overlap * clamp(1.0 - travel, 0.0, 1.0), fading);
-        let overlap = overlap_of(contact.surface, rest_radius, lever, d, s, less);
+        var overlap = overlap_of(contact.surface, rest_radius, from_axis, d, s, less);
+#ifdef FLEXIBLE_NEEDLE
+        overlap.gradient -= d * dot(overlap.gradient, bend.slope);
+#endif
         let depth = overlap.value;
         let steep = length(overlap.gradient);
         let n = overlap.gradient * (-1.0 / steep);
-        var v = node_velocity[contact.node].xyz - step_input.velocity.xyz;
+        var v = node_velocity[contact.node].xyz - needle_velocity;
 #ifdef FREE_PATH
         v -= cross(angular_velocity(), lever);
 #endif
@@ -172,6 +186,9 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     for (var once = select(1u, 0u, dot(total, total) > 0.0); once == 0u; once++) {
         corner_force[contact.slot] += vec4<f32>(total, bound);
         book_contact(index, tip, normal, tangential, lever);
+#ifdef FLEXIBLE_NEEDLE
+        contact_sums[index].work += dot(total, bend.rate) * params.dt;
+#endif
     }
     contact_sums[index].stored = stored;
     // A node that the needle has left forgets.

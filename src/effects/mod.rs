@@ -3,6 +3,7 @@
 pub mod cohesive;
 pub mod damage;
 pub mod fibres;
+pub mod flexible_needle;
 pub mod friction;
 pub mod gravity;
 pub mod indentation;
@@ -25,6 +26,7 @@ pub struct EffectSet {
     pub puncture: Option<puncture::Params>,
     pub indentation: Option<indentation::Params>,
     pub friction: Option<friction::Params>,
+    pub flexible_needle: Option<flexible_needle::Params>,
 }
 
 /// What the program knows about an effect without running it.
@@ -43,7 +45,7 @@ pub struct Effect {
 }
 
 /// All effects. The order is the order of their blocks in the stages.
-pub const EFFECTS: [Effect; 10] = [
+pub const EFFECTS: [Effect; 11] = [
     mass_scaling::EFFECT,
     gravity::EFFECT,
     plasticity::EFFECT,
@@ -54,6 +56,7 @@ pub const EFFECTS: [Effect; 10] = [
     puncture::EFFECT,
     indentation::EFFECT,
     friction::EFFECT,
+    flexible_needle::EFFECT,
 ];
 
 impl EffectSet {
@@ -70,6 +73,7 @@ impl EffectSet {
             self.puncture.is_some(),
             self.indentation.is_some(),
             self.friction.is_some(),
+            self.flexible_needle.is_some(),
         ]
     }
 

@@ -88,11 +88,14 @@ pub const LAWS: [(&str, &str); 5] = [
 ];
 
 /// Effects of tools, which work on the block only.
-const BLOCK_EFFECTS: [&str; 4] = ["cohesive", "puncture", "indentation", "friction"];
+const BLOCK_EFFECTS: [&str; 5] = ["cohesive", "puncture", "indentation", "friction", "flexible_needle"];
 
 /// Names that are defined for the shaders.
 pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
-    let works = |key: &str| !features.tetrahedra || !BLOCK_EFFECTS.contains(&key);
+    // A flexible needle acts by the contact of `puncture`, on a planned path.
+    let bends = effects.puncture.is_some() && !features.free_path;
+    let works =
+        |key: &str| (!features.tetrahedra || !BLOCK_EFFECTS.contains(&key)) && (key != "flexible_needle" || bends);
     let mut defines: BTreeSet<&'static str> = effects.active().filter(|e| works(e.key)).map(|e| e.define).collect();
     let mut define = |name: &'static str, wanted: bool| {
         if wanted {
@@ -223,7 +226,7 @@ impl GpuEngine {
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
         let results: Vec<ResultRange> =
-            ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "tip_result"]
+            ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "needle_loads", "tip_result"]
                 .into_iter()
                 .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
                 .map(|(name, size)| {
@@ -389,6 +392,11 @@ impl GpuEngine {
                         sums.reactions[index / FACE_PARTS] += force;
                     }
                 }
+                "needle_loads" => {
+                    for (load, s) in sums.needle_loads.iter_mut().zip(read_all::<[f32; 4]>(bytes)) {
+                        *load = DVec3::new(s[0].into(), s[1].into(), s[2].into());
+                    }
+                }
                 "separation_sums" => {
                     for s in read_all::<SeparationSums>(bytes) {
                         sums.cohesive_dissipation += f64::from(s.dissipation);
@@ -521,7 +529,7 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 52] = [
+const BUFFERS: [&str; 54] = [
     "cohesive",
     "face_pairs",
     "pair_states",
@@ -532,6 +540,8 @@ const BUFFERS: [&str; 52] = [
     "gravity",
     "puncture",
     "friction",
+    "centre_line",
+    "needle_loads",
     "indentation",
     "cell_edges",
     "node_mass",
@@ -612,6 +622,8 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
                 _pad: 0.0,
             }])
         }
+        "centre_line" => zeros(1, size_of::<CentreLine>()),
+        "needle_loads" => zeros(CONTACT_PARTS as u64, 16),
         "indentation" => bytes_of(&[indentation_params(model)]),
         "cohesive" => bytes_of(&[cohesive_params(model)]),
         "face_pairs" => bytes_of(&face_pairs(model, layout)),
@@ -1138,6 +1150,17 @@ fn symmetric(q: &ViscousStress) -> DMat3 {
     DMat3::from_cols(DVec3::new(xx, xy, zx), DVec3::new(xy, yy, yz), DVec3::new(zx, yz, zz))
 }
 
+/// The centre-line of a frame in the layout of the shader.
+fn centre_line(line: &crate::needle::centre_line::CentreLine) -> CentreLine {
+    CentreLine {
+        per_length: (1.0 / line.spacing) as f32,
+        first_step: line.first_step as u32,
+        offset: line.offset.map(vec4),
+        rate: line.rate.map(vec4),
+        ..Zeroable::zeroed()
+    }
+}
+
 /// The input of step `number` in the layout of the shader.
 fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) -> StepInput {
     // Multiples of the golden ratio: any run of steps sees all offsets alike, so rounding errors cancel.
@@ -1189,6 +1212,9 @@ impl Engine for GpuEngine {
             let numbered = (plan.first_step..).zip(&plan.steps);
             let inputs: Vec<StepInput> = numbered.map(|(n, s)| step_input(s, n, self.dt)).collect();
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&inputs));
+        }
+        if let (Some(buffer), Some(line)) = (self.buffers.get("centre_line"), &plan.centre_line) {
+            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&centre_line(line)));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {

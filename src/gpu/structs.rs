@@ -292,6 +292,15 @@ shared_structs! {
         fade_length: f32,
         _pad: f32,
     }
+    /// shaders/effects/flexible_needle.wgsl
+    struct CentreLine {
+        per_length: f32,
+        first_step: u32,
+        _pad0: u32,
+        _pad1: u32,
+        offset: [[f32; 4]; 32],
+        rate: [[f32; 4]; 32],
+    }
     /// shaders/effects/indentation.wgsl
     struct IndentationParams {
         radius: f32,

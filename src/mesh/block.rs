@@ -422,6 +422,7 @@ mod tests {
             entry: DVec3::new(entry[0] * 1e-3, entry[1] * 1e-3, 0.0),
             direction: direction.normalize(),
             phases: vec![Phase::Insert { speed: 2e-3, depth: depth * 1e-3 }],
+            vibration: None,
         }
     }
 

@@ -66,6 +66,8 @@ pub struct EnergyAccount {
     pub viscous: f64,
     /// Stored in contact, stick and tip springs, plus what contact damping dissipated.
     pub contact: f64,
+    /// Gained and damped by a flexible needle since t = 0.
+    pub needle: f64,
     /// Largest |external| so far, the scale of the imbalance.
     pub external_max: f64,
 }
@@ -84,6 +86,7 @@ impl EnergyAccount {
             + self.damage
             + self.viscous
             + self.contact
+            + self.needle
     }
 
     /// (external - accounted) / largest external work; 0 while nothing has happened.
@@ -116,6 +119,25 @@ pub struct Health {
     pub not_finite: bool,
 }
 
+/// A flexible needle at the end of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NeedleRecord {
+    /// Where the tip is off the straight axis [m].
+    pub tip_offset: DVec3,
+    /// How far the tip stays behind that of a straight needle [m].
+    pub retreat: f64,
+    /// Largest distance of the centre-line from the axis [m].
+    pub largest_offset: f64,
+    /// Largest axial compression [N].
+    pub compression: f64,
+    /// Energy of bending [J].
+    pub bending_energy: f64,
+    /// True once the needle has buckled.
+    pub buckled: bool,
+    /// True where the beam did not find its balance.
+    pub unbalanced: bool,
+}
+
 /// One display frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FrameRecord {
@@ -135,6 +157,8 @@ pub struct FrameRecord {
     /// What each face exerts on the tissue at the end of the frame, indexed by `Face` [N]; zero without driven faces.
     pub reactions: [DVec3; 6],
     pub energy: EnergyAccount,
+    /// Zero without a flexible needle.
+    pub needle: NeedleRecord,
     pub health: Health,
     /// What the bore of a hollow needle holds.
     pub core: Option<CoreSample>,

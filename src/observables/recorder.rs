@@ -37,6 +37,7 @@ impl Recorder {
         e.damage += sums.damage_dissipation;
         e.viscous = sums.viscous_dissipation;
         self.contact_dissipation += sums.contact_dissipation;
+        e.needle = sums.needle_energy;
         e.contact = sums.contact_energy + self.contact_dissipation;
         let mean_pose = model.kinematics.as_ref().map(|k| k.pose(0.5 * (begin + end)));
         let direction = mean_pose.map_or(DVec3::ZERO, |p| p.direction);
@@ -58,6 +59,7 @@ impl Recorder {
             tip_coordinate: sums.tip_coordinate,
             reactions: sums.reactions,
             energy: *e,
+            needle: Default::default(),
             core: None,
             health: Health {
                 min_j: sums.min_j,

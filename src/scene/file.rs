@@ -27,7 +27,7 @@ pub struct SceneFile {
     /// Node sets of a mesh that are held.
     #[serde(default)]
     pub support: Vec<SupportTable>,
-    /// A rigid solid needle with a conical tip. At most one tool per scene.
+    /// A needle with a conical or bevelled tip, rigid without the effect `flexible_needle`. At most one tool per scene.
     pub needle: Option<NeedleTable>,
     /// A rigid sphere. At most one tool per scene.
     pub sphere: Option<SphereTable>,
@@ -38,6 +38,7 @@ pub struct SceneFile {
     pub puncture: Option<PunctureTable>,
     pub cohesive: Option<CohesiveTable>,
     pub friction: Option<FrictionTable>,
+    pub flexible_needle: Option<FlexibleNeedleTable>,
     pub indentation: Option<IndentationTable>,
     pub gravity: Option<GravityTable>,
     pub plasticity: Option<PlasticityTable>,
@@ -309,7 +310,7 @@ pub struct FaceTable {
     pub traction_ramp_s: Option<f64>,
 }
 
-/// A rigid solid needle: cylinder and tip.
+/// A needle: cylinder and tip.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NeedleTable {
@@ -331,8 +332,8 @@ pub struct NeedleTable {
     pub cutting_edge: Option<f64>,
     /// Friction coefficient of the bore.
     pub bore_friction: Option<f64>,
-    /// Needle material: a name in the library or a table; default "steel-304". The needle is rigid, so the material
-    /// is checked and reported only.
+    /// Needle material: a name in the library or a table; default "steel-304". It decides how the needle bends with the
+    /// effect `flexible_needle`.
     pub material: Option<NeedleMaterialEntry>,
 }
 
@@ -392,6 +393,20 @@ pub struct MotionTable {
     /// The phases, in order.
     #[serde(default)]
     pub phase: Vec<PhaseTable>,
+    /// Vibration of the hub on top of the phases.
+    pub vibration: Option<VibrationTable>,
+}
+
+/// A sinusoidal motion of the hub, from the start of the run on.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VibrationTable {
+    /// Amplitude [mm].
+    pub amplitude_mm: f64,
+    /// Frequency [Hz].
+    pub frequency_hz: f64,
+    /// Direction of the motion, any length; default: along the insertion.
+    pub direction: Option<[f64; 3]>,
 }
 
 /// One phase of the motion.
@@ -481,6 +496,20 @@ pub struct FrictionTable {
     pub fade_length_mm: Option<f64>,
 }
 
+/// Parameters of the effect `flexible_needle`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FlexibleNeedleTable {
+    /// Length from hub to tip [mm]; default 100.
+    pub free_length_mm: Option<f64>,
+    /// Number of elements, 4 to 200; default 40.
+    pub elements: Option<u32>,
+    /// Diameter of the bore [mm], 0: solid; default: the gauge's, solid for a needle without gauge.
+    pub inner_diameter_mm: Option<f64>,
+    /// Acceleration of free fall on the needle [m/s^2]; default: that of the effect `gravity` if it is on, else none.
+    pub gravity_m_s2: Option<[f64; 3]>,
+}
+
 /// Parameters of the effect `cohesive`: faces that separate. With a needle that cuts, its path opens on them: on a slit
 /// before a solid needle, on the ring of its cutting edge before a hollow one.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -531,6 +560,13 @@ pub struct IndentationTable {
 pub struct GravityTable {
     /// Acceleration of free fall [m/s^2]; default [0, 0, -9.81].
     pub acceleration_m_s2: Option<[f64; 3]>,
+}
+
+impl GravityTable {
+    /// Nothing weighs anything.
+    pub fn none() -> Self {
+        GravityTable { acceleration_m_s2: Some([0.0; 3]) }
+    }
 }
 
 /// Parameters of the effect `plasticity`.

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use motion::{Motion, Phase};
+pub use motion::{Motion, Phase, Vibration};
 
 use crate::effects::{self, EffectSet};
 use crate::material::ElasticLaw;
@@ -301,7 +301,7 @@ pub enum Tool {
     },
 }
 
-/// A rigid solid needle: a cylinder with a straight or oblique conical tip.
+/// A needle, solid to the tissue: a cylinder with a straight or oblique conical tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeedleShape {
     /// What the user calls it, e.g. `16G`.
@@ -314,8 +314,13 @@ pub struct NeedleShape {
     pub tip: TipShape,
     /// What makes it hollow.
     pub bore: Option<BoreShape>,
-    /// Name of the needle material (rigid here; kept for reports).
+    /// Name of the needle material.
     pub material: String,
+    /// Young's modulus [Pa] and density [kg/m^3] of the material, and diameter of the bore [m] (0: solid): how a flexible
+    /// needle bends.
+    pub youngs_modulus: f64,
+    pub density: f64,
+    pub inner_diameter: f64,
 }
 
 /// The inside of a hollow needle.
@@ -359,6 +364,9 @@ impl NeedleShape {
             tip: TipShape::Cone,
             bore: None,
             material: "steel-304".into(),
+            youngs_modulus: 193e9,
+            density: 7900.0,
+            inner_diameter: 0.0,
         }
     }
 }

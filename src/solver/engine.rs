@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::ToolPose;
+use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
 use crate::needle::free_path::FreeTip;
 use crate::scene::Face;
 
@@ -41,6 +42,8 @@ pub struct FramePlan {
     pub first_step: u64,
     /// One entry per step.
     pub steps: Vec<StepInput>,
+    /// How the needle is bent during the frame; `None`: straight.
+    pub centre_line: Option<CentreLine>,
 }
 
 impl StepInput {
@@ -82,8 +85,12 @@ pub struct FrameSums {
     /// Whole impulse [N s] and angular impulse about the tip [N m s], world frame.
     pub impulse: DVec3,
     pub angular_impulse: DVec3,
-    /// Work done by the tool [J].
+    /// Work done by the tool [J]; with a flexible needle that of its hub, once the run has booked the beam.
     pub tool_work: f64,
+    /// Impulse on the tissue, shared over the entries of the centre-line [N s]; zero without a flexible needle.
+    pub needle_loads: [DVec3; ENTRY_COUNT],
+    /// Total: gained and damped by a flexible needle [J].
+    pub needle_energy: f64,
     /// Dissipated by friction, by contact damping, by the tip law, by softening [J].
     pub friction_dissipation: f64,
     pub contact_dissipation: f64,

@@ -6,6 +6,7 @@ mod common;
 mod damage;
 mod element;
 mod fibres;
+mod flexible_needle;
 mod friction;
 mod gravity;
 mod indentation;

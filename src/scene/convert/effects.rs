@@ -4,6 +4,7 @@ use super::super::file::*;
 use super::super::{FaceCondition, Motion, NeedleShape, TissueMaterial, Tool};
 use super::{Check, MM, Within, parameters};
 use crate::effects::{self, EFFECTS, EffectSet};
+use crate::needle::beam::{BeamParams, Section};
 
 impl Check<'_> {
     pub(super) fn effects(
@@ -53,6 +54,14 @@ impl Check<'_> {
                 "add [needle], [sphere] or [flat_punch], or remove the effect",
             );
         }
+        if listed("flexible_needle") && !(is_needle && listed("puncture")) {
+            self.problems.report(
+                &place("flexible_needle"),
+                "effect `flexible_needle` needs a needle and the effect `puncture`",
+                "nothing bends the needle",
+                "add [needle] and \"puncture\" to the list `effects`, or remove the effect",
+            );
+        }
         if listed("damage") && !listed("plasticity") {
             self.problems.report(
                 &place("damage"),
@@ -78,6 +87,7 @@ impl Check<'_> {
             ("puncture", file.puncture.is_some()),
             ("cohesive", file.cohesive.is_some()),
             ("friction", file.friction.is_some()),
+            ("flexible_needle", file.flexible_needle.is_some()),
             ("indentation", file.indentation.is_some()),
             ("gravity", file.gravity.is_some()),
             ("plasticity", file.plasticity.is_some()),
@@ -122,6 +132,19 @@ impl Check<'_> {
         }
         let friction = self.friction(&file.friction.clone().unwrap_or_default());
         let indentation = self.indentation(&file.indentation.clone().unwrap_or_default());
+        if listed("flexible_needle") && (motion.is_free() || puncture.always_free) {
+            self.problems.report(
+                &place("flexible_needle"),
+                "a flexible needle keeps to its planned path",
+                "with a free motion or puncture.path = \"free\"",
+                "move along one straight line, or remove the effect",
+            );
+        }
+        let flexible = listed("flexible_needle").then(|| {
+            let weight =
+                if listed("gravity") { file.gravity.clone().unwrap_or_default() } else { GravityTable::none() };
+            self.flexible_needle(&file.flexible_needle.clone().unwrap_or_default(), tool, motion, &weight)
+        });
         let acceleration = file.gravity.as_ref().and_then(|table| table.acceleration_m_s2);
         let gravity = effects::gravity::Params {
             acceleration: self.vector("gravity.acceleration_m_s2", acceleration.unwrap_or([0.0, 0.0, -9.81]), 1000.0),
@@ -151,6 +174,68 @@ impl Check<'_> {
             puncture: listed("puncture").then_some(puncture),
             indentation: listed("indentation").then_some(indentation),
             friction: listed("friction").then_some(friction),
+            flexible_needle: flexible,
+        }
+    }
+
+    fn flexible_needle(
+        &mut self,
+        table: &FlexibleNeedleTable,
+        tool: &Option<Tool>,
+        motion: &Motion,
+        weight: &GravityTable,
+    ) -> effects::flexible_needle::Params {
+        let default = effects::flexible_needle::Params::default();
+        // Reported above where there is none.
+        let Some(Tool::Needle(needle)) = tool else { return default };
+        let at = |key: &str| format!("flexible_needle.{key}");
+        let length = self.optional(
+            &at("free_length_mm"),
+            table.free_length_mm,
+            MM,
+            default.beam.length,
+            Within::Between(5.0, 500.0),
+        );
+        if length <= motion.deepest() {
+            self.problems.report(
+                &if table.free_length_mm.is_some() { at("free_length_mm") } else { "flexible_needle".into() },
+                format!(
+                    "the needle is {} mm long and goes {} mm deep: its hub would enter the tissue",
+                    length / MM,
+                    motion.deepest() / MM
+                ),
+                "longer than the deepest insertion",
+                format!("write free_length_mm above {}", motion.deepest() / MM),
+            );
+        }
+        let outer_diameter = 2.0 * needle.radius;
+        let inner_diameter = self.optional(
+            &at("inner_diameter_mm"),
+            table.inner_diameter_mm,
+            MM,
+            needle.inner_diameter,
+            Within::NotNegative(20.0),
+        );
+        if inner_diameter > 0.98 * outer_diameter {
+            self.problems.report(
+                &at("inner_diameter_mm"),
+                format!("the bore of {} mm leaves no wall of {} mm", inner_diameter / MM, outer_diameter / MM),
+                "at most 0.98 of the outer diameter",
+                "write the inner diameter of the tube, or 0 for a solid needle",
+            );
+        }
+        let elements = table.elements.map_or(default.beam.elements as f64, f64::from);
+        let elements = self.number(&at("elements"), elements, Within::Between(4.0, 200.0));
+        let acceleration = table.gravity_m_s2.or(weight.acceleration_m_s2).unwrap_or([0.0, 0.0, -9.81]);
+        effects::flexible_needle::Params {
+            beam: BeamParams {
+                length,
+                elements: elements as usize,
+                section: Section { outer_diameter, inner_diameter },
+                youngs_modulus: needle.youngs_modulus,
+                density: needle.density,
+            },
+            gravity: self.vector(&at("gravity_m_s2"), acceleration, 1000.0),
         }
     }
 

@@ -19,6 +19,7 @@ use crate::error::{Error, Result};
 use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::ToolPose;
+use crate::needle::centre_line::CentreLine;
 use crate::scene::Face;
 
 /// Sums of one contact node over one step.
@@ -53,6 +54,10 @@ pub struct CpuEngine {
     contact_energy: f64,
     /// Plastic and damage dissipation that earlier frames have told [J].
     booked: (f64, f64),
+    /// Centre-line of a flexible needle in the frame under way.
+    centre_line: Option<CentreLine>,
+    /// Impulse of that frame on each contact node [N s]; used with a centre-line only.
+    node_impulse: Vec<DVec3>,
     finished: std::collections::VecDeque<FrameSums>,
     sums: FrameSums,
 }
@@ -97,6 +102,8 @@ impl CpuEngine {
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
             booked: (0.0, 0.0),
+            centre_line: None,
+            node_impulse: vec![DVec3::ZERO; model.contact_nodes.len()],
             finished: Default::default(),
             sums: FrameSums::default(),
             model,
@@ -123,7 +130,7 @@ impl CpuEngine {
         self.added_bound.fill(0.0);
         self.cohesive_forces();
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
-            self.needle_contact(plan, &pose);
+            self.needle_contact(plan, &pose, input.step);
         }
         if let (Some(_), Some(pose)) = (model.effects.indentation, input.pose) {
             self.indenter_contact(&pose);
@@ -342,8 +349,12 @@ impl Engine for CpuEngine {
 
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {
         self.sums = FrameSums { frame: plan.frame, steps: plan.steps.len() as u32, ..Default::default() };
+        self.centre_line = plan.centre_line;
         for input in &plan.steps {
             self.step(input);
+        }
+        if let Some(pose) = plan.steps.last().and_then(|s| s.pose) {
+            self.share_needle_loads(&pose);
         }
         self.measure();
         self.finished.push_back(self.sums);

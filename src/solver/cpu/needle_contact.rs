@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::{ContactSums, CpuEngine};
 use crate::model::{ContactSurface, PuncturePlan};
+use crate::needle::centre_line::Bend;
 use crate::needle::free_path::{FreeTip, PASSED_MARGIN, WATCHED};
 use crate::needle::gap::{Overlap, Profile};
 use crate::needle::{ToolPose, swing};
@@ -12,7 +13,7 @@ use crate::solver::engine::ContactState;
 impl CpuEngine {
     /// Stage `needle_contact`: nodes of the ring that the tip has passed stay outside the opened path (potential
     /// `1/2 k phi^2`, see `needle::gap`); friction on the shaft; tip springs.
-    pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
+    pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
         let d = -pose.direction;
         let k = plan.contact_stiffness;
@@ -22,13 +23,14 @@ impl CpuEngine {
         let tip = self.state.tip;
         let cone = profile.tip_length;
         let mut stored = self.tip_energy;
+        let line = self.centre_line;
         let mut tip_on_node: std::collections::HashMap<usize, DVec3> = Default::default();
         for (force, nodes, weights) in &self.tip_forces {
             for (n, w) in nodes.iter().zip(weights) {
                 *tip_on_node.entry(*n).or_default() += (pose.direction * *force + self.tip_sway) * *w;
             }
         }
-        for (contact, memory) in model.contact_nodes.iter().zip(&mut self.state.contact) {
+        for (index, (contact, memory)) in model.contact_nodes.iter().zip(&mut self.state.contact).enumerate() {
             let node = contact.node as usize;
             let x = model.mesh.rest_position(node) + self.state.displacement[node];
             let mut sums = ContactSums::default();
@@ -37,19 +39,21 @@ impl CpuEngine {
             }
             let relative = x - pose.tip;
             let s = relative.dot(d);
+            let bend = line.map_or(Bend::default(), |l| l.at(s, (step - l.first_step) as f64 * self.dt));
+            let from_axis = relative - bend.offset;
             let (passed, rest_radius) = match &plan.free {
                 None => (contact.pushed && contact.rest_axial < a, contact.rest_radius),
-                Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, relative, s, d),
+                Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, from_axis, s, d),
             };
             if !(passed && s > 0.0) {
                 *memory =
                     ContactState { rest_radius: memory.rest_radius, passed: memory.passed, ..ContactState::default() };
             } else {
                 let overlap = |less: (f64, f64)| match contact.surface {
-                    ContactSurface::OpenedPath => profile.opened_path(relative, d, rest_radius, less),
-                    ContactSurface::Slit { side } => profile.slit_face(relative, d, side, less),
-                    ContactSurface::OuterWall => profile.tube_wall(relative, d, false, less),
-                    ContactSurface::Bore => profile.tube_wall(relative, d, true, less),
+                    ContactSurface::OpenedPath => profile.opened_path(from_axis, d, rest_radius, less),
+                    ContactSurface::Slit { side } => profile.slit_face(from_axis, d, side, less),
+                    ContactSurface::OuterWall => profile.tube_wall(from_axis, d, false, less),
+                    ContactSurface::Bore => profile.tube_wall(from_axis, d, true, less),
                 };
                 let free = overlap((0.0, 0.0));
                 if !memory.touching {
@@ -61,9 +65,10 @@ impl CpuEngine {
                 let fading = if travel > 0.0 && travel < 1.0 { -memory.overlap / plan.params.entry_fade } else { 0.0 };
                 let less = (memory.overlap * (1.0 - travel).clamp(0.0, 1.0), fading);
                 let Overlap { value: depth, gradient } = overlap(less);
+                let gradient = gradient - d * gradient.dot(bend.slope);
                 let steep = gradient.length();
                 let n = -gradient / steep;
-                let v = self.state.velocity[node] - pose.velocity - pose.angular_velocity.cross(relative);
+                let v = self.state.velocity[node] - pose.velocity - pose.angular_velocity.cross(relative) - bend.rate;
                 let vn = v.dot(n);
                 let mass = model.node_mass[node];
                 let damping = 2.0 * plan.params.contact_damping * (k * mass).sqrt();
@@ -106,8 +111,22 @@ impl CpuEngine {
             self.external[node] += total;
             stored += sums.stored;
             self.sums.book(&sums, pose, self.dt);
+            if line.is_some() {
+                self.sums.tool_work += total.dot(bend.rate) * self.dt;
+                self.node_impulse[index] += total * self.dt;
+            }
         }
         self.contact_energy = stored;
+    }
+
+    /// Shares the impulses of the frame over the entries of the centre-line, by where the nodes are at its end.
+    pub(super) fn share_needle_loads(&mut self, pose: &ToolPose) {
+        let Some(line) = self.centre_line else { return };
+        for (contact, impulse) in self.model.contact_nodes.iter().zip(&mut self.node_impulse) {
+            let node = contact.node as usize;
+            let x = self.model.mesh.rest_position(node) + self.state.displacement[node];
+            line.share(&mut self.sums.needle_loads, (pose.tip - x).dot(pose.direction), std::mem::take(impulse));
+        }
     }
 }
 
