@@ -185,8 +185,7 @@ fn difference(after: Option<f64>, before: Option<f64>) -> Option<f64> {
 /// The frames at which pictures and field files are due.
 fn moments(simulation: &Simulation) -> Vec<Moment> {
     let outputs = &simulation.model.scene.outputs;
-    let frame_of_time =
-        |t: f64| (t <= simulation.duration() + simulation.dt).then(|| simulation.frame_at(t));
+    let frame_of_time = |t: f64| (t <= simulation.duration() + simulation.dt).then(|| simulation.frame_at(t));
     let frame_of = |value: f64| match &simulation.model.kinematics {
         // A depth counts on the way in: the first time that the tool gets there.
         Some(k) => k.time_of_depth(value).map(|t| simulation.frame_at(t)),

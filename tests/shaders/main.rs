@@ -244,6 +244,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "AnchorPlace",
         "GridPlace",
         "MaterialPlace",
+        "FreeContact",
         "Overlap",
         "Slopes",
         "IsochoricStress",

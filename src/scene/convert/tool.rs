@@ -235,8 +235,9 @@ impl Check<'_> {
             }
             (None, Some(angle)) => {
                 let angle = self.number(&at("angle_deg"), angle, Within::Between(0.0, 80.0)).to_radians();
-                let azimuth =
-                    self.optional(&at("azimuth_deg"), azimuth_deg, 1.0, 0.0, Within::Between(-360.0, 360.0)).to_radians();
+                let azimuth = self
+                    .optional(&at("azimuth_deg"), azimuth_deg, 1.0, 0.0, Within::Between(-360.0, 360.0))
+                    .to_radians();
                 Some(DVec3::new(angle.sin() * azimuth.cos(), angle.sin() * azimuth.sin(), -angle.cos()))
             }
         }
