@@ -86,8 +86,9 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         var advance = 0.0;
         if (excess > 0.0) {
             // At most 5 um in the first step and 13 um later, and four times the speed of the needle: a faster tip
-            // would leave nodes inside the needle.
-            let cap = min(select(13e-6, 5e-6, before == 0.0), 4.0 * length(step_input.velocity.xyz) * params.dt);
+            // would leave nodes inside the needle. A stab travels more than that in one step.
+            let travel = length(step_input.velocity.xyz) * params.dt;
+            let cap = min(max(select(13e-6, 5e-6, before == 0.0), 1.25 * travel), 4.0 * travel);
             let lambda = clamp(stretch / f32(ANCHOR_COUNT), 0.2, 3.0);
             advance = min(excess / (puncture.tip_stiffness * lambda), cap);
         }

@@ -8,7 +8,7 @@
 //! where F > F_c:  a += min((F - F_c) / (k_tip lambda), cap),  lambda = <dx_k/da . t> in 0.2..3
 //! dissipated: sum k_tip/N g_k (loss of g_k)                                               [J]
 //! ```
-//! `cap`: 5 um in the first step, 13 um later, and four times the needle's travel. `a` never decreases.
+//! `cap`: 5 um in the first step, 13 um later (at least 5/4 of the needle's travel), and four times the needle's travel. `a` never decreases.
 //!
 //! Path. A cell with the volume fraction `phi` within a0 of the axis keeps `max(residual, 1 - phi ramp(a))` of its
 //! stiffness; the energy that it loses is dissipated. A node with rest distance a0 < r0 < ring radius that the tip has passed

@@ -13,6 +13,7 @@ use stylet::solver::engine::State;
 use stylet::solver::simulation::{EngineChoice, Simulation};
 
 mod effects;
+mod free_hand;
 mod muscle_biopsy;
 mod samples;
 mod validation;

@@ -260,6 +260,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "Bend",
         "GridPlace",
         "MaterialPlace",
+        "FreeContact",
         "Overlap",
         "Slopes",
         "IsochoricStress",

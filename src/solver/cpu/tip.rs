@@ -61,7 +61,8 @@ impl CpuEngine {
             let lambda = springs.iter().map(|s| s.1).sum::<f64>() / springs.len() as f64;
             let speed = pose.velocity.length();
             let cap = if a == 0.0 { 0.005e-3 } else { 0.013e-3 };
-            let cap = f64::min(cap, 4.0 * speed * self.dt);
+            // A stab travels more than that in one step.
+            let cap = f64::min(f64::max(cap, 1.25 * speed * self.dt), 4.0 * speed * self.dt);
             let advance = ((force - threshold) / (p.tip_stiffness * lambda.clamp(0.2, 3.0))).min(cap);
             self.state.tip_coordinate = a + advance;
             let before = springs;
