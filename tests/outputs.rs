@@ -12,7 +12,7 @@ use stylet::mesh::{BlockMesh, Mesh};
 use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord, Health};
 use stylet::output::folder::{ENERGY_TABLE, FORCE_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY};
 use stylet::output::sample::{Motion as FaceMotion, SAMPLE_COLUMNS};
-use stylet::output::tables::{ENERGY_COLUMNS, FORCE_COLUMNS};
+use stylet::output::tables::{ENERGY_COLUMNS, force_columns};
 use stylet::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Status, Summary, Tables, write_force_chart,
     write_sample_chart,
@@ -307,7 +307,7 @@ fn tables_grow_row_by_row_and_survive_without_being_closed() {
         assert!(text.ends_with('\n'));
     }
     std::mem::forget(tables);
-    for (name, columns) in [(FORCE_TABLE, &FORCE_COLUMNS[..]), (ENERGY_TABLE, &ENERGY_COLUMNS[..])] {
+    for (name, columns) in [(FORCE_TABLE, &force_columns()[..]), (ENERGY_TABLE, &ENERGY_COLUMNS[..])] {
         let mut reader = csv::Reader::from_path(folder.file(name)).unwrap();
         assert_eq!(reader.headers().unwrap(), columns);
         let rows: Vec<Vec<f64>> =

@@ -19,6 +19,29 @@ pub struct ForceParts {
     pub torque: DVec3,
 }
 
+/// One addend of the axial force, as tables, charts and reports show it.
+#[derive(Debug, Clone, Copy)]
+pub struct ForcePart {
+    /// Name in legends.
+    pub name: &'static str,
+    /// Column of `force.csv`.
+    pub column: &'static str,
+    /// Red, green, blue; people with colour-blindness tell the parts apart (Okabe and Ito 2008).
+    pub colour: [u8; 3],
+    /// Its share of the axial force [N].
+    pub of: fn(&ForceParts) -> f64,
+}
+
+impl ForceParts {
+    /// The parts that add up to `axial`, from the bottom of a stack to its top. A new part is one line here: columns,
+    /// charts and reports follow this list.
+    pub const PARTS: [ForcePart; 3] = [
+        ForcePart { name: "cutting", column: "cutting_force_n", colour: [204, 121, 167], of: |f| f.cutting },
+        ForcePart { name: "spreading", column: "spreading_force_n", colour: [0, 158, 115], of: |f| f.spreading },
+        ForcePart { name: "friction", column: "friction_force_n", colour: [230, 159, 0], of: |f| f.friction },
+    ];
+}
+
 /// Energies [J] at the end of a frame. Work and dissipation are totals since t = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EnergyAccount {

@@ -8,26 +8,24 @@ use std::path::PathBuf;
 
 use super::folder::{ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE};
 use super::sample::{DrivenFace, SAMPLE_COLUMNS, SamplePoint};
-use crate::observables::{EnergyAccount, FrameRecord};
+use crate::observables::{EnergyAccount, ForceParts, FrameRecord};
 use crate::{Error, Result};
 
 /// Columns of `force.csv`; the meaning is that of the fields of [`FrameRecord`].
-pub const FORCE_COLUMNS: [&str; 14] = [
-    "time_s",
-    "depth_m",
-    "phase",
-    "axial_force_n",
-    "cutting_force_n",
-    "spreading_force_n",
-    "friction_force_n",
-    "lateral_x_n",
-    "lateral_y_n",
-    "lateral_z_n",
-    "torque_x_nm",
-    "torque_y_nm",
-    "torque_z_nm",
-    "tip_coordinate_m",
-];
+pub fn force_columns() -> Vec<&'static str> {
+    let mut columns = vec!["time_s", "depth_m", "phase", "axial_force_n"];
+    columns.extend(ForceParts::PARTS.map(|part| part.column));
+    columns.extend([
+        "lateral_x_n",
+        "lateral_y_n",
+        "lateral_z_n",
+        "torque_x_nm",
+        "torque_y_nm",
+        "torque_z_nm",
+        "tip_coordinate_m",
+    ]);
+    columns
+}
 
 /// Columns of `energy.csv`.
 pub const ENERGY_COLUMNS: [&str; 25] = [
@@ -116,7 +114,7 @@ impl Tables {
         };
         Ok(Self {
             sample,
-            force: Table::create(folder.file(FORCE_TABLE), &FORCE_COLUMNS)?,
+            force: Table::create(folder.file(FORCE_TABLE), &force_columns())?,
             energy: Table::create(folder.file(ENERGY_TABLE), &ENERGY_COLUMNS)?,
         })
     }
@@ -134,24 +132,13 @@ impl Tables {
     }
 }
 
-fn force_row(record: &FrameRecord) -> [String; FORCE_COLUMNS.len()] {
+fn force_row(record: &FrameRecord) -> Vec<String> {
     let f = &record.force;
-    [
-        number(record.time),
-        number(record.depth),
-        record.phase.to_string(),
-        number(f.axial),
-        number(f.cutting),
-        number(f.spreading),
-        number(f.friction),
-        number(f.lateral.x),
-        number(f.lateral.y),
-        number(f.lateral.z),
-        number(f.torque.x),
-        number(f.torque.y),
-        number(f.torque.z),
-        number(record.tip_coordinate),
-    ]
+    let mut row = vec![number(record.time), number(record.depth), record.phase.to_string(), number(f.axial)];
+    row.extend(ForceParts::PARTS.iter().map(|part| number((part.of)(f))));
+    row.extend([f.lateral, f.torque].iter().flat_map(|v| v.to_array()).map(number));
+    row.push(number(record.tip_coordinate));
+    row
 }
 
 fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
