@@ -1,5 +1,6 @@
 //! Effects are chosen by the scene. `None` means absent: no define, no buffer, no binding, no code.
 
+pub mod adhesion;
 pub mod damage;
 pub mod fibres;
 pub mod friction;
@@ -21,6 +22,7 @@ pub struct EffectSet {
     pub viscoelastic: Option<viscoelastic::Params>,
     pub damage: Option<damage::Params>,
     pub puncture: Option<puncture::Params>,
+    pub adhesion: Option<adhesion::Params>,
     pub indentation: Option<indentation::Params>,
     pub friction: Option<friction::Params>,
 }
@@ -41,7 +43,7 @@ pub struct Effect {
 }
 
 /// All effects. The order is the order of their blocks in the stages.
-pub const EFFECTS: [Effect; 9] = [
+pub const EFFECTS: [Effect; 10] = [
     mass_scaling::EFFECT,
     gravity::EFFECT,
     plasticity::EFFECT,
@@ -49,6 +51,7 @@ pub const EFFECTS: [Effect; 9] = [
     viscoelastic::EFFECT,
     damage::EFFECT,
     puncture::EFFECT,
+    adhesion::EFFECT,
     indentation::EFFECT,
     friction::EFFECT,
 ];
@@ -64,6 +67,7 @@ impl EffectSet {
             self.viscoelastic.is_some(),
             self.damage.is_some(),
             self.puncture.is_some(),
+            self.adhesion.is_some(),
             self.indentation.is_some(),
             self.friction.is_some(),
         ]

@@ -133,7 +133,7 @@ impl BlockMesh {
                 ],
             };
         };
-        let end = motion.deepest_point();
+        let end = motion.deepest_point_in(tissue.size.z);
         let lateral = |axis: usize| {
             let entry = motion.entry[axis];
             let zone = [entry.min(end[axis]) - tissue.fine_radius, entry.max(end[axis]) + tissue.fine_radius];

@@ -28,7 +28,7 @@ pub fn force_columns() -> Vec<&'static str> {
 }
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 25] = [
+pub const ENERGY_COLUMNS: [&str; 26] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -38,6 +38,7 @@ pub const ENERGY_COLUMNS: [&str; 25] = [
     "damping_j",
     "friction_j",
     "cutting_j",
+    "adhesion_j",
     "plastic_j",
     "damage_j",
     "viscous_j",
@@ -154,6 +155,7 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(e.damping),
         number(e.friction),
         number(e.cutting),
+        number(e.adhesion),
         number(e.plastic),
         number(e.damage),
         number(e.viscous),

@@ -94,6 +94,8 @@ pub struct TissueMaterial {
     pub damage: Option<effects::damage::Params>,
     /// Tip forces in this material; `None`: those of the scene's puncture table.
     pub cutting: Option<Cutting>,
+    /// A membrane: energy that puncturing this layer takes beyond cutting through it [J].
+    pub membrane_energy: Option<f64>,
 }
 
 impl TissueMaterial {
@@ -109,6 +111,7 @@ impl TissueMaterial {
             viscoelastic: None,
             damage: None,
             cutting: None,
+            membrane_energy: None,
         }
     }
 }
@@ -289,6 +292,9 @@ pub struct NeedleShape {
     pub tip: TipShape,
     /// Name of the needle material (rigid here; kept for reports).
     pub material: String,
+    /// Length from the tip to the hub [m] and density of the material [kg/m^3]; they give the mass alone.
+    pub length: f64,
+    pub density: f64,
 }
 
 /// Shape of the tip of a needle.
@@ -312,9 +318,22 @@ impl NeedleShape {
         self.radius / self.tip_length
     }
 
-    /// A needle with a conical tip, of steel. Lengths in m.
+    /// Mass of a solid cylinder [kg]; the missing part of the tip does not count.
+    pub fn mass(&self) -> f64 {
+        std::f64::consts::PI * self.radius.powi(2) * self.length * self.density
+    }
+
+    /// A needle with a conical tip, of steel, 100 mm long. Lengths in m.
     pub fn cone(name: &str, radius: f64, tip_length: f64) -> Self {
-        NeedleShape { name: name.into(), radius, tip_length, tip: TipShape::Cone, material: "steel-304".into() }
+        NeedleShape {
+            name: name.into(),
+            radius,
+            tip_length,
+            tip: TipShape::Cone,
+            material: "steel-304".into(),
+            length: 0.1,
+            density: 7.93e3,
+        }
     }
 }
 
@@ -340,6 +359,11 @@ impl Motion {
     /// Where the tip is at the largest depth [m].
     pub fn deepest_point(&self) -> DVec3 {
         self.entry + self.direction * self.deepest()
+    }
+
+    /// The same, not below the bottom of a block of height `height` [m].
+    pub fn deepest_point_in(&self, height: f64) -> DVec3 {
+        self.entry + self.direction * self.deepest().min(height / -self.direction.z)
     }
 
     /// Largest speed of all phases [m/s].

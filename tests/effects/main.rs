@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod adhesion;
 mod damage;
 mod element;
 mod fibres;

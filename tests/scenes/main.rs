@@ -15,6 +15,7 @@ use stylet::solver::simulation::{EngineChoice, Simulation};
 mod effects;
 mod muscle_biopsy;
 mod samples;
+mod tip;
 mod validation;
 
 fn load(name: &str, overrides: &[&str]) -> Scene {

@@ -56,15 +56,16 @@ fn effect_set(wanted: impl Fn(usize) -> bool) -> EffectSet {
         viscoelastic: wanted(4).then(Default::default),
         damage: wanted(5).then(Default::default),
         puncture: wanted(6).then(Default::default),
-        indentation: wanted(7).then(Default::default),
-        friction: wanted(8).then(Default::default),
+        adhesion: wanted(7).then(Default::default),
+        indentation: wanted(8).then(Default::default),
+        friction: wanted(9).then(Default::default),
     };
     let expected: Vec<&str> = EFFECTS.iter().enumerate().filter(|e| wanted(e.0)).map(|e| e.1.key).collect();
     assert_eq!(set.keys(), expected, "order of the effect table");
     set
 }
 
-/// All 512 subsets: none, every single one, all pairs, all together and what lies between.
+/// All 1024 subsets: none, every single one, all pairs, all together and what lies between.
 fn all_sets() -> Vec<EffectSet> {
     (0..1usize << EFFECTS.len()).map(|bits| effect_set(|i| bits >> i & 1 == 1)).collect()
 }
@@ -274,7 +275,7 @@ fn a_wrong_layout_is_found_and_named() {
 }
 
 /// Words that would betray an effect, by its key.
-const TRACES: [(&str, &[&str]); 9] = [
+const TRACES: [(&str, &[&str]); 10] = [
     ("mass_scaling", &["mass_scaling", "stable_mass", "selective"]),
     ("gravity", &["gravity", "free fall"]),
     ("plasticity", &["yield", "hardening", "flow_plastically", "mandel"]),
@@ -282,6 +283,7 @@ const TRACES: [(&str, &[&str]); 9] = [
     ("viscoelastic", &["visc", "prony[", "relax("]),
     ("damage", &["degradation(", "damage["]),
     ("puncture", &["puncture", "tip_", "needle", "soften", "remaining"]),
+    ("adhesion", &["adhesion"]),
     ("indentation", &["indent", "punch"]),
     ("friction", &["friction", "stick_", "coulomb"]),
 ];
@@ -351,8 +353,9 @@ fn an_absent_effect_leaves_no_trace() {
                 assert!(found.is_none(), "{stage} without {key}: {word:?} in {found:?}");
             }
         }
-        // Not a vacuous search: with the effect alone (or with a tool, for friction) the words are there.
-        let present = effect_set(|i| i == absent || (*key == "friction" && EFFECTS[i].key == "puncture"));
+        // Not a vacuous search: with the effect alone (or with a tool, for friction and adhesion) the words are there.
+        let present =
+            effect_set(|i| i == absent || (matches!(*key, "friction" | "adhesion") && EFFECTS[i].key == "puncture"));
         let all: String = text_of(&present, &scene(false, false)).into_iter().map(|t| t.1).collect();
         assert!(traces.iter().any(|word| all.contains(word)), "{key}: none of {traces:?} with it");
     }

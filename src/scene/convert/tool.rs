@@ -61,21 +61,21 @@ impl Check<'_> {
         }
         let radius = 0.5 * diameter;
         let (tip, tip_length) = self.needle_tip(table, radius);
-        let material = match &table.material {
-            None => "steel-304".to_string(),
+        let length = self.optional("needle.length_mm", table.length_mm, MM, 100.0 * MM, Within::Between(1.0, 1000.0));
+        let steel = presets::needle_material("steel-304").map_or(7.93e3, |m| m.density);
+        let (material, density) = match &table.material {
+            None => ("steel-304".to_string(), steel),
             Some(NeedleMaterialEntry::Preset(name)) => {
-                if presets::needle_material(name).is_none() {
+                let found = presets::needle_material(name);
+                if found.is_none() {
                     let names: Vec<&str> = presets::needle_materials().iter().map(|m| m.name.as_str()).collect();
                     self.unknown_name("needle.material", "needle material", name, &names);
                 }
-                name.clone()
+                (name.clone(), found.map_or(steel, |m| m.density))
             }
-            Some(NeedleMaterialEntry::Table(table)) => {
-                self.needle_material(table);
-                "constants".to_string()
-            }
+            Some(NeedleMaterialEntry::Table(table)) => ("constants".to_string(), self.needle_material(table)),
         };
-        NeedleShape { name, radius, tip_length, tip, material }
+        NeedleShape { name, radius, tip_length, tip, material, length, density }
     }
 
     /// Shape and length of the tip.
@@ -116,7 +116,8 @@ impl Check<'_> {
         }
     }
 
-    fn needle_material(&mut self, table: &NeedleMaterialTable) {
+    /// Checks a table of constants; returns its density [kg/m^3].
+    fn needle_material(&mut self, table: &NeedleMaterialTable) -> f64 {
         self.number("needle.material.youngs_modulus_gpa", table.youngs_modulus_gpa, Within::Between(0.1, 2000.0));
         self.number("needle.material.poisson_ratio", table.poisson_ratio, Within::Between(0.0, 0.4999));
         // Density [kg/m^3] and how the file writes it.
@@ -130,11 +131,11 @@ impl Check<'_> {
                     "density_g_cm3 or density_g_mm3",
                     "write density_g_cm3 = 7.9 (steel)",
                 );
-                return;
+                return 7.9e3;
             }
         };
         if (800.0..=25_000.0).contains(&density) {
-            return;
+            return density;
         }
         // A density in t/mm^3 taken for g/mm^3 is a million times too small.
         let as_tonnes = density * 1e6;
@@ -155,6 +156,7 @@ impl Check<'_> {
             "no needle material",
             guess,
         );
+        density
     }
 
     pub(super) fn motion(&mut self, file: &SceneFile, has_tool: bool) -> Motion {

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
+use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
 use crate::model::Model;
@@ -24,6 +25,8 @@ struct ContactSums {
     tip: DVec3,
     normal: DVec3,
     friction: DVec3,
+    /// The normal force acts on the shaft of a needle.
+    on_shaft: bool,
     /// Torque about the tip [N m].
     torque: DVec3,
     friction_work: f64,
@@ -59,6 +62,7 @@ impl CpuEngine {
             velocity: vec![DVec3::ZERO; nodes],
             stiffness: if model.puncture.is_some() { vec![1.0; cells] } else { Vec::new() },
             tip_coordinate: 0.0,
+            bond: Bond::default(),
             contact: vec![ContactState::default(); model.contact_nodes.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
         };
@@ -262,6 +266,9 @@ impl FrameSums {
         let total = c.tip + c.normal + c.friction;
         self.cutting_impulse += c.tip.dot(pose.direction) * dt;
         self.spreading_impulse += c.normal.dot(pose.direction) * dt;
+        if c.on_shaft {
+            self.shaft_impulse += c.normal.dot(pose.direction) * dt;
+        }
         self.friction_impulse += c.friction.dot(pose.direction) * dt;
         self.impulse += total * dt;
         self.angular_impulse += c.torque * dt;
