@@ -170,6 +170,8 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let pressure = select(0.0, max(0.0, elastic - damping * vn), depth > 0.0);
         normal = n * pressure;
         stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
+        contact_sums[index].shaft +=
+            select(0.0, dot(normal, step_input.direction.xyz) * params.dt, s >= puncture.tip_length);
         contact_sums[index].damping_dissipation +=
             select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
 #ifdef COHESIVE

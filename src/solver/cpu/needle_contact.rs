@@ -79,6 +79,7 @@ impl CpuEngine {
                 let elastic = k * depth * steep;
                 let normal = if depth > 0.0 { (elastic - damping * vn).max(0.0) } else { 0.0 };
                 sums.normal = n * normal;
+                sums.on_shaft = s >= cone;
                 if depth > 0.0 {
                     sums.stored = 0.5 * k * depth * depth;
                     sums.damping_power = (elastic - normal) * vn;
