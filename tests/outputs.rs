@@ -63,10 +63,12 @@ fn records() -> Vec<FrameRecord> {
                 force: ForceParts {
                     axial: cutting + spreading + friction,
                     cutting,
-                    spreading,
+                    tip_spreading: 0.25 * spreading,
+                    shaft_spreading: 0.75 * spreading,
                     friction,
                     lateral: DVec3::new(0.01, -0.02, 0.0),
                     torque: DVec3::new(1e-5, 0.0, 2e-6),
+                    ..Default::default()
                 },
                 tip_coordinate: depth - 0.5e-3,
                 energy: EnergyAccount {
@@ -140,6 +142,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
             entry: DVec3::ZERO,
             direction: direction.normalize(),
             phases: vec![Phase::Insert { speed: 2e-3, depth: 6e-3 }],
+            vibration: None,
         },
         effects: EffectSet::default(),
         solver: SolverSettings {

@@ -115,6 +115,7 @@ pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
             entry: DVec3::new(0.23 * h, 0.31 * h, 0.0),
             direction: DVec3::NEG_Z,
             phases: if needle { vec![Phase::Insert { speed: 2e-3, depth: 10e-3 }] } else { Vec::new() },
+            vibration: None,
         },
         effects: EffectSet {
             mass_scaling: Some(mass_scaling::Params { factor: 1000.0 }),
@@ -185,7 +186,7 @@ impl Subject {
                 input
             })
             .collect();
-        let plan = FramePlan { frame: self.frame, first_step: self.step, steps: inputs };
+        let plan = FramePlan { frame: self.frame, first_step: self.step, steps: inputs, centre_line: None };
         self.step += steps as u64;
         self.frame += 1;
         let begin = Instant::now();

@@ -59,6 +59,7 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     for notice in &simulation.notices {
         eprintln!("note: {notice}");
     }
+    let told = simulation.notices.len();
     let moments = moments(&simulation);
     for moment in &moments {
         simulation.stop_after(moment.frame);
@@ -115,6 +116,9 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     let wall = begin.elapsed().as_secs_f64() - drawing;
     let cpu = difference(process::cpu_seconds(), cpu_begin).map(|c| c - drawing_cpu);
     progress.finish();
+    for notice in &simulation.notices[told..] {
+        eprintln!("note: {notice}");
+    }
 
     let mesh = &simulation.model.mesh;
     let steps = records.last().map_or(0, |r| r.step);

@@ -9,9 +9,11 @@ use crate::error::{Error, Result};
 
 /// Every shader file by its path under `shaders/`, without extension.
 pub const SOURCES: &[(&str, &str)] = &[
+    ("effects/adhesion", include_str!("../../shaders/effects/adhesion.wgsl")),
     ("effects/cohesive", include_str!("../../shaders/effects/cohesive.wgsl")),
     ("effects/damage", include_str!("../../shaders/effects/damage.wgsl")),
     ("effects/fibres", include_str!("../../shaders/effects/fibres.wgsl")),
+    ("effects/flexible_needle", include_str!("../../shaders/effects/flexible_needle.wgsl")),
     ("effects/free_path", include_str!("../../shaders/effects/free_path.wgsl")),
     ("effects/friction", include_str!("../../shaders/effects/friction.wgsl")),
     ("effects/gravity", include_str!("../../shaders/effects/gravity.wgsl")),

@@ -13,6 +13,7 @@ use super::kernel::{Kernel, Reflected, STEP_INPUT, reflect};
 use super::layout::Layout;
 use super::structs::*;
 use crate::effects::EffectSet;
+use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
 use crate::material::Isochoric;
 use crate::material_point::{Material as Constants, PointState};
@@ -88,11 +89,14 @@ pub const LAWS: [(&str, &str); 5] = [
 ];
 
 /// Effects of tools, which work on the block only.
-const BLOCK_EFFECTS: [&str; 4] = ["cohesive", "puncture", "indentation", "friction"];
+const BLOCK_EFFECTS: [&str; 6] = ["cohesive", "puncture", "adhesion", "indentation", "friction", "flexible_needle"];
 
 /// Names that are defined for the shaders.
 pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
-    let works = |key: &str| !features.tetrahedra || !BLOCK_EFFECTS.contains(&key);
+    // A flexible needle acts by the contact of `puncture`, on a planned path.
+    let bends = effects.puncture.is_some() && !features.free_path;
+    let works =
+        |key: &str| (!features.tetrahedra || !BLOCK_EFFECTS.contains(&key)) && (key != "flexible_needle" || bends);
     let mut defines: BTreeSet<&'static str> = effects.active().filter(|e| works(e.key)).map(|e| e.define).collect();
     let mut define = |name: &'static str, wanted: bool| {
         if wanted {
@@ -223,7 +227,7 @@ impl GpuEngine {
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
         let results: Vec<ResultRange> =
-            ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "tip_result"]
+            ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "needle_loads", "tip_result"]
                 .into_iter()
                 .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
                 .map(|(name, size)| {
@@ -389,6 +393,11 @@ impl GpuEngine {
                         sums.reactions[index / FACE_PARTS] += force;
                     }
                 }
+                "needle_loads" => {
+                    for (load, s) in sums.needle_loads.iter_mut().zip(read_all::<[f32; 4]>(bytes)) {
+                        *load = DVec3::new(s[0].into(), s[1].into(), s[2].into());
+                    }
+                }
                 "separation_sums" => {
                     for s in read_all::<SeparationSums>(bytes) {
                         sums.cohesive_dissipation += f64::from(s.dissipation);
@@ -403,6 +412,7 @@ impl GpuEngine {
                         sums.angular_impulse += vector(s.angular_impulse);
                         sums.cutting_impulse += f64::from(s.cutting);
                         sums.spreading_impulse += f64::from(s.spreading);
+                        sums.shaft_impulse += f64::from(s.shaft);
                         sums.friction_impulse += f64::from(s.sliding);
                         sums.tool_work += f64::from(s.work);
                         sums.friction_dissipation += f64::from(s.sliding_dissipation);
@@ -416,6 +426,11 @@ impl GpuEngine {
                         sums.tip_dissipation = f64::from(s.dissipation);
                         sums.softening_dissipation = f64::from(s.softening);
                         sums.contact_energy += f64::from(s.spring_energy);
+                        sums.membrane_impulse = f64::from(s.membrane_impulse);
+                        sums.adhesion_impulse = f64::from(s.bond_impulse);
+                        sums.adhesion_dissipation = f64::from(s.bond_dissipation);
+                        // The contact nodes have booked the whole force of the anchors.
+                        sums.cutting_impulse -= sums.membrane_impulse + sums.adhesion_impulse;
                     }
                 }
             }
@@ -521,7 +536,7 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 52] = [
+const BUFFERS: [&str; 55] = [
     "cohesive",
     "face_pairs",
     "pair_states",
@@ -531,7 +546,10 @@ const BUFFERS: [&str; 52] = [
     STEP_INPUT,
     "gravity",
     "puncture",
+    "adhesion",
     "friction",
+    "centre_line",
+    "needle_loads",
     "indentation",
     "cell_edges",
     "node_mass",
@@ -603,6 +621,15 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
             bytes_of(&[GravityParams { acceleration: vec4(g / model.mass_scaling()) }])
         }
         "puncture" => bytes_of(&[puncture_params(model)]),
+        "adhesion" => {
+            let p = model.effects.adhesion.unwrap_or_default();
+            bytes_of(&[AdhesionParams {
+                static_force: p.static_force as f32,
+                kinetic_force: p.kinetic_force as f32,
+                stiffness: p.stiffness as f32,
+                sliding_distance: p.sliding_distance as f32,
+            }])
+        }
         "friction" => {
             let p = model.effects.friction.unwrap_or_default();
             bytes_of(&[FrictionParams {
@@ -612,6 +639,8 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
                 _pad: 0.0,
             }])
         }
+        "centre_line" => zeros(1, size_of::<CentreLine>()),
+        "needle_loads" => zeros(CONTACT_PARTS as u64, 16),
         "indentation" => bytes_of(&[indentation_params(model)]),
         "cohesive" => bytes_of(&[cohesive_params(model)]),
         "face_pairs" => bytes_of(&face_pairs(model, layout)),
@@ -910,11 +939,13 @@ fn puncture_params(model: &Model) -> PunctureParams {
         let p = plan.params;
         // s0 depends on z alone, and an anchor acts on the two node planes around it.
         let mut segments = [[0.0; 4]; LARGEST_SEGMENT_COUNT];
+        let mut membranes = 0;
         let last = plan.segments.len() - 1;
         for (i, out) in segments.iter_mut().enumerate() {
             let s = plan.segments[i.min(last)];
             let c = s.cutting;
-            *out = [s.start as f32, c.puncture_force as f32, c.cutting_force as f32, 0.0];
+            *out = [s.start, c.puncture_force, c.cutting_force, s.transition_length].map(|x| x as f32);
+            membranes |= u32::from(s.membrane) << i;
         }
         let tallest = model.mesh.block().lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let mut anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
@@ -937,7 +968,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             path_cell_count = free.cell_count();
         }
         PunctureParams {
-            transition_length: p.transition_length as f32,
+            exit: plan.exit as f32,
             tip_stiffness: p.tip_stiffness as f32,
             residual_stiffness: p.residual_stiffness as f32,
             contact_stiffness: plan.contact_stiffness as f32,
@@ -949,6 +980,10 @@ fn puncture_params(model: &Model) -> PunctureParams {
             path_cell_count: path_cell_count as u32,
             softened_radius: p.softened_radius as f32,
             ring_radius: p.ring_radius as f32,
+            membranes,
+            rate_exponent: p.rate_exponent as f32,
+            reference_speed: p.reference_speed as f32,
+            exit_fade: p.transition_length as f32,
             shift: vec4(plan.profile.shift),
             edge_radius: plan.profile.bore.map_or(0.0, |b| b.edge as f32),
             bore_radius: plan.profile.bore.map_or(0.0, |b| b.radius as f32),
@@ -1138,6 +1173,17 @@ fn symmetric(q: &ViscousStress) -> DMat3 {
     DMat3::from_cols(DVec3::new(xx, xy, zx), DVec3::new(xy, yy, yz), DVec3::new(zx, yz, zz))
 }
 
+/// The centre-line of a frame in the layout of the shader.
+fn centre_line(line: &crate::needle::centre_line::CentreLine) -> CentreLine {
+    CentreLine {
+        per_length: (1.0 / line.spacing) as f32,
+        first_step: line.first_step as u32,
+        offset: line.offset.map(vec4),
+        rate: line.rate.map(vec4),
+        ..Zeroable::zeroed()
+    }
+}
+
 /// The input of step `number` in the layout of the shader.
 fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) -> StepInput {
     // Multiples of the golden ratio: any run of steps sees all offsets alike, so rounding errors cancel.
@@ -1189,6 +1235,9 @@ impl Engine for GpuEngine {
             let numbered = (plan.first_step..).zip(&plan.steps);
             let inputs: Vec<StepInput> = numbered.map(|(n, s)| step_input(s, n, self.dt)).collect();
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&inputs));
+        }
+        if let (Some(buffer), Some(line)) = (self.buffers.get("centre_line"), &plan.centre_line) {
+            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&centre_line(line)));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {
@@ -1256,7 +1305,11 @@ impl Engine for GpuEngine {
                 "node_velocity" => state.velocity = read_all::<[f32; 4]>(bytes).map(vector).collect(),
                 "cell_stiffness" => state.stiffness = read_all::<f32>(bytes).map(f64::from).collect(),
                 "tip_state" => {
-                    state.tip_coordinate = read_all::<TipState>(bytes).next().map_or(0.0, |t| t.coordinate.into());
+                    for tip in read_all::<TipState>(bytes) {
+                        state.tip_coordinate = tip.coordinate.into();
+                        state.bond =
+                            Bond { stretch: tip.bond_stretch.into(), slid: tip.bond_slid.into(), gap: tip.gap.into() };
+                    }
                 }
                 "free_tip" => {
                     for t in read_all::<FreeTip>(bytes) {
@@ -1335,7 +1388,13 @@ impl Engine for GpuEngine {
         write("node_velocity", bytemuck::cast_slice(&v));
         let stiffness: Vec<f32> = state.stiffness.iter().map(|s| *s as f32).collect();
         write("cell_stiffness", bytemuck::cast_slice(&stiffness));
-        let tip = TipState { coordinate: state.tip_coordinate as f32, ..TipState::zeroed() };
+        let tip = TipState {
+            coordinate: state.tip_coordinate as f32,
+            bond_stretch: state.bond.stretch as f32,
+            bond_slid: state.bond.slid as f32,
+            gap: state.bond.gap as f32,
+            ..TipState::zeroed()
+        };
         write("tip_state", bytemuck::bytes_of(&tip));
         write("free_tip", bytemuck::bytes_of(&free_tip(&state.tip)));
         write("free_cells", bytemuck::cast_slice(&free_cells(&self.model, &state.cut_samples)));

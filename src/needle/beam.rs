@@ -120,7 +120,8 @@ impl NodeSpring {
         NodeSpring { stiffness: (DMat3::IDENTITY - along) * k, anchor }
     }
 
-    fn force(&self, x: DVec3) -> DVec3 {
+    /// Force on a node at `x` [N].
+    pub fn force(&self, x: DVec3) -> DVec3 {
         self.stiffness * (self.anchor - x)
     }
 

@@ -28,7 +28,7 @@ pub fn force_columns() -> Vec<&'static str> {
 }
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 26] = [
+pub const ENERGY_COLUMNS: [&str; 28] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -39,10 +39,12 @@ pub const ENERGY_COLUMNS: [&str; 26] = [
     "friction_j",
     "cutting_j",
     "cohesive_j",
+    "adhesion_j",
     "plastic_j",
     "damage_j",
     "viscous_j",
     "contact_j",
+    "needle_j",
     "imbalance",
     "kinetic_to_internal",
     "hourglass_to_internal",
@@ -177,10 +179,12 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(e.friction),
         number(e.cutting),
         number(e.cohesive),
+        number(e.adhesion),
         number(e.plastic),
         number(e.damage),
         number(e.viscous),
         number(e.contact),
+        number(e.needle),
         number(e.imbalance()),
         number(kinetic_to_internal(e)),
         number(hourglass_to_internal(e)),

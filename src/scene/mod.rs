@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use motion::{Motion, Phase};
+pub use motion::{Motion, Phase, Vibration};
 
 use crate::effects::{self, EffectSet};
 use crate::material::ElasticLaw;
@@ -119,6 +119,8 @@ pub struct TissueMaterial {
     pub damage: Option<effects::damage::Params>,
     /// Tip forces in this material; `None`: those of the scene's puncture table.
     pub cutting: Option<Cutting>,
+    /// A membrane: energy that puncturing this layer takes beyond cutting through it [J].
+    pub membrane_energy: Option<f64>,
 }
 
 impl TissueMaterial {
@@ -134,6 +136,7 @@ impl TissueMaterial {
             viscoelastic: None,
             damage: None,
             cutting: None,
+            membrane_energy: None,
         }
     }
 }
@@ -301,7 +304,7 @@ pub enum Tool {
     },
 }
 
-/// A rigid solid needle: a cylinder with a straight or oblique conical tip.
+/// A needle, solid to the tissue: a cylinder with a straight or oblique conical tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeedleShape {
     /// What the user calls it, e.g. `16G`.
@@ -314,8 +317,15 @@ pub struct NeedleShape {
     pub tip: TipShape,
     /// What makes it hollow.
     pub bore: Option<BoreShape>,
-    /// Name of the needle material (rigid here; kept for reports).
+    /// Name of the needle material.
     pub material: String,
+    /// Young's modulus [Pa] and density [kg/m^3] of the material, and diameter of the bore [m] (0: solid): how a flexible
+    /// needle bends.
+    pub youngs_modulus: f64,
+    pub density: f64,
+    pub inner_diameter: f64,
+    /// Length from the tip to the hub [m]; with the density it gives the mass.
+    pub length: f64,
 }
 
 /// The inside of a hollow needle.
@@ -350,7 +360,12 @@ impl NeedleShape {
         self.radius / self.tip_length
     }
 
-    /// A needle with a conical tip, of steel. Lengths in m.
+    /// Mass of a solid cylinder [kg]; the missing part of the tip does not count.
+    pub fn mass(&self) -> f64 {
+        std::f64::consts::PI * self.radius.powi(2) * self.length * self.density
+    }
+
+    /// A needle with a conical tip, of steel, 100 mm long. Lengths in m.
     pub fn cone(name: &str, radius: f64, tip_length: f64) -> Self {
         NeedleShape {
             name: name.into(),
@@ -359,6 +374,10 @@ impl NeedleShape {
             tip: TipShape::Cone,
             bore: None,
             material: "steel-304".into(),
+            youngs_modulus: 193e9,
+            density: 7900.0,
+            inner_diameter: 0.0,
+            length: 0.1,
         }
     }
 }

@@ -4,6 +4,8 @@ use super::super::file::*;
 use super::super::{FaceCondition, Motion, NeedleShape, TissueMaterial, Tool};
 use super::{Check, MM, Within, parameters};
 use crate::effects::{self, EFFECTS, EffectSet};
+use crate::material::four_digits;
+use crate::needle::beam::{BeamParams, Section};
 
 impl Check<'_> {
     pub(super) fn effects(
@@ -53,6 +55,22 @@ impl Check<'_> {
                 "add [needle], [sphere] or [flat_punch], or remove the effect",
             );
         }
+        if listed("flexible_needle") && !(is_needle && listed("puncture")) {
+            self.problems.report(
+                &place("flexible_needle"),
+                "effect `flexible_needle` needs a needle and the effect `puncture`",
+                "nothing bends the needle",
+                "add [needle] and \"puncture\" to the list `effects`, or remove the effect",
+            );
+        }
+        if listed("adhesion") && !listed("puncture") {
+            self.problems.report(
+                &place("adhesion"),
+                "effect `adhesion` needs `puncture`: tissue sticks to a tip that is in it",
+                "nothing enters the tissue",
+                "add \"puncture\" to the list `effects`, or remove \"adhesion\"",
+            );
+        }
         if listed("damage") && !listed("plasticity") {
             self.problems.report(
                 &place("damage"),
@@ -77,7 +95,9 @@ impl Check<'_> {
         for (key, present) in [
             ("puncture", file.puncture.is_some()),
             ("cohesive", file.cohesive.is_some()),
+            ("adhesion", file.adhesion.is_some()),
             ("friction", file.friction.is_some()),
+            ("flexible_needle", file.flexible_needle.is_some()),
             ("indentation", file.indentation.is_some()),
             ("gravity", file.gravity.is_some()),
             ("plasticity", file.plasticity.is_some()),
@@ -120,8 +140,22 @@ impl Check<'_> {
                 "add \"cohesive\" to the list `effects`, or remove bore_diameter_mm",
             );
         }
+        let adhesion = self.adhesion(&file.adhesion.clone().unwrap_or_default());
         let friction = self.friction(&file.friction.clone().unwrap_or_default());
         let indentation = self.indentation(&file.indentation.clone().unwrap_or_default());
+        if listed("flexible_needle") && (motion.is_free() || puncture.always_free) {
+            self.problems.report(
+                &place("flexible_needle"),
+                "a flexible needle keeps to its planned path",
+                "with a free motion or puncture.path = \"free\"",
+                "move along one straight line, or remove the effect",
+            );
+        }
+        let flexible = listed("flexible_needle").then(|| {
+            let weight =
+                if listed("gravity") { file.gravity.clone().unwrap_or_default() } else { GravityTable::none() };
+            self.flexible_needle(&file.flexible_needle.clone().unwrap_or_default(), tool, motion, &weight)
+        });
         let acceleration = file.gravity.as_ref().and_then(|table| table.acceleration_m_s2);
         let gravity = effects::gravity::Params {
             acceleration: self.vector("gravity.acceleration_m_s2", acceleration.unwrap_or([0.0, 0.0, -9.81]), 1000.0),
@@ -149,8 +183,71 @@ impl Check<'_> {
             }),
             cohesive: listed("cohesive").then_some(cohesive),
             puncture: listed("puncture").then_some(puncture),
+            adhesion: listed("adhesion").then_some(adhesion),
             indentation: listed("indentation").then_some(indentation),
             friction: listed("friction").then_some(friction),
+            flexible_needle: flexible,
+        }
+    }
+
+    fn flexible_needle(
+        &mut self,
+        table: &FlexibleNeedleTable,
+        tool: &Option<Tool>,
+        motion: &Motion,
+        weight: &GravityTable,
+    ) -> effects::flexible_needle::Params {
+        let default = effects::flexible_needle::Params::default();
+        // Reported above where there is none.
+        let Some(Tool::Needle(needle)) = tool else { return default };
+        let at = |key: &str| format!("flexible_needle.{key}");
+        let length = self.optional(
+            &at("free_length_mm"),
+            table.free_length_mm,
+            MM,
+            default.beam.length,
+            Within::Between(5.0, 500.0),
+        );
+        if length <= motion.deepest() {
+            self.problems.report(
+                &if table.free_length_mm.is_some() { at("free_length_mm") } else { "flexible_needle".into() },
+                format!(
+                    "the needle is {} mm long and goes {} mm deep: its hub would enter the tissue",
+                    length / MM,
+                    motion.deepest() / MM
+                ),
+                "longer than the deepest insertion",
+                format!("write free_length_mm above {}", motion.deepest() / MM),
+            );
+        }
+        let outer_diameter = 2.0 * needle.radius;
+        let inner_diameter = self.optional(
+            &at("inner_diameter_mm"),
+            table.inner_diameter_mm,
+            MM,
+            needle.inner_diameter,
+            Within::NotNegative(20.0),
+        );
+        if inner_diameter > 0.98 * outer_diameter {
+            self.problems.report(
+                &at("inner_diameter_mm"),
+                format!("the bore of {} mm leaves no wall of {} mm", inner_diameter / MM, outer_diameter / MM),
+                "at most 0.98 of the outer diameter",
+                "write the inner diameter of the tube, or 0 for a solid needle",
+            );
+        }
+        let elements = table.elements.map_or(default.beam.elements as f64, f64::from);
+        let elements = self.number(&at("elements"), elements, Within::Between(4.0, 200.0));
+        let acceleration = table.gravity_m_s2.or(weight.acceleration_m_s2).unwrap_or([0.0, 0.0, -9.81]);
+        effects::flexible_needle::Params {
+            beam: BeamParams {
+                length,
+                elements: elements as usize,
+                section: Section { outer_diameter, inner_diameter },
+                youngs_modulus: needle.youngs_modulus,
+                density: needle.density,
+            },
+            gravity: self.vector(&at("gravity_m_s2"), acceleration, 1000.0),
         }
     }
 
@@ -236,6 +333,14 @@ impl Check<'_> {
             ),
             entry_fade: self.optional(&at("entry_fade_mm"), t.entry_fade_mm, MM, d.entry_fade, Positive(100.0)),
             always_free: t.path == Some(PathWord::Free),
+            rate_exponent: self.optional(&at("rate_exponent"), t.rate_exponent, 1.0, d.rate_exponent, NotNegative(1.0)),
+            reference_speed: self.optional(
+                &at("reference_speed_mm_s"),
+                t.reference_speed_mm_s,
+                MM,
+                d.reference_speed,
+                Between(1e-3, 1e3),
+            ),
         };
         if params.softened_radius >= params.ring_radius {
             let key = if t.softened_radius_mm.is_some() { "softened_radius_mm" } else { "ring_radius_mm" };
@@ -354,6 +459,57 @@ impl Check<'_> {
                 "turn the azimuth to 0 or 90 degrees, or remove \"cohesive\" (the path then opens by softening)",
             );
         }
+    }
+
+    fn adhesion(&mut self, t: &AdhesionTable) -> effects::adhesion::Params {
+        use Within::{NotNegative, Positive};
+        let d = effects::adhesion::Params::default();
+        let at = |key: &str| format!("adhesion.{key}");
+        let params = effects::adhesion::Params {
+            static_force: self.optional(&at("static_force_n"), t.static_force_n, 1.0, d.static_force, Positive(100.0)),
+            kinetic_force: self.optional(
+                &at("kinetic_force_n"),
+                t.kinetic_force_n,
+                1.0,
+                d.kinetic_force,
+                NotNegative(100.0),
+            ),
+            stiffness: self.optional(&at("stiffness_n_mm"), t.stiffness_n_mm, 1e3, d.stiffness, Positive(1e4)),
+            sliding_distance: self.optional(
+                &at("sliding_distance_mm"),
+                t.sliding_distance_mm,
+                MM,
+                d.sliding_distance,
+                Positive(100.0),
+            ),
+        };
+        let (fall, key) = (params.static_force - params.kinetic_force, |written: bool, key| {
+            if written { format!("adhesion.{key}") } else { "adhesion".to_string() }
+        });
+        if fall < 0.0 {
+            self.problems.report(
+                &key(t.kinetic_force_n.is_some(), "kinetic_force_n"),
+                format!(
+                    "the kinetic force {} N is above the static one, {} N",
+                    params.kinetic_force, params.static_force
+                ),
+                "nothing lets go",
+                "write a kinetic_force_n below static_force_n, e.g. 0.05 and 0.25",
+            );
+        } else if params.stiffness * params.sliding_distance <= fall {
+            self.problems.report(
+                &key(t.sliding_distance_mm.is_some(), "sliding_distance_mm"),
+                format!(
+                    "the bond of {} N/mm snaps back: its force falls by {} N within {} mm",
+                    params.stiffness * 1e-3,
+                    four_digits(fall),
+                    params.sliding_distance / MM
+                ),
+                "must be above (static_force_n - kinetic_force_n)/stiffness_n_mm",
+                format!("write a sliding_distance_mm above {}", four_digits(fall / params.stiffness / MM)),
+            );
+        }
+        params
     }
 
     fn friction(&mut self, table: &FrictionTable) -> effects::friction::Params {

@@ -15,10 +15,12 @@ use rayon::prelude::*;
 
 use super::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
+use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::ToolPose;
+use crate::needle::centre_line::CentreLine;
 use crate::scene::Face;
 
 /// Sums of one contact node over one step.
@@ -28,6 +30,8 @@ struct ContactSums {
     tip: DVec3,
     normal: DVec3,
     friction: DVec3,
+    /// The normal force acts on the shaft of a needle.
+    on_shaft: bool,
     /// Torque about the tip [N m].
     torque: DVec3,
     friction_work: f64,
@@ -53,6 +57,10 @@ pub struct CpuEngine {
     contact_energy: f64,
     /// Plastic and damage dissipation that earlier frames have told [J].
     booked: (f64, f64),
+    /// Centre-line of a flexible needle in the frame under way.
+    centre_line: Option<CentreLine>,
+    /// Impulse of that frame on each contact node [N s]; used with a centre-line only.
+    node_impulse: Vec<DVec3>,
     finished: std::collections::VecDeque<FrameSums>,
     sums: FrameSums,
 }
@@ -69,6 +77,7 @@ impl CpuEngine {
             tip_coordinate: 0.0,
             tip: model.free_tip(),
             cut_samples: vec![0; model.puncture.as_ref().and_then(|p| p.free.as_ref()).map_or(0, |f| f.cell_count())],
+            bond: Bond::default(),
             contact: vec![ContactState::default(); model.contact_nodes.len()],
             pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
@@ -97,6 +106,8 @@ impl CpuEngine {
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
             booked: (0.0, 0.0),
+            centre_line: None,
+            node_impulse: vec![DVec3::ZERO; model.contact_nodes.len()],
             finished: Default::default(),
             sums: FrameSums::default(),
             model,
@@ -123,7 +134,7 @@ impl CpuEngine {
         self.added_bound.fill(0.0);
         self.cohesive_forces();
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
-            self.needle_contact(plan, &pose);
+            self.needle_contact(plan, &pose, input.step);
         }
         if let (Some(_), Some(pose)) = (model.effects.indentation, input.pose) {
             self.indenter_contact(&pose);
@@ -294,6 +305,9 @@ impl FrameSums {
         let total = c.tip + c.normal + c.friction;
         self.cutting_impulse += c.tip.dot(pose.direction) * dt;
         self.spreading_impulse += c.normal.dot(pose.direction) * dt;
+        if c.on_shaft {
+            self.shaft_impulse += c.normal.dot(pose.direction) * dt;
+        }
         self.friction_impulse += c.friction.dot(pose.direction) * dt;
         self.impulse += total * dt;
         self.angular_impulse += c.torque * dt;
@@ -342,8 +356,12 @@ impl Engine for CpuEngine {
 
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {
         self.sums = FrameSums { frame: plan.frame, steps: plan.steps.len() as u32, ..Default::default() };
+        self.centre_line = plan.centre_line;
         for input in &plan.steps {
             self.step(input);
+        }
+        if let Some(pose) = plan.steps.last().and_then(|s| s.pose) {
+            self.share_needle_loads(&pose);
         }
         self.measure();
         self.finished.push_back(self.sums);

@@ -4,7 +4,8 @@ use glam::DVec3;
 
 use super::{ContactSums, CpuEngine};
 use crate::model::{ContactSurface, PuncturePlan};
-use crate::needle::free_path::{FreeTip, PASSED_MARGIN, WATCHED};
+use crate::needle::centre_line::Bend;
+use crate::needle::free_path::{END_FADE, FreeTip, PASSED_MARGIN, WATCHED, faded_at_end};
 use crate::needle::gap::{Overlap, Profile};
 use crate::needle::{ToolPose, swing};
 use crate::solver::engine::ContactState;
@@ -12,7 +13,7 @@ use crate::solver::engine::ContactState;
 impl CpuEngine {
     /// Stage `needle_contact`: nodes of the ring that the tip has passed stay outside the opened path (potential
     /// `1/2 k phi^2`, see `needle::gap`); friction on the shaft; tip springs.
-    pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
+    pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
         let d = -pose.direction;
         let k = plan.contact_stiffness;
@@ -22,13 +23,14 @@ impl CpuEngine {
         let tip = self.state.tip;
         let cone = profile.tip_length;
         let mut stored = self.tip_energy;
+        let line = self.centre_line;
         let mut tip_on_node: std::collections::HashMap<usize, DVec3> = Default::default();
         for (force, nodes, weights) in &self.tip_forces {
             for (n, w) in nodes.iter().zip(weights) {
                 *tip_on_node.entry(*n).or_default() += (pose.direction * *force + self.tip_sway) * *w;
             }
         }
-        for (contact, memory) in model.contact_nodes.iter().zip(&mut self.state.contact) {
+        for (index, (contact, memory)) in model.contact_nodes.iter().zip(&mut self.state.contact).enumerate() {
             let node = contact.node as usize;
             let x = model.mesh.rest_position(node) + self.state.displacement[node];
             let mut sums = ContactSums::default();
@@ -37,19 +39,21 @@ impl CpuEngine {
             }
             let relative = x - pose.tip;
             let s = relative.dot(d);
-            let (passed, rest_radius) = match &plan.free {
-                None => (contact.pushed && contact.rest_axial < a, contact.rest_radius),
-                Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, relative, s, d),
+            let bend = line.map_or(Bend::default(), |l| l.at(s, (step - l.first_step) as f64 * self.dt));
+            let from_axis = relative - bend.offset;
+            let (touches, rest_radius, end) = match &plan.free {
+                None => (contact.pushed && contact.rest_axial < a && s > 0.0, contact.rest_radius, 0.0),
+                Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, from_axis, s, d),
             };
-            if !(passed && s > 0.0) {
+            if !touches {
                 *memory =
                     ContactState { rest_radius: memory.rest_radius, passed: memory.passed, ..ContactState::default() };
             } else {
                 let overlap = |less: (f64, f64)| match contact.surface {
-                    ContactSurface::OpenedPath => profile.opened_path(relative, d, rest_radius, less),
-                    ContactSurface::Slit { side } => profile.slit_face(relative, d, side, less),
-                    ContactSurface::OuterWall => profile.tube_wall(relative, d, false, less),
-                    ContactSurface::Bore => profile.tube_wall(relative, d, true, less),
+                    ContactSurface::OpenedPath => profile.opened_path(from_axis, d, rest_radius, less),
+                    ContactSurface::Slit { side } => profile.slit_face(from_axis, d, side, less),
+                    ContactSurface::OuterWall => profile.tube_wall(from_axis, d, false, less),
+                    ContactSurface::Bore => profile.tube_wall(from_axis, d, true, less),
                 };
                 let free = overlap((0.0, 0.0));
                 if !memory.touching {
@@ -60,16 +64,22 @@ impl CpuEngine {
                 let travel = (s - memory.axial_on) / plan.params.entry_fade;
                 let fading = if travel > 0.0 && travel < 1.0 { -memory.overlap / plan.params.entry_fade } else { 0.0 };
                 let less = (memory.overlap * (1.0 - travel).clamp(0.0, 1.0), fading);
-                let Overlap { value: depth, gradient } = overlap(less);
+                let mut overlap = overlap(less);
+                if plan.free.is_some() {
+                    overlap = faded_at_end(overlap, d, s, end, END_FADE * cone);
+                }
+                let Overlap { value: depth, gradient } = overlap;
+                let gradient = gradient - d * gradient.dot(bend.slope);
                 let steep = gradient.length();
                 let n = -gradient / steep;
-                let v = self.state.velocity[node] - pose.velocity - pose.angular_velocity.cross(relative);
+                let v = self.state.velocity[node] - pose.velocity - pose.angular_velocity.cross(relative) - bend.rate;
                 let vn = v.dot(n);
                 let mass = model.node_mass[node];
                 let damping = 2.0 * plan.params.contact_damping * (k * mass).sqrt();
                 let elastic = k * depth * steep;
                 let normal = if depth > 0.0 { (elastic - damping * vn).max(0.0) } else { 0.0 };
                 sums.normal = n * normal;
+                sums.on_shaft = s >= cone;
                 if depth > 0.0 {
                     sums.stored = 0.5 * k * depth * depth;
                     sums.damping_power = (elastic - normal) * vn;
@@ -106,13 +116,27 @@ impl CpuEngine {
             self.external[node] += total;
             stored += sums.stored;
             self.sums.book(&sums, pose, self.dt);
+            if line.is_some() {
+                self.sums.tool_work += total.dot(bend.rate) * self.dt;
+                self.node_impulse[index] += total * self.dt;
+            }
         }
         self.contact_energy = stored;
     }
+
+    /// Shares the impulses of the frame over the entries of the centre-line, by where the nodes are at its end.
+    pub(super) fn share_needle_loads(&mut self, pose: &ToolPose) {
+        let Some(line) = self.centre_line else { return };
+        for (contact, impulse) in self.model.contact_nodes.iter().zip(&mut self.node_impulse) {
+            let node = contact.node as usize;
+            let x = self.model.mesh.rest_position(node) + self.state.displacement[node];
+            line.share(&mut self.sums.needle_loads, (pose.tip - x).dot(pose.direction), std::mem::take(impulse));
+        }
+    }
 }
 
-/// On a free path: brings what the node knows of the tip to this step, and tells whether it is to be kept out of the needle
-/// and with which r0 [m]. `lever` from the tip, `s` behind it along `d`.
+/// On a free path: brings what the node knows of the tip to this step, and tells whether it is to be kept out of the
+/// needle, with which r0 [m], and the front end [m] of what it touches. `lever` from the tip, `s` behind it along `d`.
 fn free_contact(
     plan: &PuncturePlan,
     tip: &FreeTip,
@@ -121,13 +145,14 @@ fn free_contact(
     lever: DVec3,
     s: f64,
     d: DVec3,
-) -> (bool, f64) {
+) -> (bool, f64, f64) {
     let ring = plan.params.ring_radius;
     let relative = rest - tip.place;
     let ahead = relative.dot(tip.along);
     let radius = (relative - tip.along * ahead).length();
-    let passes = ahead <= 0.0 && ahead > -ring && radius < ring;
-    let passed = tip.inside && if memory.passed { ahead < PASSED_MARGIN } else { passes };
+    // The dimple before the puncture is no opened path.
+    let passes = tip.coordinate > 0.0 && ahead <= 0.0 && ahead > -ring && radius < ring;
+    let passed = tip.inside && if memory.passed { ahead <= 0.0 || s > -PASSED_MARGIN } else { passes };
     if passed != memory.passed {
         *memory = ContactState { passed, rest_radius: if passed { radius } else { 0.0 }, ..ContactState::default() };
     }
@@ -135,5 +160,6 @@ fn free_contact(
     // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.
     let reach = WATCHED * needle.radius;
     let met = tip.inside && !passed && s > needle.tip_length && (lever - d * s).length_squared() < reach * reach;
-    (met || (passed && memory.rest_radius > plan.params.softened_radius), memory.rest_radius)
+    let in_ring = passed && s > 0.0 && memory.rest_radius > plan.params.softened_radius;
+    (met || in_ring, memory.rest_radius, if met { needle.tip_length } else { 0.0 })
 }
