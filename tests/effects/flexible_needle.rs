@@ -9,7 +9,7 @@ use stylet::model::Model;
 use stylet::needle::centre_line::{CentreLine, ENTRY_COUNT};
 use stylet::observables::FrameRecord;
 use stylet::scene::{Motion, NeedleShape, Phase, Scene, TipShape, Tool, Vibration};
-use stylet::solver::engine::{Engine, FramePlan, FrameSums, StepInput};
+use stylet::solver::engine::{FramePlan, FrameSums, StepInput};
 use stylet::solver::simulation::{EngineChoice, Simulation};
 
 use crate::common::*;
