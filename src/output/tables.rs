@@ -28,7 +28,7 @@ pub fn force_columns() -> Vec<&'static str> {
 }
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 26] = [
+pub const ENERGY_COLUMNS: [&str; 27] = [
     "time_s",
     "depth_m",
     "external_work_j",
