@@ -68,6 +68,10 @@ pub struct PathSegment {
     /// Material coordinate at which it begins [m].
     pub start: f64,
     pub cutting: Cutting,
+    /// Length over which the threshold falls from F_pun to F_cut [m].
+    pub transition_length: f64,
+    /// A layer with a puncture energy of its own.
+    pub membrane: bool,
 }
 
 /// Most materials of one scene; the last index is that of the last region.
@@ -78,12 +82,18 @@ pub const LARGEST_SEGMENT_COUNT: usize = 16;
 
 impl PuncturePlan {
     /// Tip force at which the tip advances at the coordinate a [N]: from F_pun of the material that it enters down to
-    /// F_cut over the transition length.
+    /// F_cut over the transition length; over the last transition length before the bottom it fades to nothing, since a spring
+    /// that ended at once would throw the tissue back.
     pub fn threshold(&self, a: f64) -> f64 {
-        let after = self.segments.partition_point(|s| s.start <= a).max(1) - 1;
-        let PathSegment { start, cutting } = self.segments[after];
-        let entry = (1.0 - (a - start) / self.params.transition_length).max(0.0);
-        cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * entry
+        let PathSegment { start, cutting, transition_length, .. } = self.segment(a);
+        let entry = (1.0 - (a - start) / transition_length).max(0.0);
+        let left = ((self.exit - a) / self.params.transition_length).clamp(0.0, 1.0);
+        (cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * entry) * left
+    }
+
+    /// The stretch of the path at the coordinate a [m].
+    pub fn segment(&self, a: f64) -> PathSegment {
+        self.segments[self.segments.partition_point(|s| s.start <= a).max(1) - 1]
     }
 }
 
@@ -98,6 +108,8 @@ pub struct PuncturePlan {
     pub profile: Profile,
     pub path: PlannedPath,
     pub anchors: Vec<TipAnchor>,
+    /// Material coordinate at which the path leaves the block through the bottom [m].
+    pub exit: f64,
     pub cells: Vec<PathCell>,
     /// Contact stiffness k [N/m].
     pub contact_stiffness: f64,
@@ -315,6 +327,7 @@ impl Model {
             (Some(_), None) => Vec::new(),
             (None, _) => path_cells(mesh, &path, params.softened_radius, deepest),
         };
+        let exit = self.scene.tissue.size.z / -path.direction.z;
         let surfaces = self.separated_surfaces(&path);
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the needle radius.
         let anchor_reach = needle.radius + self.scene.tissue.cell_size * 1.5;
@@ -336,7 +349,8 @@ impl Model {
             })
             .collect();
         self.puncture = Some(PuncturePlan {
-            segments: path_segments(&self.scene, &params, &path, deepest),
+            segments: path_segments(&self.scene, &params, &path, exit),
+            exit,
             anchors: tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
             cells,
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
@@ -392,7 +406,13 @@ impl Model {
         let path = PlannedPath { entry: motion.entry, direction: motion.direction };
         self.puncture = Some(PuncturePlan {
             free: Some(FreePlan { low, count, cuttings: cuttings.map(cutting).collect() }),
-            segments: vec![PathSegment { start: 0.0, cutting: cutting(&self.scene.material) }],
+            segments: vec![PathSegment {
+                start: 0.0,
+                cutting: cutting(&self.scene.material),
+                transition_length: params.transition_length,
+                membrane: false,
+            }],
+            exit: f64::INFINITY,
             anchors: Vec::new(),
             cells: Vec::new(),
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
@@ -597,25 +617,37 @@ fn node_flags(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
     flags
 }
 
-/// Stretches of the path with their own tip forces, from the materials that its axis passes through.
-fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, deepest: f64) -> Vec<PathSegment> {
+/// Stretches of the path with their own tip forces, from the materials that its axis passes through on its way to the
+/// bottom at `exit` [m].
+fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, exit: f64) -> Vec<PathSegment> {
     const STEP: f64 = 2.0e-5;
     let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
-    let at = |a: f64| {
-        let x = path.entry + path.direction * a;
-        let region = scene.regions.iter().rposition(|r| r.shape.contains(x));
-        (region, region.map_or(scene.material.cutting, |r| scene.regions[r].material.cutting).unwrap_or(own))
-    };
-    let mut segments: Vec<(Option<usize>, PathSegment)> = Vec::new();
-    for i in 0..=(deepest / STEP).ceil() as usize {
+    let mut starts: Vec<(f64, Option<usize>)> = Vec::new();
+    for i in 0..(exit / STEP).ceil().max(1.0) as usize {
         // The surface itself belongs to what lies under it.
         let a = i as f64 * STEP;
-        let (region, cutting) = at(a + 0.5 * STEP);
-        if segments.last().is_none_or(|(last, _)| *last != region) {
-            segments.push((region, PathSegment { start: a, cutting }));
+        let x = path.entry + path.direction * (a + 0.5 * STEP);
+        let region = scene.regions.iter().rposition(|r| r.shape.contains(x));
+        if starts.last().is_none_or(|(_, last)| *last != region) {
+            starts.push((a, region));
         }
     }
-    segments.into_iter().map(|s| s.1).take(LARGEST_SEGMENT_COUNT).collect()
+    let ends = starts.iter().skip(1).map(|s| s.0).chain([exit]);
+    starts
+        .iter()
+        .zip(ends)
+        .take(LARGEST_SEGMENT_COUNT)
+        .map(|(&(start, region), end)| {
+            let material = region.map_or(&scene.material, |r| &scene.regions[r].material);
+            let mut cutting = material.cutting.unwrap_or(own);
+            let mut transition_length = params.transition_length;
+            if let Some(energy) = material.membrane_energy {
+                transition_length = transition_length.min(end - start);
+                cutting.puncture_force = cutting.cutting_force + 2.0 * energy / transition_length;
+            }
+            PathSegment { start, cutting, transition_length, membrane: material.membrane_energy.is_some() }
+        })
+        .collect()
 }
 
 /// Lines on which the tip springs are anchored: one on the axis, 6 at R/2, 12 at R. Before a slit none lies on its plane,

@@ -10,12 +10,14 @@ use stylet::effects::EffectSet;
 use stylet::material::ElasticLaw;
 use stylet::mesh::{BlockMesh, Mesh};
 use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord, Health};
-use stylet::output::folder::{ENERGY_TABLE, FORCE_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY};
+use stylet::output::folder::{
+    ENERGY_TABLE, FORCE_CHART, FORCE_PARTS_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY,
+};
 use stylet::output::sample::{Motion as FaceMotion, SAMPLE_COLUMNS};
 use stylet::output::tables::{ENERGY_COLUMNS, force_columns};
 use stylet::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Status, Summary, Tables, write_force_chart,
-    write_sample_chart,
+    write_parts_chart, write_sample_chart,
 };
 use stylet::render::{self, Image, Picture, offscreen, raster};
 use stylet::scene::{
@@ -61,10 +63,12 @@ fn records() -> Vec<FrameRecord> {
                 force: ForceParts {
                     axial: cutting + spreading + friction,
                     cutting,
-                    spreading,
+                    tip_spreading: 0.25 * spreading,
+                    shaft_spreading: 0.75 * spreading,
                     friction,
                     lateral: DVec3::new(0.01, -0.02, 0.0),
                     torque: DVec3::new(1e-5, 0.0, 2e-6),
+                    ..Default::default()
                 },
                 tip_coordinate: depth - 0.5e-3,
                 energy: EnergyAccount {
@@ -227,6 +231,7 @@ fn a_named_folder_is_made_and_not_reused() {
         "energy.csv",
         "summary.json",
         "force.svg",
+        "force_parts.svg",
         "sample.csv",
         "sample.svg",
         "frames.pvd",
@@ -565,6 +570,36 @@ fn charts_are_well_formed() {
             assert!(text.contains("depth of the tip [mm]"));
             let label = format!("puncture {:.2} N at", figures.puncture_force.unwrap());
             assert!(text.contains(&label));
+        }
+    }
+}
+
+#[test]
+fn parts_of_the_force_add_up_in_tables_and_charts() {
+    let base = kept("charts");
+    fs::create_dir_all(&base).unwrap();
+    let all = records();
+    for record in &all {
+        let sum: f64 = ForceParts::PARTS.iter().map(|part| (part.of)(&record.force)).sum();
+        assert!((sum - record.force.axial).abs() < 1e-12);
+    }
+    for part in ForceParts::PARTS {
+        assert!(force_columns().contains(&part.column), "{}", part.column);
+    }
+    let mut broken = all.clone();
+    broken[50].force.friction = f64::NAN;
+    for (name, records, abscissa) in [
+        (FORCE_PARTS_CHART, &all[..], "time [s]"),
+        ("parts_inward.svg", &all[..150], "depth of the tip [mm]"),
+        ("parts_broken.svg", &broken[..], "time [s]"),
+        ("parts_empty.svg", &[], "time [s]"),
+    ] {
+        write_parts_chart(&base.join(name), "Parts <of> the force", records).unwrap();
+        let text = fs::read_to_string(base.join(name)).unwrap();
+        assert_well_formed(&text);
+        assert!(!text.contains("NaN") && text.contains(abscissa), "{name}");
+        for part in ForceParts::PARTS {
+            assert!(text.contains(part.name), "{name}: {}", part.name);
         }
     }
 }

@@ -52,6 +52,8 @@ const LOOK_AHEAD: f32 = 1.05;
 const PASSED_MARGIN: f32 = 0.05e-3;
 const WATCHED: f32 = 1.5;
 const SLIP_CAP: f32 = 13e-6;
+const SOFTENING_RATE: f32 = 1.5;
+const END_FADE: f32 = 0.25;
 
 // Place of an anchor in the tip's plane, along `across` and along T x `across` [m].
 fn anchor_offset(anchor: u32) -> vec2<f32> {
@@ -75,4 +77,12 @@ fn pulled_back(fx: vec3<f32>, fy: vec3<f32>, fz: vec3<f32>, v: vec3<f32>) -> vec
     let j = dot(fx, cx);
     let back = vec3<f32>(dot(cx, v), dot(cross(fz, fx), v), dot(cross(fx, fy), v));
     return select(v, back / select(1.0, j, j > 0.02), j > 0.02);
+}
+
+// The overlap of a node at `s` behind the tip, faded behind the front end of what it touches; `d` is the gradient of s.
+fn faded_at_end(overlap: Overlap, d: vec3<f32>, s: f32, end: f32) -> Overlap {
+    let length = END_FADE * puncture.tip_length;
+    let part = min((s - end) / length, 1.0);
+    let slope = select(0.0, 1.0 / length, part < 1.0);
+    return Overlap(overlap.value * part, overlap.gradient * part + d * (overlap.value * slope));
 }

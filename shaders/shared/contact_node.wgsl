@@ -57,7 +57,8 @@ struct ContactSums {
     damping_dissipation: f32,
     // Stored in the springs of this node at the last step [J].
     stored: f32,
-    _pad: f32,
+    // The part of `spreading` on the shaft of a needle [N s].
+    shaft: f32,
 }
 
 @group(1) @binding(4) var<storage, read> contact_nodes: array<ContactNode>;

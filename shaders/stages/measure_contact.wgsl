@@ -48,6 +48,7 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
         total.sliding_dissipation += sums.sliding_dissipation;
         total.damping_dissipation += sums.damping_dissipation;
         total.stored += sums.stored;
+        total.shaft += sums.shaft;
         contact_sums[index] = ContactSums();
     }
     contact_totals[lane] = total;
@@ -71,6 +72,9 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
     if (lane == 0u) {
         tip_result = tip_state;
         tip_state.dissipation = 0.0;
+        tip_state.membrane_impulse = 0.0;
+        tip_state.bond_impulse = 0.0;
+        tip_state.bond_dissipation = 0.0;
         for (var index = 0u; index < puncture.path_cell_count; index++) {
             tip_result.softening += path_cells[index].dissipation;
             path_cells[index].dissipation = 0.0;

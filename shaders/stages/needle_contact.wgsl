@@ -35,16 +35,24 @@ fn tip_share(grid: vec3<u32>, rest: vec3<f32>) -> vec3<f32> {
     return force;
 }
 
-// Brings what node `index` knows of the tip to this step. Returns whether it is to be kept out of the needle, and its r0.
-fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> vec2<f32> {
+struct FreeContact {
+    // Whether the node is to be kept out of the needle, its r0 and the front end of what it touches [m].
+    touches: bool,
+    rest_radius: f32,
+    end: f32,
+}
+
+// Brings what node `index` knows of the tip to this step.
+fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> FreeContact {
     let T = free_tip.along.xyz;
     let relative = rest - free_tip.place.xyz;
     let ahead = dot(relative, T);
     let radius = length(relative - T * ahead);
     let ring = puncture.ring_radius;
     let old = contact_memory[index].passed == 1.0;
-    let passes = ahead <= 0.0 && ahead > -ring && radius < ring;
-    let passed = free_tip.inside == 1.0 && select(passes, ahead < PASSED_MARGIN, old);
+    // The dimple before the puncture is no opened path.
+    let passes = free_tip.coordinate > 0.0 && ahead <= 0.0 && ahead > -ring && radius < ring;
+    let passed = free_tip.inside == 1.0 && select(passes, ahead <= 0.0 || s > -PASSED_MARGIN, old);
     for (var once = select(1u, 0u, passed != old); once == 0u; once++) {
         var fresh = ContactMemory();
         fresh.passed = select(0.0, 1.0, passed);
@@ -55,8 +63,8 @@ fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> vec2<f
     // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.
     let reach = WATCHED * puncture.needle_radius;
     let met = free_tip.inside == 1.0 && !passed && s > puncture.tip_length && dot(lever, lever) - s * s < reach * reach;
-    let kept_out = met || (passed && rest_radius > puncture.softened_radius);
-    return vec2<f32>(select(0.0, 1.0, kept_out), rest_radius);
+    let in_ring = passed && s > 0.0 && rest_radius > puncture.softened_radius;
+    return FreeContact(met || in_ring, rest_radius, select(0.0, puncture.tip_length, met));
 }
 #else
 // Share of the tip springs that acts on a grid node, along the insertion direction [N]. The loop is empty for nodes
@@ -117,8 +125,8 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
 #ifdef FREE_PATH
     let tip = tip_share(contact.grid.xyz, contact.rest.xyz);
     let met = free_contact(index, contact.rest.xyz, from_axis, s);
-    let passed = met.x == 1.0 && s > 0.0;
-    let rest_radius = met.y;
+    let passed = met.touches;
+    let rest_radius = met.rest_radius;
 #else
     let tip = step_input.direction.xyz * tip_share(contact.grid.xyz, contact.rest_axial);
     let passed = contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0;
@@ -142,6 +150,9 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let fading = select(0.0, -memory.overlap / puncture.entry_fade, travel > 0.0 && travel < 1.0);
         let less = vec2<f32>(memory.overlap * clamp(1.0 - travel, 0.0, 1.0), fading);
         var overlap = overlap_of(contact.surface, rest_radius, from_axis, d, s, less);
+#ifdef FREE_PATH
+        overlap = faded_at_end(overlap, d, s, met.end);
+#endif
 #ifdef FLEXIBLE_NEEDLE
         overlap.gradient -= d * dot(overlap.gradient, bend.slope);
 #endif
@@ -159,6 +170,8 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let pressure = select(0.0, max(0.0, elastic - damping * vn), depth > 0.0);
         normal = n * pressure;
         stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
+        contact_sums[index].shaft +=
+            select(0.0, dot(normal, step_input.direction.xyz) * params.dt, s >= puncture.tip_length);
         contact_sums[index].damping_dissipation +=
             select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
 #ifdef COHESIVE

@@ -47,8 +47,10 @@ fn soften_free_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
         free_cells[index].marked_high = marked_high;
         let fraction = f32(countOneBits(marked_low) + countOneBits(marked_high)) / 64.0;
         let number = free_cells[index].cell;
-        let remaining = max(1.0 - fraction, puncture.residual_stiffness);
         let old = cell_stiffness[number];
+        // A plane of samples is passed at once; the stiffness follows at a bounded rate.
+        let slowly = old - SOFTENING_RATE * free_tip.advance / min(size.x, min(size.y, size.z));
+        let remaining = max(max(1.0 - fraction, puncture.residual_stiffness), slowly);
         for (var again = select(1u, 0u, remaining < old); again == 0u; again++) {
             let layer = params.cells_x * params.cells_y;
             let k = quotient(number, layer);

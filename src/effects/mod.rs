@@ -1,5 +1,6 @@
 //! Effects are chosen by the scene. `None` means absent: no define, no buffer, no binding, no code.
 
+pub mod adhesion;
 pub mod cohesive;
 pub mod damage;
 pub mod fibres;
@@ -24,6 +25,7 @@ pub struct EffectSet {
     pub damage: Option<damage::Params>,
     pub cohesive: Option<cohesive::Params>,
     pub puncture: Option<puncture::Params>,
+    pub adhesion: Option<adhesion::Params>,
     pub indentation: Option<indentation::Params>,
     pub friction: Option<friction::Params>,
     pub flexible_needle: Option<flexible_needle::Params>,
@@ -45,7 +47,7 @@ pub struct Effect {
 }
 
 /// All effects. The order is the order of their blocks in the stages.
-pub const EFFECTS: [Effect; 11] = [
+pub const EFFECTS: [Effect; 12] = [
     mass_scaling::EFFECT,
     gravity::EFFECT,
     plasticity::EFFECT,
@@ -54,6 +56,7 @@ pub const EFFECTS: [Effect; 11] = [
     damage::EFFECT,
     cohesive::EFFECT,
     puncture::EFFECT,
+    adhesion::EFFECT,
     indentation::EFFECT,
     friction::EFFECT,
     flexible_needle::EFFECT,
@@ -71,6 +74,7 @@ impl EffectSet {
             self.damage.is_some(),
             self.cohesive.is_some(),
             self.puncture.is_some(),
+            self.adhesion.is_some(),
             self.indentation.is_some(),
             self.friction.is_some(),
             self.flexible_needle.is_some(),

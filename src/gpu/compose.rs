@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 
 /// Every shader file by its path under `shaders/`, without extension.
 pub const SOURCES: &[(&str, &str)] = &[
+    ("effects/adhesion", include_str!("../../shaders/effects/adhesion.wgsl")),
     ("effects/cohesive", include_str!("../../shaders/effects/cohesive.wgsl")),
     ("effects/damage", include_str!("../../shaders/effects/damage.wgsl")),
     ("effects/fibres", include_str!("../../shaders/effects/fibres.wgsl")),

@@ -13,6 +13,7 @@ use super::kernel::{Kernel, Reflected, STEP_INPUT, reflect};
 use super::layout::Layout;
 use super::structs::*;
 use crate::effects::EffectSet;
+use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
 use crate::material::Isochoric;
 use crate::material_point::{Material as Constants, PointState};
@@ -88,7 +89,7 @@ pub const LAWS: [(&str, &str); 5] = [
 ];
 
 /// Effects of tools, which work on the block only.
-const BLOCK_EFFECTS: [&str; 5] = ["cohesive", "puncture", "indentation", "friction", "flexible_needle"];
+const BLOCK_EFFECTS: [&str; 6] = ["cohesive", "puncture", "adhesion", "indentation", "friction", "flexible_needle"];
 
 /// Names that are defined for the shaders.
 pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
@@ -411,6 +412,7 @@ impl GpuEngine {
                         sums.angular_impulse += vector(s.angular_impulse);
                         sums.cutting_impulse += f64::from(s.cutting);
                         sums.spreading_impulse += f64::from(s.spreading);
+                        sums.shaft_impulse += f64::from(s.shaft);
                         sums.friction_impulse += f64::from(s.sliding);
                         sums.tool_work += f64::from(s.work);
                         sums.friction_dissipation += f64::from(s.sliding_dissipation);
@@ -424,6 +426,11 @@ impl GpuEngine {
                         sums.tip_dissipation = f64::from(s.dissipation);
                         sums.softening_dissipation = f64::from(s.softening);
                         sums.contact_energy += f64::from(s.spring_energy);
+                        sums.membrane_impulse = f64::from(s.membrane_impulse);
+                        sums.adhesion_impulse = f64::from(s.bond_impulse);
+                        sums.adhesion_dissipation = f64::from(s.bond_dissipation);
+                        // The contact nodes have booked the whole force of the anchors.
+                        sums.cutting_impulse -= sums.membrane_impulse + sums.adhesion_impulse;
                     }
                 }
             }
@@ -529,7 +536,7 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 54] = [
+const BUFFERS: [&str; 55] = [
     "cohesive",
     "face_pairs",
     "pair_states",
@@ -539,6 +546,7 @@ const BUFFERS: [&str; 54] = [
     STEP_INPUT,
     "gravity",
     "puncture",
+    "adhesion",
     "friction",
     "centre_line",
     "needle_loads",
@@ -613,6 +621,15 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
             bytes_of(&[GravityParams { acceleration: vec4(g / model.mass_scaling()) }])
         }
         "puncture" => bytes_of(&[puncture_params(model)]),
+        "adhesion" => {
+            let p = model.effects.adhesion.unwrap_or_default();
+            bytes_of(&[AdhesionParams {
+                static_force: p.static_force as f32,
+                kinetic_force: p.kinetic_force as f32,
+                stiffness: p.stiffness as f32,
+                sliding_distance: p.sliding_distance as f32,
+            }])
+        }
         "friction" => {
             let p = model.effects.friction.unwrap_or_default();
             bytes_of(&[FrictionParams {
@@ -922,11 +939,13 @@ fn puncture_params(model: &Model) -> PunctureParams {
         let p = plan.params;
         // s0 depends on z alone, and an anchor acts on the two node planes around it.
         let mut segments = [[0.0; 4]; LARGEST_SEGMENT_COUNT];
+        let mut membranes = 0;
         let last = plan.segments.len() - 1;
         for (i, out) in segments.iter_mut().enumerate() {
             let s = plan.segments[i.min(last)];
             let c = s.cutting;
-            *out = [s.start as f32, c.puncture_force as f32, c.cutting_force as f32, 0.0];
+            *out = [s.start, c.puncture_force, c.cutting_force, s.transition_length].map(|x| x as f32);
+            membranes |= u32::from(s.membrane) << i;
         }
         let tallest = model.mesh.block().lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let mut anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
@@ -949,7 +968,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             path_cell_count = free.cell_count();
         }
         PunctureParams {
-            transition_length: p.transition_length as f32,
+            exit: plan.exit as f32,
             tip_stiffness: p.tip_stiffness as f32,
             residual_stiffness: p.residual_stiffness as f32,
             contact_stiffness: plan.contact_stiffness as f32,
@@ -961,6 +980,10 @@ fn puncture_params(model: &Model) -> PunctureParams {
             path_cell_count: path_cell_count as u32,
             softened_radius: p.softened_radius as f32,
             ring_radius: p.ring_radius as f32,
+            membranes,
+            rate_exponent: p.rate_exponent as f32,
+            reference_speed: p.reference_speed as f32,
+            exit_fade: p.transition_length as f32,
             shift: vec4(plan.profile.shift),
             edge_radius: plan.profile.bore.map_or(0.0, |b| b.edge as f32),
             bore_radius: plan.profile.bore.map_or(0.0, |b| b.radius as f32),
@@ -1282,7 +1305,11 @@ impl Engine for GpuEngine {
                 "node_velocity" => state.velocity = read_all::<[f32; 4]>(bytes).map(vector).collect(),
                 "cell_stiffness" => state.stiffness = read_all::<f32>(bytes).map(f64::from).collect(),
                 "tip_state" => {
-                    state.tip_coordinate = read_all::<TipState>(bytes).next().map_or(0.0, |t| t.coordinate.into());
+                    for tip in read_all::<TipState>(bytes) {
+                        state.tip_coordinate = tip.coordinate.into();
+                        state.bond =
+                            Bond { stretch: tip.bond_stretch.into(), slid: tip.bond_slid.into(), gap: tip.gap.into() };
+                    }
                 }
                 "free_tip" => {
                     for t in read_all::<FreeTip>(bytes) {
@@ -1361,7 +1388,13 @@ impl Engine for GpuEngine {
         write("node_velocity", bytemuck::cast_slice(&v));
         let stiffness: Vec<f32> = state.stiffness.iter().map(|s| *s as f32).collect();
         write("cell_stiffness", bytemuck::cast_slice(&stiffness));
-        let tip = TipState { coordinate: state.tip_coordinate as f32, ..TipState::zeroed() };
+        let tip = TipState {
+            coordinate: state.tip_coordinate as f32,
+            bond_stretch: state.bond.stretch as f32,
+            bond_slid: state.bond.slid as f32,
+            gap: state.bond.gap as f32,
+            ..TipState::zeroed()
+        };
         write("tip_state", bytemuck::bytes_of(&tip));
         write("free_tip", bytemuck::bytes_of(&free_tip(&state.tip)));
         write("free_cells", bytemuck::cast_slice(&free_cells(&self.model, &state.cut_samples)));

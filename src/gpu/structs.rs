@@ -165,7 +165,7 @@ shared_structs! {
     }
     /// shaders/effects/puncture.wgsl
     struct PunctureParams {
-        transition_length: f32,
+        exit: f32,
         tip_stiffness: f32,
         residual_stiffness: f32,
         contact_stiffness: f32,
@@ -185,6 +185,10 @@ shared_structs! {
         reference: [f32; 4],
         free_low: [u32; 4],
         free_count: [u32; 4],
+        membranes: u32,
+        rate_exponent: f32,
+        reference_speed: f32,
+        exit_fade: f32,
         segments: [[f32; 4]; 16],
     }
     /// shaders/effects/puncture.wgsl
@@ -208,6 +212,21 @@ shared_structs! {
         dissipation: f32,
         spring_energy: f32,
         softening: f32,
+        membrane_impulse: f32,
+        bond_impulse: f32,
+        bond_dissipation: f32,
+        bond_stretch: f32,
+        bond_slid: f32,
+        gap: f32,
+        _pad0: f32,
+        _pad1: f32,
+    }
+    /// shaders/effects/adhesion.wgsl
+    struct AdhesionParams {
+        static_force: f32,
+        kinetic_force: f32,
+        stiffness: f32,
+        sliding_distance: f32,
     }
     /// shaders/effects/puncture.wgsl
     struct PathCell {
@@ -349,7 +368,7 @@ shared_structs! {
         sliding_dissipation: f32,
         damping_dissipation: f32,
         stored: f32,
-        _pad: f32,
+        shaft: f32,
     }
     /// shaders/shared/cell_sums.wgsl
     struct CellSums {

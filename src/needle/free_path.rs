@@ -17,18 +17,23 @@
 //! an open track needs no cutting force until it comes to the end of the track.
 //!
 //! Material that has been cut: 4^3 sample points per cell, marked when they come to lie behind the tip within a0. Their
-//! number is the fraction phi of the softened path. "Just ahead" is farther than any sample that the tip's own plane can
+//! number is the fraction phi of the softened path, which follows it at a bounded rate. "Just ahead" is farther than any sample that the tip's own plane can
 //! have marked, else the tip would find its own cut before it.
 //!
 //! Nodes. When the plane through X normal to T passes a node within the ring radius, its distance from the axis becomes its
-//! r0; when the tip draws back over it, it is forgotten. Nodes with a0 < r0 keep to the opened path as in the planned case.
-//! A node that the tip has not passed, met sideways by the shaft, stays outside the bare shaft, r >= R.
+//! r0 (not before the puncture); when the tip draws back over it, it is forgotten. Nodes with a0 < r0 keep to the opened path as in the planned case.
+//! A node that the tip has not passed, met sideways by the shaft, stays outside the bare shaft, r >= R. Tissue that a
+//! sideways load presses against the needle slides off its end: there the overlap fades, phi min(1, (s - s_e)/l), with the
+//! gradient of the product, so that it lets go without a jump and gives back all that it holds. s_e: the tip (0), for the
+//! bare shaft its front end (Lc).
 //!
 //! A track begins where the tip comes through the top face, and ends where it comes out of it; outside there is no force. The
 //! tip springs pull along t and sideways with their exact gradients; with v + omega x lever as the velocity of the needle the
 //! work of a turning needle is force . v + torque . omega. Source: this project.
 
 use glam::DVec3;
+
+use super::gap::Overlap;
 
 /// Sample points of a cell along each axis.
 pub const SAMPLES: usize = 4;
@@ -42,7 +47,8 @@ pub const MARKED_BEHIND: f64 = 0.5;
 /// How far ahead cut material is looked for, in extents of half a sample spacing along T.
 pub const LOOK_AHEAD: f64 = 1.05;
 
-/// How far a node may come before the tip's plane again until it counts as not passed [m].
+/// How far before the tip a passed node may come in space until it counts as not passed [m]. In sheared tissue the plane
+/// normal to T is oblique to the needle: by that plane alone loaded nodes would be let go (7 % of all work was lost).
 pub const PASSED_MARGIN: f64 = 0.05e-3;
 
 /// Distance from the needle's axis, in needle radii, from which a node that the tip has not passed is watched.
@@ -50,6 +56,20 @@ pub const WATCHED: f64 = 1.5;
 
 /// Largest sideways slip and retreat in one step beside what the needle travels [m].
 pub const SLIP_CAP: f64 = 13e-6;
+
+/// Largest loss of stiffness of a cell, as a part of the whole, per cell edge of advance: a plane of samples is passed at
+/// once, and a jump of a quarter of the stiffness shakes the tissue (with cells of 0.6 mm 438 clamped nodes).
+pub const SOFTENING_RATE: f64 = 1.5;
+
+/// Length over which the overlap fades at the front end of what a node touches, in tip lengths.
+pub const END_FADE: f64 = 0.25;
+
+/// The overlap of a node at `s` behind the tip, faded over `length` [m] behind `end` [m]; `d` is the gradient of s.
+pub fn faded_at_end(overlap: Overlap, d: DVec3, s: f64, end: f64, length: f64) -> Overlap {
+    let part = ((s - end) / length).min(1.0);
+    let slope = if part < 1.0 { 1.0 / length } else { 0.0 };
+    Overlap { value: overlap.value * part, gradient: overlap.gradient * part + d * (overlap.value * slope) }
+}
 
 /// Where the tip is in the material.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

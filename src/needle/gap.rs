@@ -42,8 +42,8 @@ pub struct BoreProfile {
     pub radius: f64,
 }
 
-/// Half width, in shaft radii, over which the push to the own side fades at the ends of a slit.
-const SLIT_BLEND: f64 = 1.0 / 6.0;
+/// Half width of the section, in shaft radii, below which the push to the own side of a slit fades.
+const SLIT_FADE: f64 = 1.0 / 3.0;
 
 impl Profile {
     /// The profile of a needle that points along `direction`.
@@ -70,13 +70,11 @@ impl Profile {
 
     /// Overlap of one face of a slit with the section, pushed towards its own side `side` (unit, lateral):
     /// ```text
-    /// p = rho.side,  q = rho - side p,  w = sqrt(rc^2 - q^2)
-    /// phi = w (w - p)/rc - less  where p >= 0,  w^2/rc - p w^2/(w^2 + b^2) - less  where p < 0,  b = R/6
+    /// p = rho.side,  q = rho - side p,  w = sqrt(rc^2 - q^2),  phi = (w - p) w^2/(w^2 + b^2) - less,  b = R/3
     /// ```
-    /// with the lateral vector `rho` from the section's centre. Zero where the face has reached the circle and where the circle
-    /// ends (q = rc), with bounded gradients in between, also at the apex. A radial normal would push both faces to one side;
-    /// with the first form for p < 0 too the gradient grows without limit at the ends of the slit, and the contact creates
-    /// 14 % of the work.
+    /// with the lateral vector `rho` from the section's centre: the way out to the face's own side, faded where the circle ends
+    /// (q = rc), so that the gradient stays bounded there and at the apex. A radial normal would push both faces to one side;
+    /// without the fading the contact at the ends of the slit creates half of the needle's work.
     pub fn slit_face(&self, lever: DVec3, d: DVec3, side: DVec3, less: (f64, f64)) -> Overlap {
         let s = lever.dot(d);
         let (rc, slope) = self.section(s);
@@ -87,18 +85,14 @@ impl Profile {
         if square <= 0.0 {
             return Overlap { value: -1.0, gradient: -side };
         }
-        let (value, lateral, growth) = if p >= 0.0 {
-            let w = square.sqrt();
-            let value = w * (w - p) / rc;
-            (value, (-side * w + q * (p / w - 2.0)) / rc, (2.0 - p / w) - value / rc)
-        } else {
-            let blend = (SLIT_BLEND * self.radius).powi(2);
-            let (part, rate) = (square / (square + blend), blend / (square + blend).powi(2));
-            let lateral = -side * part - q * (2.0 / rc - 2.0 * p * rate);
-            (square / rc - p * part, lateral, 2.0 - square / (rc * rc) - 2.0 * p * rc * rate)
-        };
-        let along = (growth - lateral.dot(self.shift)) * slope - less.1;
-        Overlap { value: value - less.0, gradient: lateral + d * along }
+        let w = square.sqrt();
+        let fade = square + (SLIT_FADE * self.radius).powi(2);
+        let part = square / fade;
+        // d phi / d w^2.
+        let rate = (1.0 - part) / fade * (w - p) + 0.5 * w / fade;
+        let lateral = -side * part - q * (2.0 * rate);
+        let along = (2.0 * rc * rate - lateral.dot(self.shift)) * slope - less.1;
+        Overlap { value: part * (w - p) - less.0, gradient: lateral + d * along }
     }
 
     /// Overlap of the tissue around a hollow needle with its outer wall (`inside` false) or of the core with its bore; both

@@ -147,6 +147,8 @@ fn curves(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRe
     let mut curves: Vec<Curve> = ForceParts::PARTS
         .iter()
         .zip(PART_DASHES.into_iter().cycle())
+        // A part that the scene does not have has no line.
+        .filter(|(part, _)| inward.iter().any(|r| (part.of)(&r.force) != 0.0))
         .map(|(part, dash)| Curve {
             label: part.name,
             colour: rgb(part.colour),

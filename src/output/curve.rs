@@ -3,6 +3,8 @@
 //! Only frames on the way in count: those deeper than every frame before them. Holding, withdrawing and frames whose
 //! depth or force is not a finite number are left out.
 
+use serde::{Deserialize, Serialize};
+
 use crate::observables::FrameRecord;
 
 /// Travel after the peak within which the force has to fall, and in which the force after puncture is sought [m].
@@ -17,6 +19,8 @@ pub const LINEAR_AFTER_PUNCTURE: f64 = 2.0e-3;
 pub const LINEAR_AT_LEAST: f64 = 1.0e-3;
 /// Travel at the end of the insertion over which the force at full depth is averaged [m].
 pub const END_TRAVEL: f64 = 0.25e-3;
+/// Fraction of the largest force so far by which the force falls in a major drop.
+pub const MAJOR_DROP: f64 = 0.15;
 /// A drop smaller than this many standard deviations of the frame-to-frame noise is noise.
 const NOISE_FACTOR: f64 = 4.0;
 /// A peak below this fraction of the largest force is first contact, not puncture.
@@ -139,6 +143,55 @@ pub fn frames_on_the_way_in(records: &[FrameRecord]) -> impl Iterator<Item = &Fr
         }
         deeper
     })
+}
+
+/// A fall of the axial force on the way in whose size is at least [`MAJOR_DROP`] of the largest force before it.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct MajorDrop {
+    /// Depth of the tip on the needle's axis at the peak [m]; it includes the dimple.
+    pub depth_m: f64,
+    /// How far the tip has cut into the material at the peak [m].
+    pub tip_coordinate_m: f64,
+    /// Axial force at the peak, and at the lowest point before it rises as much again [N].
+    pub force_n: f64,
+    pub force_after_n: f64,
+}
+
+/// The major drops of a curve, in order. A peak is one when the force falls below it by [`MAJOR_DROP`] of the largest force so
+/// far before it rises above the peak again; the drop is over when the force has risen by as much from its lowest point.
+pub fn major_drops(records: &[FrameRecord]) -> Vec<MajorDrop> {
+    let frames = frames_on_the_way_in(records).filter(|r| r.force.axial.is_finite());
+    let frames: Vec<&FrameRecord> = frames.collect();
+    let largest = frames.iter().map(|r| r.force.axial).fold(0.0, f64::max);
+    let mut drops: Vec<MajorDrop> = Vec::new();
+    let (mut falling, mut running, mut extreme) = (false, 0.0_f64, None::<&FrameRecord>);
+    for frame in frames {
+        let force = frame.force.axial;
+        running = running.max(force);
+        let needed = MAJOR_DROP * running;
+        let before = *extreme.get_or_insert(frame);
+        let further = if falling { force < before.force.axial } else { force >= before.force.axial };
+        if further {
+            extreme = Some(frame);
+        }
+        match drops.last_mut() {
+            Some(drop) if falling => drop.force_after_n = drop.force_after_n.min(force),
+            _ => {}
+        }
+        let turned = (force - before.force.axial).abs() >= needed && !further;
+        if turned && !falling && before.force.axial >= LEAST_PEAK * largest {
+            drops.push(MajorDrop {
+                depth_m: before.depth,
+                tip_coordinate_m: before.tip_coordinate,
+                force_n: before.force.axial,
+                force_after_n: force,
+            });
+        }
+        if turned {
+            (falling, extreme) = (!falling, Some(frame));
+        }
+    }
+    drops
 }
 
 /// Points after index `i` within [`DROP_TRAVEL`], at least one where there is one.
@@ -386,6 +439,39 @@ mod tests {
         near(figures.slope_after_puncture, 50.0, 1e-6);
         let too_short = CurveFigures::from_records(&insertion(3.5e-3, shallow));
         assert_eq!(too_short.slope_after_puncture, None);
+    }
+
+    #[test]
+    fn major_drops_are_counted_once() {
+        // Up to 1 N, down to 0.6, up to 1.2, a ripple of 0.1, down to 0.8 in two stairs.
+        let law = |d: f64| {
+            let points = [
+                (0.0, 0.0),
+                (3.0, 1.0),
+                (3.3, 0.6),
+                (6.0, 1.2),
+                (6.3, 1.1),
+                (6.6, 1.19),
+                (7.0, 1.0),
+                (7.3, 1.1),
+                (8.0, 0.8),
+            ];
+            let after = points.partition_point(|p| p.0 * 1e-3 <= d).clamp(1, points.len() - 1);
+            let (a, b) = (points[after - 1], points[after]);
+            a.1 + (b.1 - a.1) * (d * 1e3 - a.0) / (b.0 - a.0)
+        };
+        let mut records = insertion(8e-3, law);
+        for i in 0..50 {
+            records.push(record(8e-3 - f64::from(i) * 0.1e-3, -1.0));
+        }
+        let drops = major_drops(&records);
+        assert_eq!(drops.len(), 2, "{drops:?}");
+        for (drop, (depth, force, after)) in drops.iter().zip([(3e-3, 1.0, 0.6), (6e-3, 1.2, 0.8)]) {
+            near(Some(drop.depth_m), depth, 1e-9);
+            near(Some(drop.force_n), force, 1e-9);
+            near(Some(drop.force_after_n), after, 1e-9);
+        }
+        assert!(major_drops(&insertion(8e-3, |d| 100.0 * d)).is_empty());
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub mod vtu;
 pub mod whole_file;
 
 pub use chart::write_force_chart;
-pub use curve::CurveFigures;
+pub use curve::{CurveFigures, MajorDrop, major_drops};
 pub use folder::{OutputFolder, PictureMoment};
 pub use parts_chart::write_parts_chart;
 pub use progress::Progress;

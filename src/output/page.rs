@@ -31,7 +31,7 @@ td.number { white-space: nowrap; }
 td:not(.number):not(:first-child) { min-width: 7rem; }
 th { vertical-align: bottom; }
 .raw { font-size: 0.82rem; }
-.raw td { overflow-wrap: anywhere; min-width: 7rem; }
+.raw td { white-space: nowrap; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 26rem), 1fr)); gap: 1rem; }
 figure { margin: 0; padding: 0.7rem; background: var(--card); border: 1px solid var(--line); border-radius: 0.4rem; }
 figure > svg { display: block; width: 100%; height: auto; }

@@ -142,3 +142,38 @@ impl Plot {
         Ok(())
     }
 }
+
+/// The entries of a legend beside one another, as markup.
+pub(super) fn legend_row(entries: &[String]) -> String {
+    format!("<div class=\"legend\">{}</div>", entries.concat())
+}
+
+/// Entry of an area.
+pub(super) fn legend_swatch(colour: RGBColor, opacity: f64, text: &str) -> String {
+    let colour = page_colour(colour);
+    legend_entry(&format!("<rect width=\"34\" height=\"14\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>"), text)
+}
+
+/// Entry of a line of a width [px], with the length of dash and gap.
+pub(super) fn legend_line(colour: RGBColor, width: f64, dash: Option<(u32, u32)>, text: &str) -> String {
+    let colour = page_colour(colour);
+    let dash = dash.map_or(String::new(), |(dash, gap)| format!(" stroke-dasharray=\"{dash} {gap}\""));
+    let line =
+        format!("<line x1=\"0\" y1=\"7\" x2=\"34\" y2=\"7\" stroke=\"{colour}\" stroke-width=\"{width}\"{dash}/>");
+    legend_entry(&line, text)
+}
+
+/// Entry of a mark.
+pub(super) fn legend_dot(colour: RGBColor, text: &str) -> String {
+    let colour = page_colour(colour);
+    legend_entry(&format!("<circle cx=\"17\" cy=\"7\" r=\"5.5\" fill=\"{colour}\" stroke=\"currentColor\"/>"), text)
+}
+
+fn legend_entry(sample: &str, text: &str) -> String {
+    format!("<span><svg viewBox=\"0 0 34 14\" aria-hidden=\"true\">{sample}</svg>{}</span>", super::page::escape(text))
+}
+
+/// Black is the colour of the text around it, which a reader may have light on dark.
+fn page_colour(colour: RGBColor) -> String {
+    if colour == BLACK { "currentColor".into() } else { format!("#{:02x}{:02x}{:02x}", colour.0, colour.1, colour.2) }
+}

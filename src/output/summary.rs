@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::curve::{CurveFigures, frames_on_the_way_in};
+use super::curve::{CurveFigures, MajorDrop, frames_on_the_way_in, major_drops};
 use super::sample::{DrivenFace, SamplePoint};
 use super::tables::{hourglass_to_internal, kinetic_to_internal};
 use super::whole_file;
@@ -95,6 +95,9 @@ pub struct Summary {
     pub slope_after_puncture_n_per_m: Option<f64>,
     /// Coefficient of determination of the straight line from 5 mm to the deepest point.
     pub linear_fit_r2: Option<f64>,
+    /// Major drops of the force on the way in, in order.
+    #[serde(default)]
+    pub drops: Vec<MajorDrop>,
 
     /// Driven face with the largest nominal stress, that stress (tension positive) and the stretch at which it came.
     pub face: Option<String>,
@@ -155,6 +158,7 @@ impl Summary {
             self.core_strain = Some(core.strain());
             self.core_yield = (last.tip_coordinate > 0.0).then(|| core.rest_length / last.tip_coordinate);
         }
+        self.drops = major_drops(records);
 
         let scale = records.iter().map(|r| r.energy.external_max).fold(0.0, f64::max);
         let residual = |r: &FrameRecord| (r.energy.external - r.energy.accounted()).abs();

@@ -28,7 +28,7 @@ pub fn force_columns() -> Vec<&'static str> {
 }
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 27] = [
+pub const ENERGY_COLUMNS: [&str; 28] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -39,6 +39,7 @@ pub const ENERGY_COLUMNS: [&str; 27] = [
     "friction_j",
     "cutting_j",
     "cohesive_j",
+    "adhesion_j",
     "plastic_j",
     "damage_j",
     "viscous_j",
@@ -178,6 +179,7 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(e.friction),
         number(e.cutting),
         number(e.cohesive),
+        number(e.adhesion),
         number(e.plastic),
         number(e.damage),
         number(e.viscous),

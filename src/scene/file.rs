@@ -37,6 +37,7 @@ pub struct SceneFile {
     pub motion: Option<MotionTable>,
     pub puncture: Option<PunctureTable>,
     pub cohesive: Option<CohesiveTable>,
+    pub adhesion: Option<AdhesionTable>,
     pub friction: Option<FrictionTable>,
     pub flexible_needle: Option<FlexibleNeedleTable>,
     pub indentation: Option<IndentationTable>,
@@ -159,6 +160,18 @@ pub struct RegionTable {
     pub cutting_force_n: Option<f64>,
     /// As in `material`.
     pub cutting_energy_j_m2: Option<f64>,
+    /// A tough layer with a puncture energy of its own, e.g. skin or a capsule; with `layer_mm` only.
+    pub membrane: Option<MembraneTable>,
+}
+
+/// Energy that puncturing a layer takes beyond cutting through it: exactly one key.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MembraneTable {
+    /// The energy itself [mJ].
+    pub puncture_energy_mj: Option<f64>,
+    /// Energy per area of a slit as wide as the needle through the thickness of the layer [J/m^2].
+    pub toughness_j_m2: Option<f64>,
 }
 
 /// Lowest and highest corner.
@@ -332,6 +345,8 @@ pub struct NeedleTable {
     pub cutting_edge: Option<f64>,
     /// Friction coefficient of the bore.
     pub bore_friction: Option<f64>,
+    /// Length from the tip to the hub [mm]; default 100. With the density it gives the mass, whose inertia the hand feels.
+    pub length_mm: Option<f64>,
     /// Needle material: a name in the library or a table; default "steel-304". It decides how the needle bends with the
     /// effect `flexible_needle`.
     pub material: Option<NeedleMaterialEntry>,
@@ -482,6 +497,24 @@ pub struct PunctureTable {
     pub entry_fade_mm: Option<f64>,
     /// "auto" (default): planned before the run for a straight motion, else free; "free": always found while the tip moves.
     pub path: Option<PathWord>,
+    /// Exponent of the speed of the needle in the tip forces, 0 to 1; default 0: no rate.
+    pub rate_exponent: Option<f64>,
+    /// Speed up to which the tip forces are the written ones [mm/s]; default 1.
+    pub reference_speed_mm_s: Option<f64>,
+}
+
+/// Parameters of the effect `adhesion`, which needs `puncture`: a model of the hypothesis that tissue sticks to the tip.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AdhesionTable {
+    /// Force at which the tissue lets go [N]; default 0.25.
+    pub static_force_n: Option<f64>,
+    /// Force at the end of a slip [N]; default 0.05.
+    pub kinetic_force_n: Option<f64>,
+    /// Stiffness of the bond [N/mm]; default 1.
+    pub stiffness_n_mm: Option<f64>,
+    /// Distance slid until it sticks anew [mm]: the spacing of the drops; default 1.
+    pub sliding_distance_mm: Option<f64>,
 }
 
 /// Parameters of the effect `friction`.

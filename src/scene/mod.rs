@@ -119,6 +119,8 @@ pub struct TissueMaterial {
     pub damage: Option<effects::damage::Params>,
     /// Tip forces in this material; `None`: those of the scene's puncture table.
     pub cutting: Option<Cutting>,
+    /// A membrane: energy that puncturing this layer takes beyond cutting through it [J].
+    pub membrane_energy: Option<f64>,
 }
 
 impl TissueMaterial {
@@ -134,6 +136,7 @@ impl TissueMaterial {
             viscoelastic: None,
             damage: None,
             cutting: None,
+            membrane_energy: None,
         }
     }
 }
@@ -321,6 +324,8 @@ pub struct NeedleShape {
     pub youngs_modulus: f64,
     pub density: f64,
     pub inner_diameter: f64,
+    /// Length from the tip to the hub [m]; with the density it gives the mass.
+    pub length: f64,
 }
 
 /// The inside of a hollow needle.
@@ -355,7 +360,12 @@ impl NeedleShape {
         self.radius / self.tip_length
     }
 
-    /// A needle with a conical tip, of steel. Lengths in m.
+    /// Mass of a solid cylinder [kg]; the missing part of the tip does not count.
+    pub fn mass(&self) -> f64 {
+        std::f64::consts::PI * self.radius.powi(2) * self.length * self.density
+    }
+
+    /// A needle with a conical tip, of steel, 100 mm long. Lengths in m.
     pub fn cone(name: &str, radius: f64, tip_length: f64) -> Self {
         NeedleShape {
             name: name.into(),
@@ -367,6 +377,7 @@ impl NeedleShape {
             youngs_modulus: 193e9,
             density: 7900.0,
             inner_diameter: 0.0,
+            length: 0.1,
         }
     }
 }

@@ -219,10 +219,15 @@ impl Motion {
         self.entry + self.direction * self.deepest()
     }
 
-    /// Box of the part of the needle's axis that comes to lie in the tissue [m].
-    pub fn reach(&self) -> (DVec3, DVec3) {
+    /// The same, not below the bottom of a block of height `height` [m].
+    pub fn deepest_point_in(&self, height: f64) -> DVec3 {
+        self.entry + self.direction * self.deepest().min(height / -self.direction.z)
+    }
+
+    /// Box of the part of the needle's axis that comes to lie in the tissue, a block of height `height` [m].
+    pub fn reach(&self, height: f64) -> (DVec3, DVec3) {
         if !self.is_free() {
-            let end = self.deepest_point();
+            let end = self.deepest_point_in(height);
             return (self.entry.min(end), self.entry.max(end));
         }
         let inside = |p: &Placement| {

@@ -57,7 +57,9 @@ impl PrismBase {
     pub fn new(block: &BlockMesh, cell: usize) -> Self {
         let hexahedron = Hexahedron::new(block, cell);
         let [xi, eta, _] = hexahedron.modes;
-        let area = 4.0 * hexahedron.edges[0].truncate().perp_dot(hexahedron.edges[1].truncate());
+        let cross = 4.0 * hexahedron.edges[0].truncate().perp_dot(hexahedron.edges[1].truncate());
+        // A rounded zero would have a cube root that is none.
+        let area = if block.is_gap(cell) { 0.0 } else { cross };
         PrismBase { gradients: [xi, eta], taper: hexahedron.taper, area }
     }
 }

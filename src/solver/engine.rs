@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::effects::adhesion::Bond;
 use crate::error::Result;
 use crate::material_point::PointState;
 use crate::model::Model;
@@ -78,9 +79,14 @@ impl StepInput {
 pub struct FrameSums {
     pub frame: u64,
     pub steps: u32,
-    /// Impulse on the tissue [N s]: tip springs, contact normals, friction, each along the insertion direction.
+    /// Impulse on the tissue [N s] along the insertion direction: tip law in the bulk and in membranes, tissue that sticks to the
+    /// tip, contact normals, friction.
     pub cutting_impulse: f64,
+    pub membrane_impulse: f64,
+    pub adhesion_impulse: f64,
     pub spreading_impulse: f64,
+    /// The part of `spreading_impulse` that acts on the shaft of a needle.
+    pub shaft_impulse: f64,
     pub friction_impulse: f64,
     /// Whole impulse [N s] and angular impulse about the tip [N m s], world frame.
     pub impulse: DVec3,
@@ -96,6 +102,8 @@ pub struct FrameSums {
     pub contact_dissipation: f64,
     pub tip_dissipation: f64,
     pub softening_dissipation: f64,
+    /// Dissipated by tissue that slips on the tip [J].
+    pub adhesion_dissipation: f64,
     /// Dissipated by plastic flow and by damage [J].
     pub plastic_dissipation: f64,
     pub damage_dissipation: f64,
@@ -108,7 +116,7 @@ pub struct FrameSums {
     pub torn_area: f64,
     /// What each face exerts on the tissue at the last step [N]; zero without driven faces.
     pub reactions: [DVec3; 6],
-    /// Total: stored in contact, stick and tip springs [J].
+    /// Total: stored in contact, stick, tip and bond springs [J].
     pub contact_energy: f64,
     /// Total: material coordinate a of the tip [m].
     pub tip_coordinate: f64,
@@ -151,6 +159,8 @@ pub struct State {
     pub tip: FreeTip,
     /// Marked sample points per cell of the box of a free path, bit = x + 4 y + 16 z; empty on a planned one.
     pub cut_samples: Vec<u64>,
+    /// Tissue that sticks to the tip.
+    pub bond: Bond,
     /// Memory per contact node: stretch of the stick spring [m], overlap at activation [m], axial position at
     /// activation [m]; `touching` tells whether the last two are set.
     pub contact: Vec<ContactState>,

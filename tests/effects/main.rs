@@ -3,6 +3,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod adhesion;
+mod cohesive;
 mod damage;
 mod element;
 mod fibres;

@@ -13,8 +13,10 @@ use stylet::solver::engine::State;
 use stylet::solver::simulation::{EngineChoice, Simulation};
 
 mod effects;
+mod free_hand;
 mod muscle_biopsy;
 mod samples;
+mod tip;
 mod validation;
 
 fn load(name: &str, overrides: &[&str]) -> Scene {

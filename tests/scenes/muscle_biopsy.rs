@@ -97,7 +97,7 @@ fn energies_stay_in_balance() {
 
 /// Largest difference of two force curves over the largest force: frame by frame, and with the nearest force that the
 /// other curve takes within one frame (0.033 mm) before and after, so that a drop may shift by that much.
-fn curve_difference(a: &[f64], b: &[f64]) -> (f64, f64) {
+pub(super) fn curve_difference(a: &[f64], b: &[f64]) -> (f64, f64) {
     assert_eq!(a.len(), b.len());
     let largest = a.iter().chain(b).fold(0.0, |m: f64, f| m.max(f.abs()));
     let (mut direct, mut shifted) = (0.0f64, 0.0f64);
@@ -111,7 +111,7 @@ fn curve_difference(a: &[f64], b: &[f64]) -> (f64, f64) {
     (direct / largest, shifted / largest)
 }
 
-fn axial(records: &[FrameRecord]) -> Vec<f64> {
+pub(super) fn axial(records: &[FrameRecord]) -> Vec<f64> {
     records.iter().map(|r| r.force.axial).collect()
 }
 

@@ -70,16 +70,17 @@ fn effect_set(wanted: impl Fn(usize) -> bool) -> EffectSet {
         damage: wanted(5).then(Default::default),
         cohesive: wanted(6).then(Default::default),
         puncture: wanted(7).then(Default::default),
-        indentation: wanted(8).then(Default::default),
-        friction: wanted(9).then(Default::default),
-        flexible_needle: wanted(10).then(Default::default),
+        adhesion: wanted(8).then(Default::default),
+        indentation: wanted(9).then(Default::default),
+        friction: wanted(10).then(Default::default),
+        flexible_needle: wanted(11).then(Default::default),
     };
     let expected: Vec<&str> = EFFECTS.iter().enumerate().filter(|e| wanted(e.0)).map(|e| e.1.key).collect();
     assert_eq!(set.keys(), expected, "order of the effect table");
     set
 }
 
-/// All 2048 subsets: none, every single one, all pairs, all together and what lies between.
+/// All 4096 subsets: none, every single one, all pairs, all together and what lies between.
 fn all_sets() -> Vec<EffectSet> {
     (0..1usize << EFFECTS.len()).map(|bits| effect_set(|i| bits >> i & 1 == 1)).collect()
 }
@@ -260,6 +261,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "Bend",
         "GridPlace",
         "MaterialPlace",
+        "FreeContact",
         "Overlap",
         "Slopes",
         "IsochoricStress",
@@ -296,7 +298,7 @@ fn a_wrong_layout_is_found_and_named() {
 }
 
 /// Words that would betray an effect, by its key.
-const TRACES: [(&str, &[&str]); 11] = [
+const TRACES: [(&str, &[&str]); 12] = [
     ("mass_scaling", &["mass_scaling", "stable_mass", "selective"]),
     ("gravity", &["gravity", "free fall"]),
     ("plasticity", &["yield", "hardening", "flow_plastically", "mandel"]),
@@ -305,6 +307,7 @@ const TRACES: [(&str, &[&str]); 11] = [
     ("damage", &["degradation(", "damage["]),
     ("cohesive", &["cohesive", "pair_state", "separation_sums"]),
     ("puncture", &["puncture", "tip_", "needle", "soften", "remaining"]),
+    ("adhesion", &["adhesion"]),
     ("indentation", &["indent", "punch"]),
     ("friction", &["friction", "stick_", "coulomb"]),
     ("flexible_needle", &["centre_line", "bend", "needle_loads"]),
@@ -376,7 +379,7 @@ fn an_absent_effect_leaves_no_trace() {
             }
         }
         // Not a vacuous search: with the effect alone (or with a tool, for those that need one) the words are there.
-        let needs_tool = ["friction", "flexible_needle"].contains(key);
+        let needs_tool = ["friction", "adhesion", "flexible_needle"].contains(key);
         let present = effect_set(|i| i == absent || (needs_tool && EFFECTS[i].key == "puncture"));
         let all: String = text_of(&present, &scene(false, false)).into_iter().map(|t| t.1).collect();
         assert!(traces.iter().any(|word| all.contains(word)), "{key}: none of {traces:?} with it");

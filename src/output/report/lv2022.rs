@@ -1,15 +1,15 @@
 //! The paper [Lv2022] beside runs of this program: its cases, its numbers and the page.
 
-use plotters::style::RGBColor;
+use plotters::style::{BLACK, RGBColor, WHITE};
 
 use super::CaseResults;
 use crate::observables::ForceParts;
 use crate::output::chart::{Curve, FINER, GREEN, INWARD, OUTWARD, rgb};
 use crate::output::curve::{DROP_FRACTION, DROP_TRAVEL, ForceDrop, sudden_drops};
 use crate::output::page::{document, escape, figure, numbers, picture, table, words};
-use crate::output::plot::{Area, Mark, Plot};
+use crate::output::plot::{Area, Mark, Plot, legend_dot, legend_line, legend_row, legend_swatch};
 use crate::output::summary::Status;
-use crate::scene::{Scene, Tool};
+use crate::scene::{Scene, TipShape, Tool};
 use crate::{Error, Result};
 
 /// Folder of the scenes in the repository.
@@ -202,12 +202,8 @@ impl Report {
             ("page written", escape(&self.written)),
             ("time of all steps", format!("{wall:.1} s")),
         ];
-        text += &table(
-            "",
-            "",
-            &[words("what"), words("value")],
-            &rows.map(|(what, value)| vec![what.to_string(), value]).to_vec(),
-        );
+        text +=
+            &table("", "", &[words("what"), words("value")], &rows.map(|(what, value)| vec![what.to_string(), value]));
         text
     }
 
@@ -299,11 +295,11 @@ impl Report {
             opacity: 0.25,
             corners: vec![(0.0, low), (deepest, low), (deepest, high), (0.0, high)],
         });
-        let mut legend = vec![swatch(grey, 0.35, &format!("the paper's six maxima, {low:.2} to {high:.2} N"))];
+        let mut legend = vec![legend_swatch(grey, 0.35, &format!("the paper's six maxima, {low:.2} to {high:.2} N"))];
         for ((case, colour), (width, dash)) in speeds.iter().zip(SPEED_COLOURS).zip(styles) {
             let points = case.curve("axial_force_n").into_iter().map(|(d, f)| (d * 1e3, f)).collect();
             plot.curves.push(Curve { label: "", colour, width: width * FINER, dash, points });
-            legend.push(sample(colour, f64::from(width), dash, &speed_of(case)));
+            legend.push(legend_line(colour, f64::from(width), dash, &speed_of(case)));
         }
         let mut caption = legend_row(&legend);
         if let Some(case) = speeds.first() {
@@ -324,16 +320,15 @@ impl Report {
     fn parts(&self) -> Result<String> {
         let mut text = String::from("<div class=\"charts\">\n");
         let legend: Vec<String> =
-            ForceParts::PARTS.iter().rev().map(|part| swatch(rgb(part.colour), 0.8, part.name)).collect();
+            ForceParts::PARTS.iter().rev().map(|part| legend_swatch(rgb(part.colour), 0.8, part.name)).collect();
         let mut columns = vec![words("run"), numbers("depth, mm"), numbers("axial force, N")];
         columns.extend(ForceParts::PARTS.map(|part| numbers(&format!("{}, N", part.name))));
         let mut rows = Vec::new();
         for (_, case) in &self.cases {
             let stack = case.stack();
             let chart = inline(&stack.plot(), &format!("Parts of the force against depth, {}", case.name))?;
-            let line = "<span><svg viewBox=\"0 0 34 14\" aria-hidden=\"true\"><line x1=\"0\" y1=\"7\" x2=\"34\" y2=\"7\" \
-                        stroke=\"currentColor\" stroke-width=\"2.5\"/></svg>axial force, their sum</span>";
-            let all: Vec<String> = std::iter::once(line.to_string()).chain(legend.iter().cloned()).collect();
+            let line = legend_line(BLACK, 2.5, None, "axial force, their sum");
+            let all: Vec<String> = std::iter::once(line).chain(legend.iter().cloned()).collect();
             text += &figure(&chart, &format!("{}{}", legend_row(&all), escape(&case.scene.title)));
             let largest = (0..stack.total.len()).max_by(|&a, &b| stack.total[a].total_cmp(&stack.total[b]));
             if let Some(row) = largest {
@@ -369,13 +364,16 @@ impl Report {
             });
         }
         for fall in ripple(&curve) {
-            plot.marks.push(Mark { at: (fall.depth * 1e3, fall.force), colour: RGBColor(255, 255, 255), text: None });
+            plot.marks.push(Mark { at: (fall.depth * 1e3, fall.force), colour: WHITE, text: None });
         }
         let falls = format!("falls of {:.0} to {:.0} %", 100.0 * RIPPLE, 100.0 * DROP_FRACTION);
         let legend = [
-            sample(INWARD, 3.0, None, "axial force"),
-            dot("#d55e00", &format!("drop of at least {:.0} % within {} mm", 100.0 * DROP_FRACTION, DROP_TRAVEL * 1e3)),
-            dot("#ffffff", &falls),
+            legend_line(INWARD, 3.0, None, "axial force"),
+            legend_dot(
+                OUTWARD,
+                &format!("drop of at least {:.0} % within {} mm", 100.0 * DROP_FRACTION, DROP_TRAVEL * 1e3),
+            ),
+            legend_dot(WHITE, &falls),
         ];
         let chart = inline(&plot, "Axial force against depth with its drops")?;
         let title = escape(&first.scene.title);
@@ -588,8 +586,13 @@ impl Report {
                 "diameter and wall not printed; drawn hollow",
                 format!("{}, diameter {:.3} mm, solid", needle.name, 2e3 * needle.radius),
             );
-            let half_angle = (needle.radius / needle.tip_length).atan().to_degrees();
-            row("tip", "shape not printed", format!("cone with a half angle of {half_angle:.1} deg"));
+            let tip = match needle.tip {
+                TipShape::Cone => {
+                    format!("cone with a half angle of {:.1} deg", needle.tip_slope().atan().to_degrees())
+                }
+                TipShape::Bevel { .. } => format!("bevel of {} mm", trimmed(needle.tip_length * 1e3)),
+            };
+            row("tip", "shape not printed", tip);
         }
         row(
             "material of the needle",
@@ -814,7 +817,7 @@ fn interpolated(curve: &[(f64, f64)], x: f64) -> Option<f64> {
     let after = curve.partition_point(|p| p.0 < x);
     let (b, a) = (curve.get(after)?, after.checked_sub(1).map_or(curve[after], |i| curve[i]));
     let part = if b.0 > a.0 { (x - a.0) / (b.0 - a.0) } else { 0.0 };
-    (x >= curve[0].0).then(|| a.1 + part * (b.1 - a.1))
+    (x >= curve[0].0).then_some(a.1 + part * (b.1 - a.1))
 }
 
 /// Smallest and largest value.
@@ -851,39 +854,4 @@ fn plain(value: &serde_json::Value) -> String {
         serde_json::Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(", "),
         other => other.to_string(),
     }
-}
-
-fn legend_row(entries: &[String]) -> String {
-    format!("<div class=\"legend\">{}</div>", entries.concat())
-}
-
-fn hex(colour: RGBColor) -> String {
-    format!("#{:02x}{:02x}{:02x}", colour.0, colour.1, colour.2)
-}
-
-fn swatch(colour: RGBColor, opacity: f64, text: &str) -> String {
-    format!(
-        "<span><svg viewBox=\"0 0 34 14\" aria-hidden=\"true\"><rect width=\"34\" height=\"14\" fill=\"{}\" \
-         fill-opacity=\"{opacity}\"/></svg>{}</span>",
-        hex(colour),
-        escape(text)
-    )
-}
-
-fn sample(colour: RGBColor, width: f64, dash: Option<(u32, u32)>, text: &str) -> String {
-    let dash = dash.map_or(String::new(), |(dash, gap)| format!(" stroke-dasharray=\"{dash} {gap}\""));
-    format!(
-        "<span><svg viewBox=\"0 0 34 14\" aria-hidden=\"true\"><line x1=\"0\" y1=\"7\" x2=\"34\" y2=\"7\" stroke=\"{}\" \
-         stroke-width=\"{width}\"{dash}/></svg>{}</span>",
-        hex(colour),
-        escape(text)
-    )
-}
-
-fn dot(fill: &str, text: &str) -> String {
-    format!(
-        "<span><svg viewBox=\"0 0 34 14\" aria-hidden=\"true\"><circle cx=\"17\" cy=\"7\" r=\"5.5\" fill=\"{fill}\" \
-         stroke=\"currentColor\"/></svg>{}</span>",
-        escape(text)
-    )
 }

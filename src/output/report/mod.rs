@@ -72,15 +72,14 @@ impl CaseResults {
     /// Rows of the force table deeper than every row before them.
     pub fn way_in(&self) -> Vec<usize> {
         let mut deepest = f64::NEG_INFINITY;
-        let depths = self.column("depth_m").iter().enumerate();
-        depths
-            .filter_map(|(row, &depth)| {
-                (depth > deepest).then(|| {
-                    deepest = depth;
-                    row
-                })
-            })
-            .collect()
+        let mut rows = Vec::new();
+        for (row, &depth) in self.column("depth_m").iter().enumerate() {
+            if depth > deepest {
+                deepest = depth;
+                rows.push(row);
+            }
+        }
+        rows
     }
 
     /// Depth [m] and the value of a column on the way in.

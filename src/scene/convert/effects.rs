@@ -4,6 +4,7 @@ use super::super::file::*;
 use super::super::{FaceCondition, Motion, NeedleShape, TissueMaterial, Tool};
 use super::{Check, MM, Within, parameters};
 use crate::effects::{self, EFFECTS, EffectSet};
+use crate::material::four_digits;
 use crate::needle::beam::{BeamParams, Section};
 
 impl Check<'_> {
@@ -62,6 +63,14 @@ impl Check<'_> {
                 "add [needle] and \"puncture\" to the list `effects`, or remove the effect",
             );
         }
+        if listed("adhesion") && !listed("puncture") {
+            self.problems.report(
+                &place("adhesion"),
+                "effect `adhesion` needs `puncture`: tissue sticks to a tip that is in it",
+                "nothing enters the tissue",
+                "add \"puncture\" to the list `effects`, or remove \"adhesion\"",
+            );
+        }
         if listed("damage") && !listed("plasticity") {
             self.problems.report(
                 &place("damage"),
@@ -86,6 +95,7 @@ impl Check<'_> {
         for (key, present) in [
             ("puncture", file.puncture.is_some()),
             ("cohesive", file.cohesive.is_some()),
+            ("adhesion", file.adhesion.is_some()),
             ("friction", file.friction.is_some()),
             ("flexible_needle", file.flexible_needle.is_some()),
             ("indentation", file.indentation.is_some()),
@@ -130,6 +140,7 @@ impl Check<'_> {
                 "add \"cohesive\" to the list `effects`, or remove bore_diameter_mm",
             );
         }
+        let adhesion = self.adhesion(&file.adhesion.clone().unwrap_or_default());
         let friction = self.friction(&file.friction.clone().unwrap_or_default());
         let indentation = self.indentation(&file.indentation.clone().unwrap_or_default());
         if listed("flexible_needle") && (motion.is_free() || puncture.always_free) {
@@ -172,6 +183,7 @@ impl Check<'_> {
             }),
             cohesive: listed("cohesive").then_some(cohesive),
             puncture: listed("puncture").then_some(puncture),
+            adhesion: listed("adhesion").then_some(adhesion),
             indentation: listed("indentation").then_some(indentation),
             friction: listed("friction").then_some(friction),
             flexible_needle: flexible,
@@ -321,6 +333,14 @@ impl Check<'_> {
             ),
             entry_fade: self.optional(&at("entry_fade_mm"), t.entry_fade_mm, MM, d.entry_fade, Positive(100.0)),
             always_free: t.path == Some(PathWord::Free),
+            rate_exponent: self.optional(&at("rate_exponent"), t.rate_exponent, 1.0, d.rate_exponent, NotNegative(1.0)),
+            reference_speed: self.optional(
+                &at("reference_speed_mm_s"),
+                t.reference_speed_mm_s,
+                MM,
+                d.reference_speed,
+                Between(1e-3, 1e3),
+            ),
         };
         if params.softened_radius >= params.ring_radius {
             let key = if t.softened_radius_mm.is_some() { "softened_radius_mm" } else { "ring_radius_mm" };
@@ -439,6 +459,57 @@ impl Check<'_> {
                 "turn the azimuth to 0 or 90 degrees, or remove \"cohesive\" (the path then opens by softening)",
             );
         }
+    }
+
+    fn adhesion(&mut self, t: &AdhesionTable) -> effects::adhesion::Params {
+        use Within::{NotNegative, Positive};
+        let d = effects::adhesion::Params::default();
+        let at = |key: &str| format!("adhesion.{key}");
+        let params = effects::adhesion::Params {
+            static_force: self.optional(&at("static_force_n"), t.static_force_n, 1.0, d.static_force, Positive(100.0)),
+            kinetic_force: self.optional(
+                &at("kinetic_force_n"),
+                t.kinetic_force_n,
+                1.0,
+                d.kinetic_force,
+                NotNegative(100.0),
+            ),
+            stiffness: self.optional(&at("stiffness_n_mm"), t.stiffness_n_mm, 1e3, d.stiffness, Positive(1e4)),
+            sliding_distance: self.optional(
+                &at("sliding_distance_mm"),
+                t.sliding_distance_mm,
+                MM,
+                d.sliding_distance,
+                Positive(100.0),
+            ),
+        };
+        let (fall, key) = (params.static_force - params.kinetic_force, |written: bool, key| {
+            if written { format!("adhesion.{key}") } else { "adhesion".to_string() }
+        });
+        if fall < 0.0 {
+            self.problems.report(
+                &key(t.kinetic_force_n.is_some(), "kinetic_force_n"),
+                format!(
+                    "the kinetic force {} N is above the static one, {} N",
+                    params.kinetic_force, params.static_force
+                ),
+                "nothing lets go",
+                "write a kinetic_force_n below static_force_n, e.g. 0.05 and 0.25",
+            );
+        } else if params.stiffness * params.sliding_distance <= fall {
+            self.problems.report(
+                &key(t.sliding_distance_mm.is_some(), "sliding_distance_mm"),
+                format!(
+                    "the bond of {} N/mm snaps back: its force falls by {} N within {} mm",
+                    params.stiffness * 1e-3,
+                    four_digits(fall),
+                    params.sliding_distance / MM
+                ),
+                "must be above (static_force_n - kinetic_force_n)/stiffness_n_mm",
+                format!("write a sliding_distance_mm above {}", four_digits(fall / params.stiffness / MM)),
+            );
+        }
+        params
     }
 
     fn friction(&mut self, table: &FrictionTable) -> effects::friction::Params {

@@ -66,10 +66,11 @@ impl Check<'_> {
         let radius = 0.5 * diameter;
         let (tip, tip_length) = self.needle_tip(table, radius);
         let bore = self.bore(table, radius);
+        let length = self.optional("needle.length_mm", table.length_mm, MM, 100.0 * MM, Within::Between(1.0, 1000.0));
         let steel = NeedleShape::cone(&name, radius, tip_length);
         // The bore that takes a core is that of the tube.
         let inner_diameter = bore.map_or(inner_diameter, |b| 2.0 * b.radius);
-        let shape = NeedleShape { tip, bore, inner_diameter, ..steel };
+        let shape = NeedleShape { tip, bore, inner_diameter, length, ..steel };
         match &table.material {
             None => shape,
             Some(NeedleMaterialEntry::Preset(name)) => match presets::needle_material(name) {

@@ -7,7 +7,9 @@ use crate::material::kinematics::cofactor;
 use crate::mesh::BlockMesh;
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
 use crate::needle::ToolPose;
-use crate::needle::free_path::{FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SLACK, SLIP_CAP, anchor_offset};
+use crate::needle::free_path::{
+    FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SLACK, SLIP_CAP, SOFTENING_RATE, anchor_offset,
+};
 use crate::solver::elements::CORNERS;
 
 /// A material point in the deformed mesh.
@@ -233,7 +235,8 @@ impl CpuEngine {
             }
             self.state.cut_samples[index] = marked;
             let fraction = f64::from(marked.count_ones()) / SAMPLES.pow(3) as f64;
-            self.soften_cell(cell, (1.0 - fraction).max(plan.params.residual_stiffness));
+            let slowly = self.state.stiffness[cell] - SOFTENING_RATE * tip.advance / size.min_element();
+            self.soften_cell(cell, (1.0 - fraction).max(plan.params.residual_stiffness).max(slowly));
         }
     }
 }

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
+use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
 use crate::model::Model;
@@ -29,6 +30,8 @@ struct ContactSums {
     tip: DVec3,
     normal: DVec3,
     friction: DVec3,
+    /// The normal force acts on the shaft of a needle.
+    on_shaft: bool,
     /// Torque about the tip [N m].
     torque: DVec3,
     friction_work: f64,
@@ -74,6 +77,7 @@ impl CpuEngine {
             tip_coordinate: 0.0,
             tip: model.free_tip(),
             cut_samples: vec![0; model.puncture.as_ref().and_then(|p| p.free.as_ref()).map_or(0, |f| f.cell_count())],
+            bond: Bond::default(),
             contact: vec![ContactState::default(); model.contact_nodes.len()],
             pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
@@ -301,6 +305,9 @@ impl FrameSums {
         let total = c.tip + c.normal + c.friction;
         self.cutting_impulse += c.tip.dot(pose.direction) * dt;
         self.spreading_impulse += c.normal.dot(pose.direction) * dt;
+        if c.on_shaft {
+            self.shaft_impulse += c.normal.dot(pose.direction) * dt;
+        }
         self.friction_impulse += c.friction.dot(pose.direction) * dt;
         self.impulse += total * dt;
         self.angular_impulse += c.torque * dt;

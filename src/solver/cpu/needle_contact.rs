@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{ContactSums, CpuEngine};
 use crate::model::{ContactSurface, PuncturePlan};
 use crate::needle::centre_line::Bend;
-use crate::needle::free_path::{FreeTip, PASSED_MARGIN, WATCHED};
+use crate::needle::free_path::{END_FADE, FreeTip, PASSED_MARGIN, WATCHED, faded_at_end};
 use crate::needle::gap::{Overlap, Profile};
 use crate::needle::{ToolPose, swing};
 use crate::solver::engine::ContactState;
@@ -41,11 +41,11 @@ impl CpuEngine {
             let s = relative.dot(d);
             let bend = line.map_or(Bend::default(), |l| l.at(s, (step - l.first_step) as f64 * self.dt));
             let from_axis = relative - bend.offset;
-            let (passed, rest_radius) = match &plan.free {
-                None => (contact.pushed && contact.rest_axial < a, contact.rest_radius),
+            let (touches, rest_radius, end) = match &plan.free {
+                None => (contact.pushed && contact.rest_axial < a && s > 0.0, contact.rest_radius, 0.0),
                 Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, from_axis, s, d),
             };
-            if !(passed && s > 0.0) {
+            if !touches {
                 *memory =
                     ContactState { rest_radius: memory.rest_radius, passed: memory.passed, ..ContactState::default() };
             } else {
@@ -64,7 +64,11 @@ impl CpuEngine {
                 let travel = (s - memory.axial_on) / plan.params.entry_fade;
                 let fading = if travel > 0.0 && travel < 1.0 { -memory.overlap / plan.params.entry_fade } else { 0.0 };
                 let less = (memory.overlap * (1.0 - travel).clamp(0.0, 1.0), fading);
-                let Overlap { value: depth, gradient } = overlap(less);
+                let mut overlap = overlap(less);
+                if plan.free.is_some() {
+                    overlap = faded_at_end(overlap, d, s, end, END_FADE * cone);
+                }
+                let Overlap { value: depth, gradient } = overlap;
                 let gradient = gradient - d * gradient.dot(bend.slope);
                 let steep = gradient.length();
                 let n = -gradient / steep;
@@ -75,6 +79,7 @@ impl CpuEngine {
                 let elastic = k * depth * steep;
                 let normal = if depth > 0.0 { (elastic - damping * vn).max(0.0) } else { 0.0 };
                 sums.normal = n * normal;
+                sums.on_shaft = s >= cone;
                 if depth > 0.0 {
                     sums.stored = 0.5 * k * depth * depth;
                     sums.damping_power = (elastic - normal) * vn;
@@ -130,8 +135,8 @@ impl CpuEngine {
     }
 }
 
-/// On a free path: brings what the node knows of the tip to this step, and tells whether it is to be kept out of the needle
-/// and with which r0 [m]. `lever` from the tip, `s` behind it along `d`.
+/// On a free path: brings what the node knows of the tip to this step, and tells whether it is to be kept out of the
+/// needle, with which r0 [m], and the front end [m] of what it touches. `lever` from the tip, `s` behind it along `d`.
 fn free_contact(
     plan: &PuncturePlan,
     tip: &FreeTip,
@@ -140,13 +145,14 @@ fn free_contact(
     lever: DVec3,
     s: f64,
     d: DVec3,
-) -> (bool, f64) {
+) -> (bool, f64, f64) {
     let ring = plan.params.ring_radius;
     let relative = rest - tip.place;
     let ahead = relative.dot(tip.along);
     let radius = (relative - tip.along * ahead).length();
-    let passes = ahead <= 0.0 && ahead > -ring && radius < ring;
-    let passed = tip.inside && if memory.passed { ahead < PASSED_MARGIN } else { passes };
+    // The dimple before the puncture is no opened path.
+    let passes = tip.coordinate > 0.0 && ahead <= 0.0 && ahead > -ring && radius < ring;
+    let passed = tip.inside && if memory.passed { ahead <= 0.0 || s > -PASSED_MARGIN } else { passes };
     if passed != memory.passed {
         *memory = ContactState { passed, rest_radius: if passed { radius } else { 0.0 }, ..ContactState::default() };
     }
@@ -154,5 +160,6 @@ fn free_contact(
     // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.
     let reach = WATCHED * needle.radius;
     let met = tip.inside && !passed && s > needle.tip_length && (lever - d * s).length_squared() < reach * reach;
-    (met || (passed && memory.rest_radius > plan.params.softened_radius), memory.rest_radius)
+    let in_ring = passed && s > 0.0 && memory.rest_radius > plan.params.softened_radius;
+    (met || in_ring, memory.rest_radius, if met { needle.tip_length } else { 0.0 })
 }
