@@ -156,6 +156,8 @@ fn curves(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRe
             dash,
             points: inward.iter().map(|r| (abscissa(r), (part.of)(&r.force))).filter(|p| p.1.is_finite()).collect(),
         })
+        // Most runs have few of the parts.
+        .filter(|curve: &Curve| curve.points.iter().any(|p| p.1 != 0.0))
         .collect();
     if !outward.is_empty() {
         curves.push(axial("axial, after full depth", OUTWARD, Some((9, 5)), outward));

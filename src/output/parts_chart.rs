@@ -43,12 +43,20 @@ impl ForceStack {
         }
     }
 
+    /// Which parts act at all; the others are left out of charts, legends and reports.
+    pub fn acting(&self) -> Vec<bool> {
+        self.parts.iter().map(|values| values.iter().any(|v| *v != 0.0)).collect()
+    }
+
     /// The chart: parts that push the tissue along the insertion above zero, those against it below.
     pub(super) fn plot(&self) -> Plot {
         let mut above = vec![0.0; self.abscissa.len()];
         let mut below = above.clone();
         let mut areas = Vec::new();
-        for (part, values) in ForceParts::PARTS.iter().zip(&self.parts) {
+        for ((part, values), acting) in ForceParts::PARTS.iter().zip(&self.parts).zip(self.acting()) {
+            if !acting {
+                continue;
+            }
             let mut near = Vec::with_capacity(values.len());
             let mut far = Vec::with_capacity(values.len());
             for (i, &value) in values.iter().enumerate() {

@@ -72,7 +72,7 @@ fn a_cycle_takes_the_sliding_distance_and_dissipates_its_mean_force() {
         assert!(p.stiffness * new <= p.limit(q) + 1e-12);
         let loss = 0.5 * p.stiffness * (stretch + new) * (stretch + dx - new);
         assert!(loss >= -1e-18, "{loss}");
-        if i >= 5000 && i < 6000 {
+        if (5000..6000).contains(&i) {
             dissipated += loss;
         }
         if slid > 0.0 && q == 0.0 {

@@ -3,7 +3,7 @@
 use plotters::style::{BLACK, RGBColor, WHITE};
 
 use super::CaseResults;
-use crate::observables::ForceParts;
+use crate::observables::{ForcePart, ForceParts};
 use crate::output::chart::{Curve, FINER, GREEN, INWARD, OUTWARD, rgb};
 use crate::output::curve::{DROP_FRACTION, DROP_TRAVEL, ForceDrop, sudden_drops};
 use crate::output::page::{document, escape, figure, numbers, picture, table, words};
@@ -318,31 +318,42 @@ impl Report {
     }
 
     fn parts(&self) -> Result<String> {
-        let mut text = String::from("<div class=\"charts\">\n");
-        let legend: Vec<String> =
-            ForceParts::PARTS.iter().rev().map(|part| legend_swatch(rgb(part.colour), 0.8, part.name)).collect();
+        let stacks: Vec<_> = self.cases.iter().map(|(_, case)| (case, case.stack())).collect();
+        let acting: Vec<(usize, &ForcePart)> = ForceParts::PARTS
+            .iter()
+            .enumerate()
+            .filter(|(part, _)| stacks.iter().any(|(_, stack)| stack.acting()[*part]))
+            .collect();
         let mut columns = vec![words("run"), numbers("depth, mm"), numbers("axial force, N")];
-        columns.extend(ForceParts::PARTS.map(|part| numbers(&format!("{}, N", part.name))));
+        columns.extend(acting.iter().map(|(_, part)| numbers(&format!("{}, N", part.name))));
+        let mut text = String::from("<div class=\"charts\">\n");
         let mut rows = Vec::new();
-        for (_, case) in &self.cases {
-            let stack = case.stack();
+        for (case, stack) in &stacks {
             let chart = inline(&stack.plot(), &format!("Parts of the force against depth, {}", case.name))?;
-            let line = legend_line(BLACK, 2.5, None, "axial force, their sum");
-            let all: Vec<String> = std::iter::once(line).chain(legend.iter().cloned()).collect();
-            text += &figure(&chart, &format!("{}{}", legend_row(&all), escape(&case.scene.title)));
+            let mut legend = vec![legend_line(BLACK, 2.5, None, "axial force, their sum")];
+            let here = acting.iter().rev().filter(|(index, _)| stack.acting()[*index]);
+            legend.extend(here.map(|(_, part)| legend_swatch(rgb(part.colour), 0.8, part.name)));
+            text += &figure(&chart, &format!("{}{}", legend_row(&legend), escape(&case.scene.title)));
             let largest = (0..stack.total.len()).max_by(|&a, &b| stack.total[a].total_cmp(&stack.total[b]));
             if let Some(row) = largest {
                 let total = stack.total[row];
                 let mut cells = vec![escape(&case.name), format!("{:.2}", stack.abscissa[row]), format!("{total:.3}")];
-                cells.extend(stack.parts.iter().map(|part| {
-                    let share = if total != 0.0 { 100.0 * part[row] / total } else { 0.0 };
-                    format!("{:.3} ({share:.0} %)", part[row])
+                cells.extend(acting.iter().map(|(index, _)| {
+                    let value = stack.parts[*index][row];
+                    let share = if total != 0.0 { 100.0 * value / total } else { 0.0 };
+                    format!("{value:.3} ({share:.0} %)")
                 }));
                 rows.push(cells);
             }
         }
         text += "</div>\n";
-        Ok(text + &table("", "Parts of the largest force of every run.", &columns, &rows))
+        Ok(text
+            + &table(
+                "",
+                "Parts of the largest force of every run; parts that act in none are left out.",
+                &columns,
+                &rows,
+            ))
     }
 
     fn drops(&self) -> Result<String> {
@@ -736,9 +747,12 @@ impl Report {
              between tissue and needle that widens with speed (Fig. 11) cannot appear."
                 .into(),
         );
-        items.push(
-            "A flexible needle, its weight and the vibration of the platform, by which the paper explains its region Z.".into(),
-        );
+        if !on("flexible_needle") {
+            items.push(
+                "A flexible needle, its weight and the vibration of the platform, by which the paper explains its region Z."
+                    .into(),
+            );
+        }
         if self.of(Role::Hollow).next().is_none() {
             items.push("The hollow needle, its core and the biopsy itself.".into());
         }
