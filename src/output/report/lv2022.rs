@@ -341,7 +341,8 @@ impl Report {
                 cells.extend(acting.iter().map(|(index, _)| {
                     let value = stack.parts[*index][row];
                     let share = if total != 0.0 { 100.0 * value / total } else { 0.0 };
-                    format!("{value:.3} ({share:.0} %)")
+                    // Adding zero turns a rounded -0 into 0.
+                    format!("{:.3} ({:.0} %)", (value * 1e3).round() * 1e-3 + 0.0, share.round() + 0.0)
                 }));
                 rows.push(cells);
             }
@@ -480,9 +481,12 @@ impl Report {
                 text += &picture_or_gap(case, depth, &format!("{} mm{force}", trimmed(depth * 1e3)));
             }
         }
-        text + "</div></div>\n<p>Rows: depth; columns: speed; one colour bar for all. The paper reports that tissue fits \
-                the needle less closely at higher speed; here the pictures of one row are alike, since no law of the \
-                scenes contains a rate.</p>\n"
+        text += "</div></div>\n<p>Rows: depth; columns: speed; one colour bar for all. The paper reports that tissue fits the \
+                 needle less closely at higher speed";
+        if speeds.iter().all(|case| rate_free(&case.scene)) {
+            text += "; here the pictures of one row are alike, since no law of the scenes contains a rate";
+        }
+        text + ".</p>\n"
     }
 
     fn hollow(&self) -> Result<String> {
@@ -720,7 +724,7 @@ impl Report {
         };
         let on = |key: &str| case.summary.effects.iter().any(|e| e == key);
         let mut items = Vec::new();
-        if !on("viscoelastic") {
+        if rate_free(&case.scene) {
             let measured = largest_difference(&speeds).map_or(String::new(), |d| {
                 format!(" The force at one depth differs by at most {d:.3} N between them.")
             });
@@ -736,7 +740,8 @@ impl Report {
                     .into(),
             );
         }
-        if !on("membrane") {
+        let materials = std::iter::once(&case.scene.material).chain(case.scene.regions.iter().map(|r| &r.material));
+        if materials.into_iter().all(|material| material.membrane_energy.is_none()) {
             items.push(
                 "An outer membrane (\"biological valve\"). The larger force that opens the surface stands for it."
                     .into(),
@@ -804,6 +809,12 @@ fn picture_or_gap(case: &CaseResults, depth: f64, caption: &str) -> String {
 /// `2 mm/s`, never broken between number and unit.
 fn speed_of(case: &CaseResults) -> String {
     format!("{}\u{a0}mm/s", trimmed(case.speed()))
+}
+
+/// True where no law of the scene depends on a rate.
+fn rate_free(scene: &Scene) -> bool {
+    let effects = &scene.effects;
+    effects.viscoelastic.is_none() && effects.puncture.is_none_or(|p| p.rate_exponent == 0.0)
 }
 
 /// What holds the block, in words.
