@@ -140,7 +140,7 @@ fn a_free_state_survives_the_device() {
         return;
     }
     let mut run = run(
-        "free_hand/sideways.toml",
+        "free_hand/stop_and_go.toml",
         &[COARSE, "motion.phase=[{kind = \"insert\", speed_mm_s = 10.0, depth_mm = 4.0}]", FREE],
         EngineChoice::Gpu,
     );
