@@ -1,7 +1,7 @@
 //! Stylet: a needle goes into soft tissue, and a person sees and feels what happens.
 //!
 //! Reading order, which is also the straight line that data takes:
-//! [`scene`] -> [`mesh`] -> [`effects`] -> [`model`] -> [`solver`] (engines [`solver::cpu`] and
+//! [`scene`] -> [`mesh`] -> [`effects`] -> [`separation`] and [`model`] -> [`solver`] (engines [`solver::cpu`] and
 //! [`gpu`]) -> [`observables`] -> [`output`] and [`render`].
 
 pub mod commands;
@@ -19,6 +19,7 @@ pub mod output;
 pub mod process;
 pub mod render;
 pub mod scene;
+pub mod separation;
 pub mod solver;
 
 pub use error::{Error, Result};

@@ -9,6 +9,7 @@ use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
 use stylet::commands::fit::{FitOptions, Volumetric};
+use stylet::commands::report::{ReportOptions, ReportOutcome};
 use stylet::commands::{self, bench::BenchOptions, run::RunOptions};
 use stylet::error::{Error, Result};
 use stylet::scene::Scene;
@@ -39,6 +40,8 @@ enum Command {
     Bench(BenchArgs),
     /// Fit the elastic laws to measured curves of stress against stretch
     Fit(FitArgs),
+    /// Run the scenes of a publication and put its numbers beside ours, as one HTML page
+    Report(ReportArgs),
     /// List the GPU adapters
     Adapters,
     /// Print the JSON schema of scene files
@@ -131,18 +134,40 @@ struct FitArgs {
     json: bool,
 }
 
+#[derive(Args)]
+struct ReportArgs {
+    /// Which report: lv2022
+    name: String,
+    /// Folder of the runs and of the page [default: out/report_<NAME>, with --quick out/report_<NAME>_quick]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    #[arg(long, default_value = "auto")]
+    engine: EngineChoice,
+    /// Coarse cells: a look at the page within seconds, no result
+    #[arg(long)]
+    quick: bool,
+    /// Override a key of all scenes; the page says so
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Folder of the scenes [default: scenes/<NAME>]
+    #[arg(long)]
+    scenes: Option<PathBuf>,
+    /// Compute everything again, and replace what the folder holds
+    #[arg(long)]
+    force: bool,
+}
+
 /// Prints to standard output; a closed pipe (`| head`) is no failure.
 fn print(text: &str) {
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "{text}").and_then(|()| out.flush());
 }
 
-fn run(args: &RunArgs, start: Instant) -> Result<u8> {
-    let scene = Scene::load(&args.scene.scene, &args.scene.overrides)?;
-    let options = RunOptions { engine: args.scene.engine, out: args.out.clone(), force: args.force };
+/// Becomes true with Ctrl-C; a second Ctrl-C ends the program at once.
+fn until_interrupted() -> Arc<AtomicBool> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = interrupted.clone();
-    // A second Ctrl-C ends the program at once.
     let handler = move || {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(commands::run::EXIT_INTERRUPTED.into());
@@ -151,6 +176,38 @@ fn run(args: &RunArgs, start: Instant) -> Result<u8> {
     if let Err(error) = ctrlc::set_handler(handler) {
         log::warn!("Ctrl-C will end the program at once: {error}");
     }
+    interrupted
+}
+
+fn report(args: ReportArgs) -> Result<u8> {
+    let options = ReportOptions {
+        name: args.name,
+        engine: args.engine,
+        out: args.out,
+        scenes: args.scenes,
+        quick: args.quick,
+        overrides: args.overrides,
+        force: args.force,
+    };
+    match commands::report::report(&options, &until_interrupted())? {
+        ReportOutcome::Page { path, failed } => {
+            print(&path.display().to_string());
+            if failed > 0 {
+                eprintln!("error: {failed} of the runs failed; the page says why");
+            }
+            Ok(if failed > 0 { commands::run::EXIT_DIVERGED } else { 0 })
+        }
+        ReportOutcome::Interrupted { done, of } => {
+            eprintln!("interrupted: {done} of {of} runs are finished and stay; the same command goes on from there");
+            Ok(commands::run::EXIT_INTERRUPTED)
+        }
+    }
+}
+
+fn run(args: &RunArgs, start: Instant) -> Result<u8> {
+    let scene = Scene::load(&args.scene.scene, &args.scene.overrides)?;
+    let options = RunOptions { engine: args.scene.engine, out: args.out.clone(), force: args.force };
+    let interrupted = until_interrupted();
     let outcome = commands::run::run(scene, &options, start, &interrupted);
     let code = commands::run::exit_code(&outcome);
     match outcome {
@@ -205,6 +262,7 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
             print(&if args.json { report.json() } else { report.text() });
             Ok(0)
         }
+        Some(Command::Report(args)) => report(args),
         Some(Command::FirstStep { engine }) => {
             print(&commands::bench::first_step(engine, start)?);
             Ok(0)

@@ -1,15 +1,18 @@
 //! What is constant during a run: mesh, masses, loads, and what the chosen effects prepare once.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
-use crate::effects::{EffectSet, puncture};
+use crate::effects::{EffectSet, cohesive, puncture};
 use crate::material_point::Material;
-use crate::mesh::{BlockMesh, Mesh};
+use crate::mesh::{BlockMesh, Bore, Mesh};
 use crate::needle::free_path::FreeTip;
 use crate::needle::gap::Profile;
 use crate::needle::{Kinematics, PlannedPath, lateral_axes};
 use crate::scene::motion::Placement;
 use crate::scene::{Cutting, Face, FaceCondition, NeedleShape, RegionShape, Scene, TissueMaterial, Tool};
+use crate::separation::{Cut, FacePair, Separation};
 
 /// A node that the tool may touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,8 +22,24 @@ pub struct ContactNode {
     pub rest_radius: f64,
     /// Rest coordinate s0 along the path, measured from the surface [m].
     pub rest_axial: f64,
-    /// True for the ring a0 < r0 < ring radius that the shaft pushes; the other nodes only carry tip springs.
+    /// True for nodes that the needle pushes: the ring a0 < r0 < ring radius, or the copies of a surface that separates; the
+    /// others only carry tip springs.
     pub pushed: bool,
+    pub surface: ContactSurface,
+}
+
+/// Against what part of the needle a node is held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ContactSurface {
+    /// The volume-preserving wall of the opened path.
+    OpenedPath,
+    /// The face of a slit, pushed to its own side (unit vector across the slit).
+    Slit {
+        side: DVec3,
+    },
+    /// The outer wall of a hollow needle, and its bore.
+    OuterWall,
+    Bore,
 }
 
 /// A cell that the opened path passes through.
@@ -49,6 +68,10 @@ pub struct PathSegment {
     /// Material coordinate at which it begins [m].
     pub start: f64,
     pub cutting: Cutting,
+    /// Length over which the threshold falls from F_pun to F_cut [m].
+    pub transition_length: f64,
+    /// A layer with a puncture energy of its own.
+    pub membrane: bool,
 }
 
 /// Most materials of one scene; the last index is that of the last region.
@@ -59,12 +82,18 @@ pub const LARGEST_SEGMENT_COUNT: usize = 16;
 
 impl PuncturePlan {
     /// Tip force at which the tip advances at the coordinate a [N]: from F_pun of the material that it enters down to
-    /// F_cut over the transition length.
+    /// F_cut over the transition length; over the last transition length before the bottom it fades to nothing, since a spring
+    /// that ended at once would throw the tissue back.
     pub fn threshold(&self, a: f64) -> f64 {
-        let after = self.segments.partition_point(|s| s.start <= a).max(1) - 1;
-        let PathSegment { start, cutting } = self.segments[after];
-        let entry = (1.0 - (a - start) / self.params.transition_length).max(0.0);
-        cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * entry
+        let PathSegment { start, cutting, transition_length, .. } = self.segment(a);
+        let entry = (1.0 - (a - start) / transition_length).max(0.0);
+        let left = ((self.exit - a) / self.params.transition_length).clamp(0.0, 1.0);
+        (cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * entry) * left
+    }
+
+    /// The stretch of the path at the coordinate a [m].
+    pub fn segment(&self, a: f64) -> PathSegment {
+        self.segments[self.segments.partition_point(|s| s.start <= a).max(1) - 1]
     }
 }
 
@@ -79,6 +108,8 @@ pub struct PuncturePlan {
     pub profile: Profile,
     pub path: PlannedPath,
     pub anchors: Vec<TipAnchor>,
+    /// Material coordinate at which the path leaves the block through the bottom [m].
+    pub exit: f64,
     pub cells: Vec<PathCell>,
     /// Contact stiffness k [N/m].
     pub contact_stiffness: f64,
@@ -144,6 +175,10 @@ pub struct Model {
     /// Time over which the loads grow [s].
     pub load_ramp: f64,
     pub puncture: Option<PuncturePlan>,
+    /// Faces that may separate, and copies that are tied.
+    pub separation: Separation,
+    /// Their law; `None` without the effect.
+    pub cohesion: Option<cohesive::Law>,
     /// Nodes that a tool may touch, ascending in the node index; empty without contact.
     pub contact_nodes: Vec<ContactNode>,
 }
@@ -151,8 +186,17 @@ pub struct Model {
 /// Reference length of the contact stiffness [m].
 const CONTACT_LENGTH: f64 = 0.6e-3;
 
-/// Number of tip springs: one on the axis, 6 at R/2, 12 at R.
+/// Number of tip springs of a solid needle on a path without a slit: one on the axis, 6 at R/2, 12 at R.
 pub const ANCHOR_COUNT: usize = 19;
+
+/// Most tip springs: those of a cutting ring.
+pub const LARGEST_ANCHOR_COUNT: usize = 24;
+
+/// Distance of the tip springs of a cutting ring from its edge, on either side [m].
+const CUTTING_RING: f64 = 0.2e-3;
+
+/// How far beyond the needle's sides a slit may tear [m].
+const SLIT_MARGIN: f64 = 1.0e-3;
 
 impl Model {
     /// Prepares a scene. The mesh is built from the scene by `BlockMesh::for_scene`.
@@ -177,10 +221,13 @@ impl Model {
             load_ramp,
             kinematics,
             puncture: None,
+            separation: Separation::default(),
+            cohesion: None,
             contact_nodes: Vec::new(),
             scene,
             mesh,
         };
+        model.plan_separation();
         model.plan_puncture();
         model.plan_indentation();
         model
@@ -240,6 +287,28 @@ impl Model {
         factor * self.scene.material.law.p_wave_modulus() * CONTACT_LENGTH * CONTACT_LENGTH / h
     }
 
+    /// The planned path, if the tool is a needle that cuts.
+    fn planned_path(&self) -> Option<PlannedPath> {
+        let motion = &self.scene.motion;
+        let cuts = self.effects.puncture.is_some() && self.scene.needle().is_some() && !has_free_path(&self.scene);
+        cuts.then_some(PlannedPath { entry: motion.entry, direction: motion.direction })
+    }
+
+    fn plan_separation(&mut self) {
+        let (Some(params), Some(mesh)) = (&self.effects.cohesive, self.mesh.as_block()) else { return };
+        let h = self.scene.tissue.cell_size;
+        let cut = self.planned_path().zip(self.scene.needle()).map(|(path, needle)| Cut {
+            path,
+            reach: needle.radius + SLIT_MARGIN,
+            driven: 1.05 * needle.radius,
+            deepest: self.scene.motion.deepest() + 2.0 * h,
+            ring: needle.bore.is_some(),
+        });
+        let planes: Vec<(usize, f64)> = params.planes.iter().map(|p| (p.axis, p.at)).collect();
+        self.separation = Separation::new(mesh, &planes, cut.as_ref());
+        self.cohesion = Some(cohesive::Law::new(params, self.scene.material.law.youngs_modulus(), h));
+    }
+
     fn plan_puncture(&mut self) {
         let (Some(params), Some(Tool::Needle(needle))) = (self.effects.puncture, &self.scene.tool) else {
             return;
@@ -252,25 +321,37 @@ impl Model {
         let path = PlannedPath { entry: self.scene.motion.entry, direction: self.scene.motion.direction };
         let deepest = self.scene.motion.deepest();
         let Some(mesh) = self.mesh.as_block() else { return };
-        let cells = path_cells(mesh, &path, params.softened_radius, deepest);
+        // Faces that separate need no softened path; the core of a hollow needle is severed cell by cell.
+        let cells = match (&self.cohesion, mesh.bore) {
+            (Some(_), Some(bore)) => core_cells(mesh, &bore, deepest),
+            (Some(_), None) => Vec::new(),
+            (None, _) => path_cells(mesh, &path, params.softened_radius, deepest),
+        };
+        let exit = self.scene.tissue.size.z / -path.direction.z;
+        let surfaces = self.separated_surfaces(&path);
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the needle radius.
         let anchor_reach = needle.radius + self.scene.tissue.cell_size * 1.5;
+        let cohesive = self.cohesion.is_some();
         self.contact_nodes = (0..mesh.node_count())
             .filter_map(|node| {
                 let (r0, s0) = path.material_coordinates(mesh.rest_position(node));
-                let pushed = r0 > params.softened_radius && r0 < params.ring_radius && s0 < deepest;
+                let surface = surfaces.get(&(node as u32)).copied().unwrap_or(ContactSurface::OpenedPath);
+                let in_ring = r0 > params.softened_radius && r0 < params.ring_radius;
+                let pushed = s0 < deepest && if cohesive { surface != ContactSurface::OpenedPath } else { in_ring };
                 let carries = r0 < anchor_reach && s0 < deepest + 2.0 * self.scene.tissue.cell_size;
                 (pushed || carries).then_some(ContactNode {
                     node: node as u32,
                     rest_radius: r0,
                     rest_axial: s0,
                     pushed,
+                    surface,
                 })
             })
             .collect();
         self.puncture = Some(PuncturePlan {
-            segments: path_segments(&self.scene, &params, &path, deepest),
-            anchors: tip_anchors(&path, needle.radius),
+            segments: path_segments(&self.scene, &params, &path, exit),
+            exit,
+            anchors: tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
             cells,
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
             params,
@@ -297,7 +378,13 @@ impl Model {
         let reach = params.ring_radius.max(needle.radius + 1.5 * h) + FREE_PATH_ROOM;
         self.contact_nodes = (0..mesh.node_count())
             .filter(|&node| near(mesh.rest_position(node), reach))
-            .map(|node| ContactNode { node: node as u32, rest_radius: 0.0, rest_axial: 0.0, pushed: true })
+            .map(|node| ContactNode {
+                node: node as u32,
+                rest_radius: 0.0,
+                rest_axial: 0.0,
+                pushed: true,
+                surface: ContactSurface::OpenedPath,
+            })
             .collect();
         let opened = (0..mesh.cell_count()).filter(|&cell| {
             let size = mesh.cell_size(cell);
@@ -319,7 +406,13 @@ impl Model {
         let path = PlannedPath { entry: motion.entry, direction: motion.direction };
         self.puncture = Some(PuncturePlan {
             free: Some(FreePlan { low, count, cuttings: cuttings.map(cutting).collect() }),
-            segments: vec![PathSegment { start: 0.0, cutting: cutting(&self.scene.material) }],
+            segments: vec![PathSegment {
+                start: 0.0,
+                cutting: cutting(&self.scene.material),
+                transition_length: params.transition_length,
+                membrane: false,
+            }],
+            exit: f64::INFINITY,
             anchors: Vec::new(),
             cells: Vec::new(),
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
@@ -328,6 +421,43 @@ impl Model {
             needle,
             path,
         });
+    }
+
+    /// What part of the needle the copies of the path's surface face.
+    fn separated_surfaces(&self, path: &PlannedPath) -> HashMap<u32, ContactSurface> {
+        let driven = self.separation.pairs.iter().filter(|p| p.tip_driven.is_some() || self.on_slit(p));
+        let hollow = self.scene.has_bore();
+        let axis_of = |pair: &FacePair| if pair.axis == 0 { DVec3::X } else { DVec3::Y };
+        driven
+            .flat_map(|pair| {
+                let rest = self.mesh.rest_position(pair.nodes[0] as usize) - path.entry;
+                // Of a ring pair the copy on the side of the axis belongs to the core.
+                let core = usize::from(rest.dot(axis_of(pair)) < 0.0);
+                [0, 1].map(|n| {
+                    let surface = match (hollow, n == core) {
+                        (true, true) => ContactSurface::Bore,
+                        (true, false) => ContactSurface::OuterWall,
+                        (false, _) => ContactSurface::Slit { side: axis_of(pair) * if n == 0 { -1.0 } else { 1.0 } },
+                    };
+                    (pair.nodes[n], surface)
+                })
+            })
+            .collect()
+    }
+
+    /// True where the mesh follows the bore of a hollow needle.
+    pub fn has_bore(&self) -> bool {
+        self.mesh.as_block().is_some_and(|block| block.bore.is_some())
+    }
+
+    /// True where a node is held against a surface of this kind.
+    pub fn has_surface(&self, wanted: impl Fn(&ContactSurface) -> bool) -> bool {
+        self.contact_nodes.iter().any(|c| wanted(&c.surface))
+    }
+
+    /// True for the pairs of the slit, driven or not.
+    fn on_slit(&self, pair: &FacePair) -> bool {
+        self.scene.slit_axis() == Some(pair.axis)
     }
 
     fn plan_indentation(&mut self) {
@@ -348,6 +478,7 @@ impl Model {
                     rest_radius: r0,
                     rest_axial: 0.0,
                     pushed: true,
+                    surface: ContactSurface::OpenedPath,
                 })
             })
             .collect();
@@ -486,38 +617,60 @@ fn node_flags(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
     flags
 }
 
-/// Stretches of the path with their own tip forces, from the materials that its axis passes through.
-fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, deepest: f64) -> Vec<PathSegment> {
+/// Stretches of the path with their own tip forces, from the materials that its axis passes through on its way to the
+/// bottom at `exit` [m].
+fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, exit: f64) -> Vec<PathSegment> {
     const STEP: f64 = 2.0e-5;
     let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
-    let at = |a: f64| {
-        let x = path.entry + path.direction * a;
-        let region = scene.regions.iter().rposition(|r| r.shape.contains(x));
-        (region, region.map_or(scene.material.cutting, |r| scene.regions[r].material.cutting).unwrap_or(own))
-    };
-    let mut segments: Vec<(Option<usize>, PathSegment)> = Vec::new();
-    for i in 0..=(deepest / STEP).ceil() as usize {
+    let mut starts: Vec<(f64, Option<usize>)> = Vec::new();
+    for i in 0..(exit / STEP).ceil().max(1.0) as usize {
         // The surface itself belongs to what lies under it.
         let a = i as f64 * STEP;
-        let (region, cutting) = at(a + 0.5 * STEP);
-        if segments.last().is_none_or(|(last, _)| *last != region) {
-            segments.push((region, PathSegment { start: a, cutting }));
+        let x = path.entry + path.direction * (a + 0.5 * STEP);
+        let region = scene.regions.iter().rposition(|r| r.shape.contains(x));
+        if starts.last().is_none_or(|(_, last)| *last != region) {
+            starts.push((a, region));
         }
     }
-    segments.into_iter().map(|s| s.1).take(LARGEST_SEGMENT_COUNT).collect()
+    let ends = starts.iter().skip(1).map(|s| s.0).chain([exit]);
+    starts
+        .iter()
+        .zip(ends)
+        .take(LARGEST_SEGMENT_COUNT)
+        .map(|(&(start, region), end)| {
+            let material = region.map_or(&scene.material, |r| &scene.regions[r].material);
+            let mut cutting = material.cutting.unwrap_or(own);
+            let mut transition_length = params.transition_length;
+            if let Some(energy) = material.membrane_energy {
+                transition_length = transition_length.min(end - start);
+                cutting.puncture_force = cutting.cutting_force + 2.0 * energy / transition_length;
+            }
+            PathSegment { start, cutting, transition_length, membrane: material.membrane_energy.is_some() }
+        })
+        .collect()
 }
 
-/// Lines on which the tip springs are anchored.
-fn tip_anchors(path: &PlannedPath, radius: f64) -> Vec<TipAnchor> {
+/// Lines on which the tip springs are anchored: one on the axis, 6 at R/2, 12 at R. Before a slit none lies on its plane,
+/// where it would pull at one side; a cutting ring has 12 on either side of its edge.
+fn tip_anchors(path: &PlannedPath, needle: &NeedleShape, cohesive: bool) -> Vec<TipAnchor> {
     let (e1, e2) = lateral_axes(path.direction);
+    let turn = if cohesive { std::f64::consts::TAU / 24.0 } else { 0.0 };
     let ring = |count: usize, r: f64| {
         (0..count).map(move |i| {
-            let angle = std::f64::consts::TAU * i as f64 / count as f64;
+            let angle = std::f64::consts::TAU * i as f64 / count as f64 + turn;
             (e1 * angle.cos() + e2 * angle.sin()) * r
         })
     };
-    let offsets = std::iter::once(DVec3::ZERO).chain(ring(6, 0.5 * radius)).chain(ring(12, radius));
+    let radius = needle.radius;
+    let offsets: Vec<DVec3> = match needle.bore.filter(|_| cohesive) {
+        Some(bore) => ring(12, bore.edge - CUTTING_RING).chain(ring(12, bore.edge + CUTTING_RING)).collect(),
+        None => {
+            let centre = (!cohesive).then_some(DVec3::ZERO);
+            centre.into_iter().chain(ring(6, 0.5 * radius)).chain(ring(12, radius)).collect()
+        }
+    };
     offsets
+        .into_iter()
         .map(|o| {
             // The line entry + o + t s meets z = 0 at s = -o.z / t.z.
             let axial_offset = -o.z / path.direction.z;
@@ -552,6 +705,28 @@ fn path_cells(mesh: &BlockMesh, path: &PlannedPath, radius: f64, deepest: f64) -
             (inside > 0 && start < deepest).then_some(PathCell {
                 cell: cell as u32,
                 fraction: inside as f64 / SAMPLES.pow(3) as f64,
+                axial_start: start,
+                axial_end: end,
+            })
+        })
+        .collect()
+}
+
+/// Cells of the core that a hollow needle can cut out, with the range of s0 of their layer.
+fn core_cells(mesh: &BlockMesh, bore: &Bore, deepest: f64) -> Vec<PathCell> {
+    let ring = bore.radius * (1.0 + 1e-9);
+    (0..mesh.cell_count())
+        .filter(|cell| !mesh.is_gap(*cell))
+        .filter_map(|cell| {
+            let at = mesh.cell_coordinates(cell);
+            let inside = (0..2).all(|a| {
+                let from_axis = [mesh.lines[a][at[a]], mesh.lines[a][at[a] + 1]].map(|x| (x - bore.centre[a]).abs());
+                from_axis[0].max(from_axis[1]) <= ring
+            });
+            let (start, end) = (-mesh.lines[2][at[2] + 1], -mesh.lines[2][at[2]]);
+            (inside && start < deepest).then_some(PathCell {
+                cell: cell as u32,
+                fraction: 1.0,
                 axial_start: start,
                 axial_end: end,
             })

@@ -10,12 +10,14 @@ use stylet::effects::EffectSet;
 use stylet::material::ElasticLaw;
 use stylet::mesh::{BlockMesh, Mesh};
 use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord, Health};
-use stylet::output::folder::{ENERGY_TABLE, FORCE_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY};
+use stylet::output::folder::{
+    ENERGY_TABLE, FORCE_CHART, FORCE_PARTS_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY,
+};
 use stylet::output::sample::{Motion as FaceMotion, SAMPLE_COLUMNS};
-use stylet::output::tables::{ENERGY_COLUMNS, FORCE_COLUMNS};
+use stylet::output::tables::{ENERGY_COLUMNS, force_columns};
 use stylet::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Status, Summary, Tables, write_force_chart,
-    write_sample_chart,
+    write_parts_chart, write_sample_chart,
 };
 use stylet::render::{self, Image, Picture, offscreen, raster};
 use stylet::scene::{
@@ -61,10 +63,12 @@ fn records() -> Vec<FrameRecord> {
                 force: ForceParts {
                     axial: cutting + spreading + friction,
                     cutting,
-                    spreading,
+                    tip_spreading: 0.25 * spreading,
+                    shaft_spreading: 0.75 * spreading,
                     friction,
                     lateral: DVec3::new(0.01, -0.02, 0.0),
                     torque: DVec3::new(1e-5, 0.0, 2e-6),
+                    ..Default::default()
                 },
                 tip_coordinate: depth - 0.5e-3,
                 energy: EnergyAccount {
@@ -109,9 +113,11 @@ fn graded(low: f64, high: f64, cell: f64, fine: f64) -> Vec<f64> {
 }
 
 fn mesh(cell: f64) -> Mesh {
-    Mesh::Block(BlockMesh {
-        lines: [graded(-10e-3, 10e-3, cell, 3e-3), graded(-10e-3, 10e-3, cell, 3e-3), graded(-16e-3, 0.0, cell, 9e-3)],
-    })
+    Mesh::Block(BlockMesh::new([
+        graded(-10e-3, 10e-3, cell, 3e-3),
+        graded(-10e-3, 10e-3, cell, 3e-3),
+        graded(-16e-3, 0.0, cell, 9e-3),
+    ]))
 }
 
 fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
@@ -136,6 +142,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
             entry: DVec3::ZERO,
             direction: direction.normalize(),
             phases: vec![Phase::Insert { speed: 2e-3, depth: 6e-3 }],
+            vibration: None,
         },
         effects: EffectSet::default(),
         solver: SolverSettings {
@@ -224,6 +231,7 @@ fn a_named_folder_is_made_and_not_reused() {
         "energy.csv",
         "summary.json",
         "force.svg",
+        "force_parts.svg",
         "sample.csv",
         "sample.svg",
         "frames.pvd",
@@ -296,7 +304,7 @@ fn pictures_are_named_by_their_moment() {
 fn tables_grow_row_by_row_and_survive_without_being_closed() {
     let base = tempfile::tempdir().unwrap();
     let folder = OutputFolder::create(Some(base.path()), "scene", false).unwrap();
-    let mut tables = Tables::create(&folder, &[]).unwrap();
+    let mut tables = Tables::create(&folder, &[], false).unwrap();
     assert!(!folder.file(SAMPLE_TABLE).exists());
     let records = records();
     for (rows, record) in records.iter().take(5).enumerate() {
@@ -307,7 +315,7 @@ fn tables_grow_row_by_row_and_survive_without_being_closed() {
         assert!(text.ends_with('\n'));
     }
     std::mem::forget(tables);
-    for (name, columns) in [(FORCE_TABLE, &FORCE_COLUMNS[..]), (ENERGY_TABLE, &ENERGY_COLUMNS[..])] {
+    for (name, columns) in [(FORCE_TABLE, &force_columns()[..]), (ENERGY_TABLE, &ENERGY_COLUMNS[..])] {
         let mut reader = csv::Reader::from_path(folder.file(name)).unwrap();
         assert_eq!(reader.headers().unwrap(), columns);
         let rows: Vec<Vec<f64>> =
@@ -562,6 +570,36 @@ fn charts_are_well_formed() {
             assert!(text.contains("depth of the tip [mm]"));
             let label = format!("puncture {:.2} N at", figures.puncture_force.unwrap());
             assert!(text.contains(&label));
+        }
+    }
+}
+
+#[test]
+fn parts_of_the_force_add_up_in_tables_and_charts() {
+    let base = kept("charts");
+    fs::create_dir_all(&base).unwrap();
+    let all = records();
+    for record in &all {
+        let sum: f64 = ForceParts::PARTS.iter().map(|part| (part.of)(&record.force)).sum();
+        assert!((sum - record.force.axial).abs() < 1e-12);
+    }
+    for part in ForceParts::PARTS {
+        assert!(force_columns().contains(&part.column), "{}", part.column);
+    }
+    let mut broken = all.clone();
+    broken[50].force.friction = f64::NAN;
+    for (name, records, abscissa) in [
+        (FORCE_PARTS_CHART, &all[..], "time [s]"),
+        ("parts_inward.svg", &all[..150], "depth of the tip [mm]"),
+        ("parts_broken.svg", &broken[..], "time [s]"),
+        ("parts_empty.svg", &[], "time [s]"),
+    ] {
+        write_parts_chart(&base.join(name), "Parts <of> the force", records).unwrap();
+        let text = fs::read_to_string(base.join(name)).unwrap();
+        assert_well_formed(&text);
+        assert!(!text.contains("NaN") && text.contains(abscissa), "{name}");
+        for part in ForceParts::PARTS {
+            assert!(text.contains(part.name), "{name}: {}", part.name);
         }
     }
 }

@@ -3,8 +3,8 @@
 #import effects/free_path
 #endif
 struct PunctureParams {
-    // Length over which the threshold of the tip force falls behind the entry of a material [m].
-    transition_length: f32,
+    // Material coordinate at which the path leaves the block through the bottom [m].
+    exit: f32,
     // Stiffness of all tip springs together [N/m].
     tip_stiffness: f32,
     // Elastic stiffness left in a softened cell.
@@ -24,19 +24,35 @@ struct PunctureParams {
     ring_radius: f32,
     // Shift of a section's centre per radius: zero for a cone, from the apex to the axis for a bevel; w unused.
     shift: vec4<f32>,
+    // Radii of the cutting edge and of the bore [m]; coefficient mu of the bore.
+    edge_radius: f32,
+    bore_radius: f32,
+    bore_grip: f32,
+    _pad2: u32,
     // Of a free path: direction of the needle before the run, to which `shift` belongs; first cell and cells per axis of
     // the box of `free_cells`; w unused.
     reference: vec4<f32>,
     free_low: vec4<u32>,
     free_count: vec4<u32>,
+    // Bit i: segment i is a membrane.
+    membranes: u32,
+    // Exponent of the speed in the tip forces, and the speed up to which they are the written ones [m/s].
+    rate_exponent: f32,
+    reference_speed: f32,
+    // Length before the exit over which the threshold fades to nothing [m].
+    exit_fade: f32,
     // Of a free path: of material number i only F_pun and F_cut [N], second and third. Of a planned path: stretches of
-    // the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], unused.
+    // the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], length over which the
+    // threshold falls from one to the other [m].
     segments: array<vec4<f32>, 16>,
 }
 
 // Material line parallel to the path: where it enters the surface [m], w: unused.
 struct TipAnchor {
     surface: vec4<f32>,
+    // In a bent grid, whose columns it runs through: column (x, y) and place in it (0..1); z, w unused.
+    column: vec4<u32>,
+    local: vec4<f32>,
 }
 
 // Where an anchor sits now: cell (w unused), local coordinates 0..1, force along the path [N].
@@ -56,6 +72,17 @@ struct TipState {
     dissipation: f32,
     spring_energy: f32,
     softening: f32,
+    // Impulse of the tip law in membranes and of tissue that holds on to the tip, in this frame [N s].
+    membrane_impulse: f32,
+    bond_impulse: f32,
+    // Dissipated by that bond in this frame [J]; its stretch and the distance it slid [m].
+    bond_dissipation: f32,
+    bond_stretch: f32,
+    bond_slid: f32,
+    // Mean distance of the tip plane beyond the anchors [m].
+    gap: f32,
+    _pad0: f32,
+    _pad1: f32,
 }
 
 // Cell that the path passes: fraction of its volume that opens, s0 range of that part [m].
@@ -80,16 +107,37 @@ struct PathCell {
 @group(3) @binding(1) var<storage, read_write> tip_state: TipState;
 @group(3) @binding(2) var<storage, read_write> tip_anchor_loads: array<TipAnchorLoad>;
 
+#ifdef BORE
+const ANCHOR_COUNT: u32 = 24u;
+#else
+#ifdef SLIT
+const ANCHOR_COUNT: u32 = 18u;
+#else
 const ANCHOR_COUNT: u32 = 19u;
+#endif
+#endif
 
-// Threshold of the tip force at material coordinate a [N].
-fn tip_threshold(a: f32) -> f32 {
+// Threshold of the tip force at material coordinate a of a needle that moves at `speed` [N].
+fn tip_threshold(a: f32, speed: f32) -> f32 {
     var segment = puncture.segments[0];
     for (var i = 1u; i < 16u; i++) {
         segment = select(segment, puncture.segments[i], puncture.segments[i].x <= a);
     }
-    let entry = max(0.0, 1.0 - (a - segment.x) / puncture.transition_length);
-    return segment.z + (segment.y - segment.z) * entry;
+    let entry = max(0.0, 1.0 - (a - segment.x) / segment.w);
+    let ratio = max(speed, puncture.reference_speed) / puncture.reference_speed;
+    // Without a rate the law is exactly that without this factor.
+    let rate = select(pow(ratio, puncture.rate_exponent), 1.0, puncture.rate_exponent == 0.0);
+    let left = clamp((puncture.exit - a) / puncture.exit_fade, 0.0, 1.0);
+    return (segment.z + (segment.y - segment.z) * entry) * left * rate;
+}
+
+// 1 where the material at coordinate a is a membrane, else 0.
+fn membrane_share(a: f32) -> f32 {
+    var segment = 0u;
+    for (var i = 1u; i < 16u; i++) {
+        segment = select(segment, i, puncture.segments[i].x <= a);
+    }
+    return f32(extractBits(puncture.membranes, segment, 1u));
 }
 
 // How deep a point lies inside the needle [m] and the gradient of that depth (src/needle/gap.rs).
@@ -116,3 +164,40 @@ fn opened_path(lever: vec3<f32>, d: vec3<f32>, s: f32, rest_radius: f32, less: v
     let m = rc * slope / open - less.y + slope * dot(e, shift);
     return Overlap(open - less.x - r, d * m - e);
 }
+
+#ifdef SLIT
+// Overlap of one face of a slit with the section, pushed to its own side, faded over SLIT_FADE = 1/3 of the radius.
+fn slit_face(lever: vec3<f32>, d: vec3<f32>, s: f32, side: vec3<f32>, less: vec2<f32>) -> Overlap {
+    let on_tip = s < puncture.tip_length;
+    let full_slope = puncture.needle_radius / puncture.tip_length;
+    let rc = select(puncture.needle_radius, full_slope * s, on_tip);
+    let slope = select(0.0, full_slope, on_tip);
+    let shift = puncture.shift.xyz;
+    let rho = lever - d * s - shift * rc;
+    let p = dot(rho, side);
+    let q = rho - side * p;
+    let square = rc * rc - dot(q, q);
+    let w = sqrt(max(square, 0.0));
+    let fade = square + puncture.needle_radius * puncture.needle_radius / 9.0;
+    let part = square / fade;
+    // d phi / d w^2.
+    let rate = (1.0 - part) / fade * (w - p) + 0.5 * w / fade;
+    let value = part * (w - p);
+    let lateral = side * -part - q * (2.0 * rate);
+    let along = (2.0 * rc * rate - dot(lateral, shift)) * slope - less.y;
+    return Overlap(select(-1.0, value - less.x, square > 0.0), select(-side, lateral + d * along, square > 0.0));
+}
+#endif
+#ifdef BORE
+// Overlap of the tissue around a hollow needle with its outer wall (`outside` 1) or of the core with its bore (-1).
+fn tube_wall(lever: vec3<f32>, d: vec3<f32>, s: f32, outside: f32, less: vec2<f32>) -> Overlap {
+    let rho = lever - d * s;
+    let r = length(rho);
+    let e = rho * select(0.0, 1.0 / r, r > 1e-9);
+    let growth = select(puncture.bore_radius, puncture.needle_radius, outside > 0.0) - puncture.edge_radius;
+    let t = clamp(s / puncture.tip_length, 0.0, 1.0);
+    let wall = puncture.edge_radius + growth * t * t * (3.0 - 2.0 * t);
+    let slope = growth * 6.0 * t * (1.0 - t) / puncture.tip_length;
+    return Overlap(outside * (wall - r) - less.x, (d * slope - e) * outside - d * less.y);
+}
+#endif

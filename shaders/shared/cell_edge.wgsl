@@ -6,5 +6,11 @@ struct CellEdge {
     _pad: f32,
 }
 
-// Edges along x, then y, then z.
-@group(1) @binding(0) var<storage, read> cell_edges: array<CellEdge>;
+// Floor of the squared size of a cell [m^2], so that a gap between two copies of a line, which has none, divides by no zero.
+const SMALLEST_SQUARE: f32 = 1e-12;
+
+#ifdef BORE
+#import shared/bent_column
+#else
+#import shared/straight_column
+#endif

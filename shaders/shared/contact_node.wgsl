@@ -1,9 +1,15 @@
+#import shared/params
+#import shared/step_input
+
 // A node that the tool may touch: what is known before the run.
 struct ContactNode {
     // Rest position X [m], w unused.
     rest: vec4<f32>,
     // Grid coordinates of the node, w unused.
     grid: vec4<u32>,
+    // Of a surface that separates: side to which a slit face is pushed (unit vector); w: 1 at the outer wall of a hollow
+    // needle, -1 at its bore.
+    surface: vec4<f32>,
     node: u32,
     // Slot of `corner_force` that takes the force on this node.
     slot: u32,
@@ -26,12 +32,13 @@ struct ContactMemory {
     overlap: f32,
     axial_on: f32,
     touching: f32,
+    // 1 while pressed by the full shaft.
+    on_shaft: f32,
     // On a free path: 1 where the tip has passed, and the distance from the axis there [m].
     passed: f32,
     rest_radius: f32,
     _pad0: f32,
     _pad1: f32,
-    _pad2: f32,
 }
 
 // Sums over the steps of a frame; forces on the tissue.
@@ -50,7 +57,8 @@ struct ContactSums {
     damping_dissipation: f32,
     // Stored in the springs of this node at the last step [J].
     stored: f32,
-    _pad: f32,
+    // The part of `spreading` on the shaft of a needle [N s].
+    shaft: f32,
 }
 
 @group(1) @binding(4) var<storage, read> contact_nodes: array<ContactNode>;

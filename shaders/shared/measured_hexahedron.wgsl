@@ -22,8 +22,6 @@ fn measured_cell(index: u32) -> MeasuredCell {
     out.kept = cell_stiffness[index];
 #endif
     out.energy = cell_energy(cell, material_of(index), out.kept, &u);
-    out.volume = cell_edges[cell.x].length
-        * cell_edges[params.cells_x + cell.y].length
-        * cell_edges[params.cells_x + params.cells_y + cell.z].length;
+    out.volume = column_area(column_at(cell.x, cell.y)) * layer_edge(cell.z).length;
     return out;
 }

@@ -5,18 +5,26 @@
 #import shared/displacement
 #import shared/grid_lines
 #import effects/puncture
+#ifdef ADHESION
+#import effects/adhesion
+#endif
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
 var<workgroup> gaps: array<f32, ANCHOR_COUNT>;
 var<workgroup> stretches: array<f32, ANCHOR_COUNT>;
 var<workgroup> losses: array<f32, ANCHOR_COUNT>;
+var<workgroup> distances: array<f32, ANCHOR_COUNT>;
 var<workgroup> coordinate: f32;
+// Force of tissue that holds on to the tip [N] and the energy stored in it [J].
+var<workgroup> bond_force: f32;
+var<workgroup> bond_energy: f32;
 
 struct AnchorPlace {
     cell: vec3<u32>,
     local: vec3<f32>,
-    // Gap to the tip plane [m], >= 0, and d(x.t)/da.
+    // Distance of the tip plane beyond it, and its positive part inside the material [m]; d(x.t)/da.
+    distance: f32,
     gap: f32,
     stretch: f32,
 }
@@ -26,15 +34,22 @@ fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     let X = tip_anchors[anchor].surface.xyz + t * a;
     let y0 = params.nodes_x;
     let z0 = params.nodes_x + params.nodes_y;
+#ifdef BORE
+    let cell = vec3<u32>(tip_anchors[anchor].column.xy, find_cell(X.z, z0, params.nodes_z));
+#else
     let cell = vec3<u32>(
         find_cell(X.x, 0u, params.nodes_x),
         find_cell(X.y, y0, params.nodes_y),
         find_cell(X.z, z0, params.nodes_z),
     );
+#endif
     let low = vec3<f32>(grid_lines[cell.x], grid_lines[y0 + cell.y], grid_lines[z0 + cell.z]);
     let high = vec3<f32>(grid_lines[cell.x + 1u], grid_lines[y0 + cell.y + 1u], grid_lines[z0 + cell.z + 1u]);
     let width = high - low;
-    let local = clamp((X - low) / width, vec3<f32>(0.0), vec3<f32>(1.0));
+    var local = clamp((X - low) / width, vec3<f32>(0.0), vec3<f32>(1.0));
+#ifdef BORE
+    local = vec3<f32>(tip_anchors[anchor].local.xy, local.z);
+#endif
     let rate = t / width;
     var along = 0.0;
     var stretch = 1.0;
@@ -52,7 +67,8 @@ fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     var place: AnchorPlace;
     place.cell = cell;
     place.local = local;
-    place.gap = max(0.0, step_input.depth - a - along);
+    place.distance = step_input.depth - a - along;
+    place.gap = select(0.0, max(0.0, place.distance), a < puncture.exit);
     place.stretch = stretch;
     return place;
 }
@@ -62,53 +78,86 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
     let anchor = min(lane, ANCHOR_COUNT - 1u);
     let spring = puncture.tip_stiffness / f32(ANCHOR_COUNT);
     let before = tip_state.coordinate;
+    let speed = length(step_input.velocity.xyz);
+    let threshold = tip_threshold(before, speed);
     var place = place_anchor(anchor, before);
     if (lane < ANCHOR_COUNT) {
         gaps[lane] = place.gap;
         stretches[lane] = place.stretch;
+        distances[lane] = place.distance;
     }
+#ifdef ADHESION
+    let law = adhesion;
+#endif
     workgroupBarrier();
     if (lane == 0u) {
         var gap = 0.0;
         var stretch = 0.0;
+        var distance = 0.0;
         for (var i = 0u; i < ANCHOR_COUNT; i++) {
             gap += gaps[i];
             stretch += stretches[i];
+            distance += distances[i];
         }
-        let excess = spring * gap - tip_threshold(before);
+        let excess = spring * gap - threshold;
         var advance = 0.0;
         if (excess > 0.0) {
             // At most 5 um in the first step and 13 um later, and four times the speed of the needle: a faster tip
             // would leave nodes inside the needle. A stab travels more than that in one step.
-            let travel = length(step_input.velocity.xyz) * params.dt;
+            let travel = speed * params.dt;
             let cap = min(max(select(13e-6, 5e-6, before == 0.0), 1.25 * travel), 4.0 * travel);
             let lambda = clamp(stretch / f32(ANCHOR_COUNT), 0.2, 3.0);
             advance = min(excess / (puncture.tip_stiffness * lambda), cap);
         }
         coordinate = before + advance;
+        bond_force = 0.0;
+        bond_energy = 0.0;
+#ifdef ADHESION
+        // A tip outside the material, or drawn back by more than D, has no bond.
+        let mean = distance / f32(ANCHOR_COUNT);
+        let old = tip_state.bond_stretch;
+        let motion = mean - tip_state.gap;
+        let inside = before > 0.0 && before < puncture.exit && mean > -law.sliding_distance;
+        let bond = select(vec2<f32>(0.0), advance_adhesion(law, old, tip_state.bond_slid, motion), inside);
+        tip_state.bond_stretch = bond.x;
+        tip_state.bond_slid = bond.y;
+        bond_force = law.stiffness * bond.x;
+        bond_energy = 0.5 * law.stiffness * bond.x * bond.x;
+        // Mean force of both steps times the slip.
+        tip_state.bond_dissipation += 0.5 * law.stiffness * (old + bond.x) * (old + motion - bond.x);
+        tip_state.bond_impulse += bond_force * params.dt;
+#endif
     }
     workgroupBarrier();
     let after = coordinate;
     let old_gap = place.gap;
     place = place_anchor(anchor, after);
     if (lane < ANCHOR_COUNT) {
-        gaps[lane] = 0.5 * spring * place.gap * place.gap;
+        let force = spring * place.gap;
+        gaps[lane] = place.gap;
+        distances[lane] = place.distance;
         // Force after the advance times the loss of stretch (trapezoidal rule of the leapfrog work).
-        losses[lane] = spring * place.gap * (old_gap - place.gap);
+        losses[lane] = force * (old_gap - place.gap);
         tip_anchor_loads[lane].cell = vec4<u32>(place.cell, 0u);
         tip_anchor_loads[lane].local = vec4<f32>(place.local, 0.0);
-        tip_anchor_loads[lane].force = spring * place.gap;
+        tip_anchor_loads[lane].force = force + bond_force / f32(ANCHOR_COUNT);
     }
     workgroupBarrier();
     if (lane == 0u) {
-        var stored = 0.0;
+        var stored = bond_energy;
         var lost = 0.0;
+        var force = 0.0;
+        var distance = 0.0;
         for (var i = 0u; i < ANCHOR_COUNT; i++) {
-            stored += gaps[i];
+            stored += 0.5 * spring * gaps[i] * gaps[i];
             lost += losses[i];
+            force += spring * gaps[i];
+            distance += distances[i];
         }
         tip_state.coordinate = after;
         tip_state.spring_energy = stored;
+        tip_state.gap = distance / f32(ANCHOR_COUNT);
         tip_state.dissipation += select(0.0, lost, after > before);
+        tip_state.membrane_impulse += force * membrane_share(after) * params.dt;
     }
 }

@@ -38,8 +38,9 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     let first = strip * params.strip_layers;
     let last = min(first + params.strip_layers, params.cells_z);
 
-    let edge_x = cell_edges[i];
-    let edge_y = cell_edges[params.cells_x + j];
+    let shape = column_at(i, j);
+    let area = column_area(shape);
+    let area_cube_root = column_cube_root(shape);
     let row = params.nodes_x;
     let layer = params.nodes_x * params.nodes_y;
     var node = first * layer + j * row + i;
@@ -59,7 +60,7 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     var slot = corner_slot(strip, 0u, 0u, padded_column(i, j));
 
     for (var k = first; k < last; k++) {
-        let edge_z = cell_edges[params.cells_x + params.cells_y + k];
+        let edge_z = layer_edge(k);
         node += layer;
         let t0 = node_displacement[node].xyz;
         let t1 = node_displacement[node + 1u].xyz;
@@ -70,21 +71,23 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let upper_xy = (t0 - t1) + (t3 - t2);
         let rise = (t0 - b0) + (t1 - b1) + (t2 - b2) + (t3 - b3);
 
+        let xi = vec3<f32>(upper_x + lower_x) * DISPLACEMENT_UNIT;
+        let eta = vec3<f32>(upper_y + lower_y) * DISPLACEMENT_UNIT;
         let H = mat3x3<f32>(
-            vec3<f32>(upper_x + lower_x) * (DISPLACEMENT_UNIT * edge_x.quarter_inverse),
-            vec3<f32>(upper_y + lower_y) * (DISPLACEMENT_UNIT * edge_y.quarter_inverse),
+            slope_x(shape, xi, eta),
+            slope_y(shape, xi, eta),
             vec3<f32>(rise) * (DISPLACEMENT_UNIT * edge_z.quarter_inverse),
         );
-        let volume = edge_x.length * edge_y.length * edge_z.length;
-        let size = edge_x.cube_root * edge_y.cube_root * edge_z.cube_root;
+        let volume = area * edge_z.length;
+        let size = area_cube_root * edge_z.cube_root;
 
         // Hourglass: E = 1/2 kappa 3.11 mu0 V^(1/3) q2 (1 + c/2 q2/V^(2/3)), q = Gamma.u/8.
         let eighth = DISPLACEMENT_UNIT * 0.125;
         let q_yz = vec3<f32>(upper_y - lower_y) * eighth;
         let q_zx = vec3<f32>(upper_x - lower_x) * eighth;
-        let q_xy = vec3<f32>(upper_xy + lower_xy) * eighth;
+        let q_xy = vec3<f32>(upper_xy + lower_xy) * eighth - tapered(shape, H);
         let q_xyz = vec3<f32>(upper_xy - lower_xy) * eighth;
-        let q2 = (dot(q_yz, q_yz) + dot(q_zx, q_zx) + dot(q_xy, q_xy) + dot(q_xyz, q_xyz)) / (size * size);
+        let q2 = (dot(q_yz, q_yz) + dot(q_zx, q_zx) + dot(q_xy, q_xy) + dot(q_xyz, q_xyz)) / max(size * size, SMALLEST_SQUARE);
         let cell = (k * params.cells_y + j) * params.cells_x + i;
         let number = material_of(cell);
         let modulus = materials[number].hourglass;
@@ -99,19 +102,23 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let hourglass = point.intact * modulus * size * (1.0 + params.quartic * q2) * 0.125;
 
         // Stiffness bound: V (K |cof B|max sum|cof B| + tangent |B| sum|B|) + hourglass.
-        let cx = point.cof[0] * edge_x.quarter_inverse;
-        let cy = point.cof[1] * edge_y.quarter_inverse;
+        let cx = pull_xi(shape, point.cof[0], point.cof[1]);
+        let cy = pull_eta(shape, point.cof[0], point.cof[1]);
         let cz = point.cof[2] * edge_z.quarter_inverse;
         let cof_b = dot(cx, cx) + dot(cy, cy) + dot(cz, cz)
             + 2.0 * (abs(dot(cx, cy)) + abs(dot(cy, cz)) + abs(dot(cz, cx)));
-        let b = vec3<f32>(edge_x.quarter_inverse, edge_y.quarter_inverse, edge_z.quarter_inverse);
+        let bx = pull_xi(shape, vec3<f32>(1.0, 0.0, 0.0), vec3<f32>(0.0, 1.0, 0.0));
+        let by = pull_eta(shape, vec3<f32>(1.0, 0.0, 0.0), vec3<f32>(0.0, 1.0, 0.0));
+        let b = dot(bx, bx) + dot(by, by) + 2.0 * abs(dot(bx, by)) + edge_z.quarter_inverse * edge_z.quarter_inverse;
         let bound = point.intact * (8.0 * volume
-            * (materials[number].bulk_modulus * cof_b + point.tangent * dot(b, b))
+            * (materials[number].bulk_modulus * cof_b + point.tangent * b)
             + modulus * size * (1.0 + 3.0 * params.quartic * q2) * 0.125);
         let factor = point.intact * volume;
         let pressure = materials[number].bulk_modulus * point.dj;
-        let a_x = (point.P[0] + point.cof[0] * pressure) * (factor * edge_x.quarter_inverse);
-        let a_y = (point.P[1] + point.cof[1] * pressure) * (factor * edge_y.quarter_inverse);
+        let stress_x = point.P[0] + point.cof[0] * pressure;
+        let stress_y = point.P[1] + point.cof[1] * pressure;
+        let a_x = pull_xi(shape, stress_x, stress_y) * factor - taper_pull_xi(shape, q_xy * hourglass);
+        let a_y = pull_eta(shape, stress_x, stress_y) * factor - taper_pull_eta(shape, q_xy * hourglass);
         let a_z = (point.P[2] + point.cof[2] * pressure) * (factor * edge_z.quarter_inverse);
         store_plane(
             slot,

@@ -23,6 +23,9 @@
 #ifdef NODE_WORK
 #import shared/node_work
 #endif
+#ifdef TIED
+#import shared/tied_nodes
+#endif
 
 @group(1) @binding(1) var<storage, read> node_mass: array<f32>;
 // u in fixed point; w: steps of this frame in which the mass of the node was raised.
@@ -39,9 +42,21 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         return;
     }
     let place = node_place(node);
+#ifdef TIED
+    // Every copy sums over all of them, in the same order, and books its share of the mass.
+    let tied = tied_nodes[node];
+    let copies = tied.copies;
+    var sum = vec4<f32>(0.0);
+    for (var copy = 0u; copy < 4u && copies[copy] != NO_NODE; copy++) {
+        sum += gathered_force(node_place(copies[copy]));
+    }
+    let scaled_mass = tied.whole_mass;
+    let share = tied.mass / scaled_mass;
+#else
     let sum = gathered_force(place);
-    var force = sum.xyz;
     let scaled_mass = node_mass[node];
+#endif
+    var force = sum.xyz;
     var mass = scaled_mass;
     var displacement = node_displacement[node];
     let old = node_velocity[node];
@@ -53,7 +68,12 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     force += gravity.acceleration.xyz * scaled_mass;
 #endif
 #ifdef LOADED_FACES
-    let load = node_load[node].xyz * step_input.load_factor;
+    var load = node_load[node].xyz * step_input.load_factor;
+#ifdef TIED
+    for (var copy = 0u; copy < 4u && copies[copy] != NO_NODE; copy++) {
+        load += select(node_load[copies[copy]].xyz, vec3<f32>(0.0), copies[copy] == node) * step_input.load_factor;
+    }
+#endif
     force += load;
 #endif
     let half = 0.5 * params.mass_damping * params.dt;
@@ -76,16 +96,24 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     // What the support adds so that the node moves as prescribed, times its velocity at mid step.
     let middle = 0.5 * (old.xyz + prescribed);
     let reaction = (mass / params.dt) * (prescribed - old.xyz) - force;
-    node_work[node] += params.dt * dot(reaction * (1.0 - is_free), middle);
+    var work = params.dt * dot(reaction * (1.0 - is_free), middle);
 #endif
     next += prescribed;
 #ifdef NODE_WORK
 #ifdef LOADED_FACES
-    node_work[node] += params.dt * 0.5 * dot(load, old.xyz + next);
+    work += params.dt * 0.5 * dot(load, old.xyz + next);
 #endif
+#ifdef TIED
+    work *= share;
+#endif
+    node_work[node] += work;
 #endif
     let mid = 0.5 * (old.xyz + next) * is_free;
-    let damped = old.w + params.mass_damping * params.dt * mass * dot(mid, mid);
+    var taken = params.mass_damping * params.dt * mass * dot(mid, mid);
+#ifdef TIED
+    taken *= share;
+#endif
+    let damped = old.w + taken;
     node_velocity[node] = vec4<f32>(next, damped);
     let way = next * (params.dt * UNITS_PER_METRE);
     var units = round(way);

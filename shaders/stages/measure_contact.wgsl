@@ -1,5 +1,6 @@
 // Stage measure_contact: one workgroup sums impulses, torque, work and dissipation over the contact nodes and clears
-// them for the next frame; the host adds the 64 partial sums in f64.
+// them for the next frame; the host adds the 64 partial sums in f64. The loads on a flexible needle are shared over the
+// entries of its centre-line.
 #import shared/params
 #import shared/step_input
 #import shared/contact_node
@@ -8,6 +9,13 @@
 #endif
 
 @group(3) @binding(6) var<storage, read_write> contact_totals: array<ContactSums, 64>;
+#ifdef FLEXIBLE_NEEDLE
+#import shared/displacement
+#import effects/flexible_needle
+@group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
+// Impulse of this frame on the tissue by each entry of the centre-line [N s], w unused.
+@group(3) @binding(16) var<storage, read_write> needle_loads: array<vec4<f32>, 64>;
+#endif
 #ifdef PUNCTURE
 @group(3) @binding(7) var<storage, read_write> tip_result: TipState;
 #endif
@@ -17,6 +25,17 @@ var<workgroup> softened: array<f32, 64>;
 
 @compute @workgroup_size(64)
 fn measure_contact(@builtin(local_invocation_index) lane: u32) {
+#ifdef FLEXIBLE_NEEDLE
+    var load = vec4<f32>(0.0);
+    for (var index = 0u; index < arrayLength(&contact_nodes); index++) {
+        let place = contact_nodes[index].rest.xyz
+            + vec3<f32>(node_displacement[contact_nodes[index].node].xyz) * DISPLACEMENT_UNIT;
+        let s = dot(step_input.tip.xyz - place, step_input.direction.xyz);
+        load += contact_sums[index].impulse * max(0.0, 1.0 - abs(centre_line_entry(s) - f32(lane)));
+    }
+    needle_loads[lane] = load;
+    storageBarrier();
+#endif
     var total: ContactSums;
     for (var index = lane; index < arrayLength(&contact_nodes); index += 64u) {
         let sums = contact_sums[index];
@@ -29,6 +48,7 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
         total.sliding_dissipation += sums.sliding_dissipation;
         total.damping_dissipation += sums.damping_dissipation;
         total.stored += sums.stored;
+        total.shaft += sums.shaft;
         contact_sums[index] = ContactSums();
     }
     contact_totals[lane] = total;
@@ -52,6 +72,9 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
     if (lane == 0u) {
         tip_result = tip_state;
         tip_state.dissipation = 0.0;
+        tip_state.membrane_impulse = 0.0;
+        tip_state.bond_impulse = 0.0;
+        tip_state.bond_dissipation = 0.0;
         for (var index = 0u; index < puncture.path_cell_count; index++) {
             tip_result.softening += path_cells[index].dissipation;
             path_cells[index].dissipation = 0.0;

@@ -11,6 +11,9 @@
 #ifdef FRICTION
 #import effects/friction
 #endif
+#ifdef FLEXIBLE_NEEDLE
+#import effects/flexible_needle
+#endif
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
@@ -80,6 +83,26 @@ fn tip_share(grid: vec3<u32>, rest_axial: f32) -> f32 {
 }
 #endif
 
+// How deep the node lies in the needle; `less`: what fades out after the entry.
+fn overlap_of(
+    surface: vec4<f32>,
+    rest_radius: f32,
+    lever: vec3<f32>,
+    d: vec3<f32>,
+    s: f32,
+    less: vec2<f32>,
+) -> Overlap {
+#ifdef BORE
+    return tube_wall(lever, d, s, surface.w, less);
+#else
+#ifdef SLIT
+    return slit_face(lever, d, s, surface.xyz, less);
+#else
+    return opened_path(lever, d, s, rest_radius, less);
+#endif
+#endif
+}
+
 @compute @workgroup_size(64)
 fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let index = thread_index(id, groups);
@@ -91,9 +114,17 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         - step_input.tip.xyz;
     let d = -step_input.direction.xyz;
     let s = dot(lever, d);
+#ifdef FLEXIBLE_NEEDLE
+    let bend = bend_at(s);
+    let from_axis = lever - bend.offset;
+    let needle_velocity = step_input.velocity.xyz + bend.rate;
+#else
+    let from_axis = lever;
+    let needle_velocity = step_input.velocity.xyz;
+#endif
 #ifdef FREE_PATH
     let tip = tip_share(contact.grid.xyz, contact.rest.xyz);
-    let met = free_contact(index, contact.rest.xyz, lever, s);
+    let met = free_contact(index, contact.rest.xyz, from_axis, s);
     let passed = met.touches;
     let rest_radius = met.rest_radius;
 #else
@@ -104,27 +135,31 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     var normal = vec3<f32>(0.0);
     var tangential = vec3<f32>(0.0);
     var stored = 0.0;
+    // Stiffness that a separated face adds at its node [N/m]: it has half the mass of the others.
+    var bound = 0.0;
     // Loops that run once or not at all: software adapters skip them, where they would walk through an `if`.
     for (var once = select(1u, 0u, passed); once == 0u; once++) {
         var memory = contact_memory[index];
         if (memory.touching == 0.0) {
             memory.touching = 1.0;
-            memory.overlap = max(0.0, opened_path(lever, d, s, rest_radius, vec2<f32>(0.0)).value);
+            memory.overlap = max(0.0, overlap_of(contact.surface, rest_radius, from_axis, d, s, vec2<f32>(0.0)).value);
             memory.axial_on = s;
         }
         // An overlap found at activation fades over `entry_fade` of travel, so that the needle does that work.
         let travel = (s - memory.axial_on) / puncture.entry_fade;
         let fading = select(0.0, -memory.overlap / puncture.entry_fade, travel > 0.0 && travel < 1.0);
         let less = vec2<f32>(memory.overlap * clamp(1.0 - travel, 0.0, 1.0), fading);
+        var overlap = overlap_of(contact.surface, rest_radius, from_axis, d, s, less);
 #ifdef FREE_PATH
-        let overlap = faded_at_end(opened_path(lever, d, s, rest_radius, less), d, s, met.end);
-#else
-        let overlap = opened_path(lever, d, s, rest_radius, less);
+        overlap = faded_at_end(overlap, d, s, met.end);
+#endif
+#ifdef FLEXIBLE_NEEDLE
+        overlap.gradient -= d * dot(overlap.gradient, bend.slope);
 #endif
         let depth = overlap.value;
         let steep = length(overlap.gradient);
         let n = overlap.gradient * (-1.0 / steep);
-        var v = node_velocity[contact.node].xyz - step_input.velocity.xyz;
+        var v = node_velocity[contact.node].xyz - needle_velocity;
 #ifdef FREE_PATH
         v -= cross(angular_velocity(), lever);
 #endif
@@ -135,12 +170,22 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let pressure = select(0.0, max(0.0, elastic - damping * vn), depth > 0.0);
         normal = n * pressure;
         stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
+        contact_sums[index].shaft +=
+            select(0.0, dot(normal, step_input.direction.xyz) * params.dt, s >= puncture.tip_length);
         contact_sums[index].damping_dissipation +=
             select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
+#ifdef COHESIVE
+        bound = select(0.0, 2.0 * k * steep * steep, depth > 0.0);
+        memory.on_shaft = select(0.0, 1.0, depth > 0.0 && s >= puncture.tip_length);
+#endif
 #ifdef FRICTION
         let kt = friction.stiffness_ratio * k;
         let grown = clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);
-        let allowed = friction.coefficient * grown * pressure / kt;
+        var coefficient = friction.coefficient;
+#ifdef BORE
+        coefficient = select(puncture.bore_grip, coefficient, contact.surface.w > 0.0);
+#endif
+        let allowed = coefficient * grown * pressure / kt;
         let trial = stick_trial(memory.stick.xyz, (v - n * vn) * params.dt, n);
         let stretch = stick_return(trial, allowed);
         memory.stick = vec4<f32>(stretch, 0.0);
@@ -152,8 +197,11 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     }
     let total = tip + normal + tangential;
     for (var once = select(1u, 0u, dot(total, total) > 0.0); once == 0u; once++) {
-        corner_force[contact.slot] += vec4<f32>(total, 0.0);
+        corner_force[contact.slot] += vec4<f32>(total, bound);
         book_contact(index, tip, normal, tangential, lever);
+#ifdef FLEXIBLE_NEEDLE
+        contact_sums[index].work += dot(total, bend.rate) * params.dt;
+#endif
     }
     contact_sums[index].stored = stored;
     // A node that the needle has left forgets.

@@ -2,6 +2,9 @@
 // that it loses is booked. One thread per path cell.
 #import shared/params
 #import shared/thread_index
+#ifdef BORE
+#import shared/step_input
+#endif
 #import shared/displacement
 #import shared/material_point
 #import shared/hexahedron_energy
@@ -18,8 +21,14 @@ fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
     }
     let path = path_cells[index];
     let ramp = clamp((tip_state.coordinate - path.axial_start) / max(path.axial_end - path.axial_start, 1e-9), 0.0, 1.0);
-    let remaining = max(1.0 - path.fraction * ramp, puncture.residual_stiffness);
     let old = cell_stiffness[path.cell];
+#ifdef BORE
+    // The core tears off where the tip stands when the needle begins to go back.
+    let here = tip_state.coordinate >= path.axial_start && tip_state.coordinate < path.axial_end;
+    let remaining = select(old, 0.0, here && dot(step_input.velocity.xyz, step_input.direction.xyz) < 0.0);
+#else
+    let remaining = max(1.0 - path.fraction * ramp, puncture.residual_stiffness);
+#endif
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
     for (var once = select(1u, 0u, remaining < old); once == 0u; once++) {
         let layer = params.cells_x * params.cells_y;

@@ -115,6 +115,7 @@ pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
             entry: DVec3::new(0.23 * h, 0.31 * h, 0.0),
             direction: DVec3::NEG_Z,
             phases: if needle { vec![Phase::Insert { speed: 2e-3, depth: 10e-3 }] } else { Vec::new() },
+            vibration: None,
         },
         effects: EffectSet {
             mass_scaling: Some(mass_scaling::Params { factor: 1000.0 }),
@@ -137,13 +138,11 @@ pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
 }
 
 pub(super) fn uniform_mesh(cells: [usize; 3], h: f64) -> BlockMesh {
-    BlockMesh {
-        lines: std::array::from_fn(|a| {
-            let n = cells[a];
-            let start = if a == 2 { -(n as f64) * h } else { -0.5 * n as f64 * h };
-            (0..=n).map(|i| start + i as f64 * h).collect()
-        }),
-    }
+    BlockMesh::new(std::array::from_fn(|a| {
+        let n = cells[a];
+        let start = if a == 2 { -(n as f64) * h } else { -0.5 * n as f64 * h };
+        (0..=n).map(|i| start + i as f64 * h).collect()
+    }))
 }
 
 /// A prepared block that steps on request.
@@ -187,7 +186,7 @@ impl Subject {
                 input
             })
             .collect();
-        let plan = FramePlan { frame: self.frame, first_step: self.step, steps: inputs };
+        let plan = FramePlan { frame: self.frame, first_step: self.step, steps: inputs, centre_line: None };
         self.step += steps as u64;
         self.frame += 1;
         let begin = Instant::now();
@@ -312,11 +311,7 @@ fn frame_overhead(gpu: Option<&Gpu>) -> Result<f64> {
 /// Time from program start to the first finished step of 20 k cells [ms] and peak memory [MB], in a fresh process.
 fn start(cold: bool, engine: EngineChoice) -> Option<(f64, f64)> {
     let mut command = std::process::Command::new(std::env::current_exe().ok()?);
-    command.arg("first-step").arg("--engine").arg(match engine {
-        EngineChoice::Auto => "auto",
-        EngineChoice::Gpu => "gpu",
-        EngineChoice::Cpu => "cpu",
-    });
+    command.arg("first-step").arg("--engine").arg(engine.key());
     if cold {
         // Drivers keep compiled shaders on disk; Mesa and NVIDIA have their own switches.
         command.env("MESA_SHADER_CACHE_DISABLE", "true").env("__GL_SHADER_DISK_CACHE", "0");

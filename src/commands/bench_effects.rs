@@ -98,8 +98,12 @@ fn subject(keys: &[&str], low: bool, gpu: Option<&Gpu>) -> Result<Subject> {
     if indents {
         let speed = 2e-3;
         scene.tool = Some(Tool::Sphere { radius: 4e-3 });
-        scene.motion =
-            Motion { entry: DVec3::ZERO, direction: DVec3::NEG_Z, phases: vec![Phase::Insert { speed, depth: 3e-3 }] };
+        scene.motion = Motion {
+            entry: DVec3::ZERO,
+            direction: DVec3::NEG_Z,
+            phases: vec![Phase::Insert { speed, depth: 3e-3 }],
+            vibration: None,
+        };
         scene.effects.indentation = Some(Default::default());
     }
     let mesh = uniform_mesh(CELLS, scene.tissue.cell_size);
@@ -161,6 +165,8 @@ pub fn off_is_absent() -> Result<bool> {
             loaded_faces: false,
             driven_faces: false,
             regions: false,
+            bore: false,
+            slit: false,
             free_path: false,
             tetrahedra: false,
             laws: BTreeSet::from([laws]),

@@ -167,6 +167,10 @@ fn describe_material(material: &TissueMaterial, effects: &EffectSet) -> Vec<Stri
         material.cutting.filter(|_| effects.puncture.is_some()).map(|c| {
             format!("puncture {} N, cutting {} N", four_digits(c.puncture_force), four_digits(c.cutting_force))
         }),
+        material
+            .membrane_energy
+            .filter(|_| effects.puncture.is_some())
+            .map(|w| format!("membrane, {} mJ", four_digits(w * 1e3))),
     ];
     let own: Vec<String> = own.into_iter().flatten().collect();
     if !own.is_empty() {
@@ -237,6 +241,15 @@ fn describe_parameters(key: &str, effects: &EffectSet) -> String {
                 four_digits(p.tip_stiffness * 1e-3),
                 four_digits(p.softened_radius * 1e3),
                 four_digits(p.ring_radius * 1e3)
+            )
+        }),
+        "adhesion" => effects.adhesion.map(|p| {
+            format!(
+                "static {} N, kinetic {} N, stiffness {} N/mm, sliding distance {} mm",
+                four_digits(p.static_force),
+                four_digits(p.kinetic_force),
+                four_digits(p.stiffness * 1e-3),
+                four_digits(p.sliding_distance * 1e3)
             )
         }),
         "indentation" => effects.indentation.map(|p| {

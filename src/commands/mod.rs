@@ -5,6 +5,7 @@ pub mod bench_effects;
 pub mod check;
 pub mod fit;
 pub mod material;
+pub mod report;
 pub mod run;
 
 use crate::error::Result;

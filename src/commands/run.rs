@@ -9,7 +9,7 @@ use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables, folder,
-    write_force_chart, write_sample_chart,
+    write_force_chart, write_parts_chart, write_sample_chart,
 };
 use crate::process;
 use crate::render;
@@ -59,12 +59,13 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     for notice in &simulation.notices {
         eprintln!("note: {notice}");
     }
+    let told = simulation.notices.len();
     let moments = moments(&simulation);
     for moment in &moments {
         simulation.stop_after(moment.frame);
     }
     let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
-    let mut tables = Tables::create(&output, &driven)?;
+    let mut tables = Tables::create(&output, &driven, simulation.model.has_bore())?;
     let mut fields = FieldFiles::new(&output);
     let progress = Progress::new(simulation.duration());
     let device = simulation.device().cloned();
@@ -115,6 +116,9 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     let wall = begin.elapsed().as_secs_f64() - drawing;
     let cpu = difference(process::cpu_seconds(), cpu_begin).map(|c| c - drawing_cpu);
     progress.finish();
+    for notice in &simulation.notices[told..] {
+        eprintln!("note: {notice}");
+    }
 
     let mesh = &simulation.model.mesh;
     let steps = records.last().map_or(0, |r| r.step);
@@ -149,6 +153,9 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     if !records.is_empty() {
         let figures = CurveFigures::from_records(&records);
         write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, &records, &figures)?;
+        if scene.tool.is_some() {
+            write_parts_chart(&output.file(folder::FORCE_PARTS_CHART), &scene.title, &records)?;
+        }
         if !driven.is_empty() {
             write_sample_chart(&output.file(folder::SAMPLE_CHART), &scene.title, &driven, &records)?;
         }
@@ -257,6 +264,17 @@ pub fn describe(summary: &Summary) -> String {
             stress * 1e-3
         );
     }
+    if let (Some(length), Some(rest), Some(mass)) =
+        (summary.core_length_m, summary.core_rest_length_m, summary.core_mass_kg)
+    {
+        text += &format!(
+            "core: {:.2} mm in the bore, {:.2} mm at rest ({:.0} % strain), {:.2} mg\n",
+            length * 1e3,
+            rest * 1e3,
+            100.0 * summary.core_strain.unwrap_or(0.0),
+            mass * 1e6
+        );
+    }
     text += &format!(
         "energy: imbalance {:.2} % of the external work, kinetic/internal {:.3} %, hourglass/internal {:.1} % (largest \
          {:.1} %); {} clamped nodes, {} inverted cells",
@@ -273,12 +291,15 @@ pub fn describe(summary: &Summary) -> String {
 /// Exit code of an interrupted run, as shells have it for Ctrl-C.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
+/// Exit code of a run that left the range in which its numbers mean something.
+pub const EXIT_DIVERGED: u8 = 3;
+
 /// Exit code of a finished run.
 pub fn exit_code(outcome: &Result<RunOutcome>) -> u8 {
     match outcome {
         Ok(o) if o.summary.status == Status::Interrupted => EXIT_INTERRUPTED,
         Ok(_) => 0,
-        Err(Error::Diverged { .. }) => 3,
+        Err(Error::Diverged { .. }) => EXIT_DIVERGED,
         Err(error) => error.exit_code(),
     }
 }

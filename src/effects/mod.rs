@@ -1,7 +1,10 @@
 //! Effects are chosen by the scene. `None` means absent: no define, no buffer, no binding, no code.
 
+pub mod adhesion;
+pub mod cohesive;
 pub mod damage;
 pub mod fibres;
+pub mod flexible_needle;
 pub mod friction;
 pub mod gravity;
 pub mod indentation;
@@ -20,9 +23,12 @@ pub struct EffectSet {
     pub fibres: Option<fibres::Params>,
     pub viscoelastic: Option<viscoelastic::Params>,
     pub damage: Option<damage::Params>,
+    pub cohesive: Option<cohesive::Params>,
     pub puncture: Option<puncture::Params>,
+    pub adhesion: Option<adhesion::Params>,
     pub indentation: Option<indentation::Params>,
     pub friction: Option<friction::Params>,
+    pub flexible_needle: Option<flexible_needle::Params>,
 }
 
 /// What the program knows about an effect without running it.
@@ -41,16 +47,19 @@ pub struct Effect {
 }
 
 /// All effects. The order is the order of their blocks in the stages.
-pub const EFFECTS: [Effect; 9] = [
+pub const EFFECTS: [Effect; 12] = [
     mass_scaling::EFFECT,
     gravity::EFFECT,
     plasticity::EFFECT,
     fibres::EFFECT,
     viscoelastic::EFFECT,
     damage::EFFECT,
+    cohesive::EFFECT,
     puncture::EFFECT,
+    adhesion::EFFECT,
     indentation::EFFECT,
     friction::EFFECT,
+    flexible_needle::EFFECT,
 ];
 
 impl EffectSet {
@@ -63,9 +72,12 @@ impl EffectSet {
             self.fibres.is_some(),
             self.viscoelastic.is_some(),
             self.damage.is_some(),
+            self.cohesive.is_some(),
             self.puncture.is_some(),
+            self.adhesion.is_some(),
             self.indentation.is_some(),
             self.friction.is_some(),
+            self.flexible_needle.is_some(),
         ]
     }
 

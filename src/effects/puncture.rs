@@ -4,11 +4,19 @@
 //! tip plane and the material point `x_k(a)` at the tip's material coordinate `a` [m]:
 //! ```text
 //! g_k = max(0, (p_tip - x_k(a)).t),  F = k_tip/N sum g_k                                  [m], [N]
-//! F_c(a) = F_cut + (F_pun - F_cut) max(0, 1 - a/l_p)
+//! F_c(a) = (F_cut + (F_pun - F_cut) max(0, 1 - (a - a_0)/l_p)) (max(v, v_0)/v_0)^n
 //! where F > F_c:  a += min((F - F_c) / (k_tip lambda), cap),  lambda = <dx_k/da . t> in 0.2..3
 //! dissipated: sum k_tip/N g_k (loss of g_k)                                               [J]
 //! ```
-//! `cap`: 5 um in the first step, 13 um later (at least 5/4 of the needle's travel), and four times the needle's travel. `a` never decreases.
+//! `a_0`: where the tip entered the material that it is in. `cap`: 5 um in the first step, 13 um later (at least 5/4 of
+//! the needle's travel), and four times the needle's travel. `a` never decreases. Springs end where the material ends: from `a_exit`, the bottom of the block, no
+//! anchor carries a force, and over the last l_p before it F_c fades linearly to nothing. `v`: speed of the needle, which in steady cutting is the rate of `a`; the exponent n is 0 by default
+//! (no rate). That toughness rises with the rate of cutting, and a power law as its description: brain and gels at 0.5 to
+//! 50 mm/s [Terzano2021].
+//!
+//! Membrane: a layer that takes the energy W to puncture beyond that of cutting through it, over the length
+//! `l = min(l_p, thickness of the layer along the path)`: `F_pun = F_cut + 2 W/l`, so that `int (F_c - F_cut) da = W`. From a toughness
+//! G: `W = G 2R thickness`, a slit as wide as the needle.
 //!
 //! Path. A cell with the volume fraction `phi` within a0 of the axis keeps `max(residual, 1 - phi ramp(a))` of its
 //! stiffness; the energy that it loses is dissipated. A node with rest distance a0 < r0 < ring radius that the tip has passed
@@ -58,6 +66,17 @@ pub struct Params {
     pub entry_fade: f64,
     /// Find the path while the tip moves even where it could be planned.
     pub always_free: bool,
+    /// Exponent n of the rate of cutting in the tip forces; 0: no rate.
+    pub rate_exponent: f64,
+    /// Speed v_0 up to which the tip forces are those above [m/s].
+    pub reference_speed: f64,
+}
+
+impl Params {
+    /// Factor on the tip forces at a speed of the needle [m/s].
+    pub fn rate_factor(&self, speed: f64) -> f64 {
+        (speed.max(self.reference_speed) / self.reference_speed).powf(self.rate_exponent)
+    }
 }
 
 impl Default for Params {
@@ -74,6 +93,8 @@ impl Default for Params {
             contact_damping: 0.2,
             entry_fade: 2.0e-3,
             always_free: false,
+            rate_exponent: 0.0,
+            reference_speed: 1.0e-3,
         }
     }
 }

@@ -9,8 +9,11 @@ use crate::error::{Error, Result};
 
 /// Every shader file by its path under `shaders/`, without extension.
 pub const SOURCES: &[(&str, &str)] = &[
+    ("effects/adhesion", include_str!("../../shaders/effects/adhesion.wgsl")),
+    ("effects/cohesive", include_str!("../../shaders/effects/cohesive.wgsl")),
     ("effects/damage", include_str!("../../shaders/effects/damage.wgsl")),
     ("effects/fibres", include_str!("../../shaders/effects/fibres.wgsl")),
+    ("effects/flexible_needle", include_str!("../../shaders/effects/flexible_needle.wgsl")),
     ("effects/free_path", include_str!("../../shaders/effects/free_path.wgsl")),
     ("effects/friction", include_str!("../../shaders/effects/friction.wgsl")),
     ("effects/gravity", include_str!("../../shaders/effects/gravity.wgsl")),
@@ -25,6 +28,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("materials/ogden", include_str!("../../shaders/materials/ogden.wgsl")),
     ("materials/yeoh", include_str!("../../shaders/materials/yeoh.wgsl")),
     ("shared/averaged_dilatation", include_str!("../../shaders/shared/averaged_dilatation.wgsl")),
+    ("shared/bent_column", include_str!("../../shaders/shared/bent_column.wgsl")),
     ("shared/capped_exponential", include_str!("../../shaders/shared/capped_exponential.wgsl")),
     ("shared/cell_edge", include_str!("../../shaders/shared/cell_edge.wgsl")),
     ("shared/cell_energy", include_str!("../../shaders/shared/cell_energy.wgsl")),
@@ -50,12 +54,15 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/point_energy", include_str!("../../shaders/shared/point_energy.wgsl")),
     ("shared/point_history", include_str!("../../shaders/shared/point_history.wgsl")),
     ("shared/step_input", include_str!("../../shaders/shared/step_input.wgsl")),
+    ("shared/straight_column", include_str!("../../shaders/shared/straight_column.wgsl")),
     ("shared/symmetric_eigen", include_str!("../../shaders/shared/symmetric_eigen.wgsl")),
     ("shared/tetrahedron", include_str!("../../shaders/shared/tetrahedron.wgsl")),
+    ("shared/tied_nodes", include_str!("../../shaders/shared/tied_nodes.wgsl")),
     ("shared/thread_index", include_str!("../../shaders/shared/thread_index.wgsl")),
     ("stages/advance_free_tip", include_str!("../../shaders/stages/advance_free_tip.wgsl")),
     ("stages/advance_tip", include_str!("../../shaders/stages/advance_tip.wgsl")),
     ("stages/average_pressure", include_str!("../../shaders/stages/average_pressure.wgsl")),
+    ("stages/cohesive_forces", include_str!("../../shaders/stages/cohesive_forces.wgsl")),
     ("stages/element_forces", include_str!("../../shaders/stages/element_forces.wgsl")),
     ("stages/indenter_contact", include_str!("../../shaders/stages/indenter_contact.wgsl")),
     ("stages/integrate_nodes", include_str!("../../shaders/stages/integrate_nodes.wgsl")),
@@ -64,6 +71,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("stages/measure_dilatation", include_str!("../../shaders/stages/measure_dilatation.wgsl")),
     ("stages/measure_faces", include_str!("../../shaders/stages/measure_faces.wgsl")),
     ("stages/measure_nodes", include_str!("../../shaders/stages/measure_nodes.wgsl")),
+    ("stages/measure_separation", include_str!("../../shaders/stages/measure_separation.wgsl")),
     ("stages/needle_contact", include_str!("../../shaders/stages/needle_contact.wgsl")),
     ("stages/soften_free_path", include_str!("../../shaders/stages/soften_free_path.wgsl")),
     ("stages/soften_path", include_str!("../../shaders/stages/soften_path.wgsl")),
@@ -71,7 +79,10 @@ pub const SOURCES: &[(&str, &str)] = &[
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 16] = [
+pub const SCENE_DEFINES: [&str; 19] = [
+    "TIED",
+    "SLIT",
+    "BORE",
     "FREE_PATH",
     "STEP_INPUT",
     "LOADED_FACES",

@@ -13,13 +13,18 @@ use super::kernel::{Kernel, Reflected, STEP_INPUT, reflect};
 use super::layout::Layout;
 use super::structs::*;
 use crate::effects::EffectSet;
+use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
 use crate::material::Isochoric;
 use crate::material_point::{Material as Constants, PointState};
-use crate::model::{ANCHOR_COUNT, FreePlan, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model};
+use crate::mesh::BlockMesh;
+use crate::model::{
+    ContactSurface, FreePlan, LARGEST_ANCHOR_COUNT, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model,
+};
 use crate::needle::free_path as needle;
 use crate::scene::Tool;
-use crate::solver::elements::HOURGLASS_MODULUS;
+use crate::solver::cpu::TORN_REACH;
+use crate::solver::elements::{HOURGLASS_MODULUS, PrismBase};
 use crate::solver::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State};
 use crate::solver::step::Stage;
 
@@ -35,6 +40,9 @@ const MAPPING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(10)
 /// Partial sums per face of `measure_faces`.
 const FACE_PARTS: usize = 64;
 
+/// Partial sums of `measure_separation`.
+const SEPARATION_PARTS: usize = 64;
+
 /// Partial sums of `measure_contact`.
 const CONTACT_PARTS: usize = 64;
 
@@ -47,6 +55,9 @@ pub struct Features {
     pub regions: bool,
     /// Tetrahedra instead of the block.
     pub tetrahedra: bool,
+    /// The tissue separates around a hollow needle, or on a slit before a solid one.
+    pub bore: bool,
+    pub slit: bool,
     /// The path of the needle is found while the tip moves.
     pub free_path: bool,
     /// Keys of the elastic laws that occur.
@@ -60,6 +71,8 @@ impl Features {
             driven_faces: model.has_driven_faces(),
             regions: !model.cell_material.is_empty(),
             tetrahedra: model.mesh.as_tets().is_some(),
+            bore: model.has_surface(|s| matches!(s, ContactSurface::OuterWall | ContactSurface::Bore)),
+            slit: model.has_surface(|s| matches!(s, ContactSurface::Slit { .. })),
             free_path: model.puncture.as_ref().is_some_and(|p| p.free.is_some()),
             laws: model.materials.iter().map(|m| m.law.isochoric.key()).collect(),
         }
@@ -76,11 +89,14 @@ pub const LAWS: [(&str, &str); 5] = [
 ];
 
 /// Effects of tools, which work on the block only.
-const BLOCK_EFFECTS: [&str; 3] = ["puncture", "indentation", "friction"];
+const BLOCK_EFFECTS: [&str; 6] = ["cohesive", "puncture", "adhesion", "indentation", "friction", "flexible_needle"];
 
 /// Names that are defined for the shaders.
 pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
-    let works = |key: &str| !features.tetrahedra || !BLOCK_EFFECTS.contains(&key);
+    // A flexible needle acts by the contact of `puncture`, on a planned path.
+    let bends = effects.puncture.is_some() && !features.free_path;
+    let works =
+        |key: &str| (!features.tetrahedra || !BLOCK_EFFECTS.contains(&key)) && (key != "flexible_needle" || bends);
     let mut defines: BTreeSet<&'static str> = effects.active().filter(|e| works(e.key)).map(|e| e.define).collect();
     let mut define = |name: &'static str, wanted: bool| {
         if wanted {
@@ -94,6 +110,11 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     define("NODE_WORK", loaded || driven);
     define("REGIONS", features.regions);
     define("TETRAHEDRA", features.tetrahedra);
+    let separates = !features.tetrahedra && effects.cohesive.is_some() && effects.puncture.is_some();
+    // Grid lines are doubled where faces may separate: copies that stay together move as one.
+    define("TIED", !features.tetrahedra && effects.cohesive.is_some());
+    define("BORE", features.bore && separates);
+    define("SLIT", features.slit && separates);
     define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
     // The bulk stiffness of a cell is not that of all others.
     define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || effects.damage.is_some()));
@@ -111,8 +132,12 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     let (block, tetrahedra) = (!features.tetrahedra, features.tetrahedra);
     let puncture = block && effects.puncture.is_some();
     let indentation = block && effects.indentation.is_some();
+    let cohesive = block && effects.cohesive.is_some();
     let wanted = |stage: &Stage| match stage {
-        Stage::AdvanceTip | Stage::SoftenPath => puncture && !features.free_path,
+        // Where faces separate no cell is softened, but a core is severed.
+        Stage::SoftenPath => puncture && (!cohesive || features.bore) && !features.free_path,
+        Stage::CohesiveForces | Stage::MeasureSeparation => cohesive,
+        Stage::AdvanceTip => puncture && !features.free_path,
         Stage::AdvanceFreeTip | Stage::SoftenFreePath => puncture && features.free_path,
         Stage::NeedleContact => puncture,
         Stage::IndenterContact => indentation,
@@ -203,14 +228,15 @@ impl GpuEngine {
             })
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
-        let results: Vec<ResultRange> = ["cell_sums", "node_sums", "contact_totals", "face_sums", "tip_result"]
-            .into_iter()
-            .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
-            .map(|(name, size)| {
-                offset += size;
-                ResultRange { name, offset: offset - size, size }
-            })
-            .collect();
+        let results: Vec<ResultRange> =
+            ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "needle_loads", "tip_result"]
+                .into_iter()
+                .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
+                .map(|(name, size)| {
+                    offset += size;
+                    ResultRange { name, offset: offset - size, size }
+                })
+                .collect();
         let staging: Vec<wgpu::Buffer> = (0..RING)
             .map(|_| {
                 gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -369,6 +395,18 @@ impl GpuEngine {
                         sums.reactions[index / FACE_PARTS] += force;
                     }
                 }
+                "needle_loads" => {
+                    for (load, s) in sums.needle_loads.iter_mut().zip(read_all::<[f32; 4]>(bytes)) {
+                        *load = DVec3::new(s[0].into(), s[1].into(), s[2].into());
+                    }
+                }
+                "separation_sums" => {
+                    for s in read_all::<SeparationSums>(bytes) {
+                        sums.cohesive_dissipation += f64::from(s.dissipation);
+                        sums.cohesive_energy += f64::from(s.stored);
+                        sums.torn_area += f64::from(s.torn_area);
+                    }
+                }
                 "contact_totals" => {
                     for s in read_all::<ContactSums>(bytes) {
                         let vector = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
@@ -376,6 +414,7 @@ impl GpuEngine {
                         sums.angular_impulse += vector(s.angular_impulse);
                         sums.cutting_impulse += f64::from(s.cutting);
                         sums.spreading_impulse += f64::from(s.spreading);
+                        sums.shaft_impulse += f64::from(s.shaft);
                         sums.friction_impulse += f64::from(s.sliding);
                         sums.tool_work += f64::from(s.work);
                         sums.friction_dissipation += f64::from(s.sliding_dissipation);
@@ -389,6 +428,11 @@ impl GpuEngine {
                         sums.tip_dissipation = f64::from(s.dissipation);
                         sums.softening_dissipation = f64::from(s.softening);
                         sums.contact_energy += f64::from(s.spring_energy);
+                        sums.membrane_impulse = f64::from(s.membrane_impulse);
+                        sums.adhesion_impulse = f64::from(s.bond_impulse);
+                        sums.adhesion_dissipation = f64::from(s.bond_dissipation);
+                        // The contact nodes have booked the whole force of the anchors.
+                        sums.cutting_impulse -= sums.membrane_impulse + sums.adhesion_impulse;
                     }
                 }
             }
@@ -486,18 +530,28 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
         Stage::NeedleContact | Stage::IndenterContact => model.contact_nodes.len() as u32,
         Stage::IntegrateNodes => model.mesh.node_count() as u32,
         Stage::MeasureCells | Stage::MeasureNodes => measure_threads,
+        Stage::CohesiveForces => model.separation.pairs.len() as u32,
+        Stage::MeasureSeparation => SEPARATION_PARTS as u32,
         Stage::MeasureContact => CONTACT_PARTS as u32,
         Stage::MeasureFaces => 6 * FACE_PARTS as u32,
     }
 }
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 47] = [
+const BUFFERS: [&str; 55] = [
+    "cohesive",
+    "face_pairs",
+    "pair_states",
+    "separation_sums",
+    "tied_nodes",
     "params",
     STEP_INPUT,
     "gravity",
     "puncture",
+    "adhesion",
     "friction",
+    "centre_line",
+    "needle_loads",
     "indentation",
     "cell_edges",
     "node_mass",
@@ -569,6 +623,15 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
             bytes_of(&[GravityParams { acceleration: vec4(g / model.mass_scaling()) }])
         }
         "puncture" => bytes_of(&[puncture_params(model)]),
+        "adhesion" => {
+            let p = model.effects.adhesion.unwrap_or_default();
+            bytes_of(&[AdhesionParams {
+                static_force: p.static_force as f32,
+                kinetic_force: p.kinetic_force as f32,
+                stiffness: p.stiffness as f32,
+                sliding_distance: p.sliding_distance as f32,
+            }])
+        }
         "friction" => {
             let p = model.effects.friction.unwrap_or_default();
             bytes_of(&[FrictionParams {
@@ -578,9 +641,16 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
                 _pad: 0.0,
             }])
         }
+        "centre_line" => zeros(1, size_of::<CentreLine>()),
+        "needle_loads" => zeros(CONTACT_PARTS as u64, 16),
         "indentation" => bytes_of(&[indentation_params(model)]),
+        "cohesive" => bytes_of(&[cohesive_params(model)]),
+        "face_pairs" => bytes_of(&face_pairs(model, layout)),
+        "pair_states" => zeros(model.separation.pairs.len().max(1) as u64, size_of::<PairState>()),
+        "separation_sums" => zeros(SEPARATION_PARTS as u64, size_of::<SeparationSums>()),
+        "tied_nodes" => bytes_of(&tied_nodes(model)),
         "cell_edges" => {
-            let edges: Vec<CellEdge> = model
+            let mut edges: Vec<CellEdge> = model
                 .mesh
                 .block()
                 .lines
@@ -589,10 +659,14 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
                 .map(|d| CellEdge {
                     length: d as f32,
                     cube_root: d.cbrt() as f32,
-                    quarter_inverse: (0.25 / d) as f32,
+                    // A gap between two copies of a line carries nothing.
+                    quarter_inverse: if d > 0.0 { (0.25 / d) as f32 } else { 0.0 },
                     _pad: 0.0,
                 })
                 .collect();
+            if model.mesh.block().bore.is_some() {
+                edges.extend(bent_columns(model.mesh.block()));
+            }
             bytes_of(&edges)
         }
         "node_mass" => bytes_of(&model.node_mass.iter().map(|m| *m as f32).collect::<Vec<_>>()),
@@ -602,7 +676,12 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "tip_anchors" => {
             let plan = model.puncture.as_ref();
             let anchors = plan.map_or(&[][..], |p| &p.anchors);
-            bytes_of(&anchors.iter().map(|a| TipAnchor { surface: vec4(a.surface) }).collect::<Vec<_>>())
+            let block = model.mesh.block();
+            let anchor = |a: &crate::model::TipAnchor| {
+                let ([i, j, _], local) = block.locate(a.surface);
+                TipAnchor { surface: vec4(a.surface), column: [i as u32, j as u32, 0, 0], local: vec4(local) }
+            };
+            bytes_of(&anchors.iter().map(anchor).collect::<Vec<_>>())
         }
         "path_cells" => {
             let plan = model.puncture.as_ref();
@@ -635,9 +714,9 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "node_sums" => zeros(measure_threads.into(), size_of::<NodeSums>()),
         "cell_stiffness" => bytes_of(&vec![1.0f32; model.mesh.cell_count()]),
         "tip_state" | "tip_result" => zeros(1, size_of::<TipState>()),
+        "tip_anchor_loads" => zeros(LARGEST_ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
         "free_tip" => bytes_of(&[free_tip(&model.free_tip())]),
         "free_cells" => bytes_of(&free_cells(model, &[])),
-        "tip_anchor_loads" => zeros(ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
         "contact_memory" => zeros(contacts, size_of::<ContactMemory>()),
         "contact_sums" => zeros(contacts, size_of::<ContactSums>()),
         "face_sums" => zeros(6 * FACE_PARTS as u64, 16),
@@ -862,11 +941,13 @@ fn puncture_params(model: &Model) -> PunctureParams {
         let p = plan.params;
         // s0 depends on z alone, and an anchor acts on the two node planes around it.
         let mut segments = [[0.0; 4]; LARGEST_SEGMENT_COUNT];
+        let mut membranes = 0;
         let last = plan.segments.len() - 1;
         for (i, out) in segments.iter_mut().enumerate() {
             let s = plan.segments[i.min(last)];
             let c = s.cutting;
-            *out = [s.start as f32, c.puncture_force as f32, c.cutting_force as f32, 0.0];
+            *out = [s.start, c.puncture_force, c.cutting_force, s.transition_length].map(|x| x as f32);
+            membranes |= u32::from(s.membrane) << i;
         }
         let tallest = model.mesh.block().lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let mut anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
@@ -889,7 +970,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             path_cell_count = free.cell_count();
         }
         PunctureParams {
-            transition_length: p.transition_length as f32,
+            exit: plan.exit as f32,
             tip_stiffness: p.tip_stiffness as f32,
             residual_stiffness: p.residual_stiffness as f32,
             contact_stiffness: plan.contact_stiffness as f32,
@@ -901,11 +982,19 @@ fn puncture_params(model: &Model) -> PunctureParams {
             path_cell_count: path_cell_count as u32,
             softened_radius: p.softened_radius as f32,
             ring_radius: p.ring_radius as f32,
+            membranes,
+            rate_exponent: p.rate_exponent as f32,
+            reference_speed: p.reference_speed as f32,
+            exit_fade: p.transition_length as f32,
             shift: vec4(plan.profile.shift),
+            edge_radius: plan.profile.bore.map_or(0.0, |b| b.edge as f32),
+            bore_radius: plan.profile.bore.map_or(0.0, |b| b.radius as f32),
+            bore_grip: plan.needle.bore.map_or(0.0, |b| b.friction as f32),
             reference: vec4(plan.path.direction),
             free_low,
             free_count,
             segments,
+            ..Zeroable::zeroed()
         }
     })
 }
@@ -966,6 +1055,88 @@ fn indentation_params(model: &Model) -> IndentationParams {
     }
 }
 
+/// Two vectors per column, in the layout that `shared/bent_column` reads.
+fn bent_columns(block: &BlockMesh) -> Vec<CellEdge> {
+    let [nx, ny, _] = block.cells();
+    let vector = |v: [f64; 4]| {
+        let [length, cube_root, quarter_inverse, _pad] = v.map(|v| v as f32);
+        CellEdge { length, cube_root, quarter_inverse, _pad }
+    };
+    (0..nx * ny)
+        .flat_map(|cell| {
+            let base = PrismBase::new(block, cell);
+            let [xi, eta] = base.gradients;
+            [vector([xi.x, xi.y, eta.x, eta.y]), vector([base.taper.x, base.taper.y, base.area, base.area.cbrt()])]
+        })
+        .collect()
+}
+
+fn cohesive_params(model: &Model) -> CohesiveParams {
+    let Some(law) = model.cohesion else { return CohesiveParams::zeroed() };
+    let h = model.scene.tissue.cell_size;
+    CohesiveParams {
+        onset: (law.strength / law.penalty) as f32,
+        shear_onset: (law.shear_strength / law.penalty) as f32,
+        energy: (2.0 * law.energy / law.penalty) as f32,
+        shear_energy: (2.0 * law.shear_energy / law.penalty) as f32,
+        exponent: law.exponent as f32,
+        penalty: law.penalty as f32,
+        inverse_ramp: (1.0 / h) as f32,
+        torn_reach: (TORN_REACH * h) as f32,
+        pair_count: model.separation.pairs.len() as u32,
+        ..Zeroable::zeroed()
+    }
+}
+
+fn face_pairs(model: &Model, layout: &Layout) -> Vec<FacePair> {
+    // Farther than any path [m].
+    const NEVER: f64 = 1e6;
+    let Some(block) = model.mesh.as_block() else { return Vec::new() };
+    let contact_of = |node: u32| model.contact_nodes.binary_search_by_key(&node, |c| c.node).ok();
+    let untouched = model.contact_nodes.iter().position(|c| !c.pushed).unwrap_or(0);
+    let mut pairs: Vec<FacePair> = model
+        .separation
+        .pairs
+        .iter()
+        .map(|pair| {
+            let [a, b] = pair.nodes;
+            let slot = |n: u32| {
+                let at = block.node_coordinates(n as usize);
+                layout.strips().pair_slot(at, block.cells(), pair.axis)
+            };
+            let way = |[from, to]: [u32; 2], w: f64| {
+                let d = block.rest_position(to as usize) - block.rest_position(from as usize);
+                [d.x as f32, d.y as f32, d.z as f32, w as f32]
+            };
+            let [first, second] = pair.ring;
+            let touched = contact_of(a).zip(contact_of(b)).filter(|_| pair.tip_driven.is_some());
+            let (ca, cb) = touched.unwrap_or((untouched, untouched));
+            FacePair {
+                nodes: [a, b, slot(a), slot(b)],
+                ring: [first[0], first[1], second[0], second[1]],
+                first_way_and_area: way(first, pair.area),
+                second_way_and_start: way(second, pair.tip_driven.unwrap_or(NEVER)),
+                contacts: [ca as u32, cb as u32, 0, 0],
+            }
+        })
+        .collect();
+    pairs.resize(pairs.len().max(1), FacePair::zeroed());
+    pairs
+}
+
+fn tied_nodes(model: &Model) -> Vec<TiedNode> {
+    (0..model.mesh.node_count())
+        .map(|node| {
+            let mut copies = [u32::MAX; 4];
+            let own = [node as u32];
+            let tied = model.separation.tied(node).unwrap_or(&own);
+            copies.iter_mut().zip(tied).for_each(|(place, copy)| *place = *copy);
+            let whole: f64 = tied.iter().map(|n| model.node_mass[*n as usize]).sum();
+            TiedNode { copies, mass: model.node_mass[node] as f32, whole_mass: whole as f32, ..Zeroable::zeroed() }
+        })
+        .collect()
+}
+
 fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
     let cells = model.mesh.block().cells();
     let mut nodes: Vec<ContactNode> = model
@@ -977,6 +1148,12 @@ fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
             ContactNode {
                 rest: vec4(model.mesh.rest_position(node)),
                 grid: [i as u32, j as u32, k as u32, 0],
+                surface: match c.surface {
+                    ContactSurface::OpenedPath => [0.0; 4],
+                    ContactSurface::Slit { side } => vec4(side),
+                    ContactSurface::OuterWall => [0.0, 0.0, 0.0, 1.0],
+                    ContactSurface::Bore => [0.0, 0.0, 0.0, -1.0],
+                },
                 node: c.node,
                 slot: layout.strips().owned_slot([i, j, k], cells),
                 pushed: c.pushed.into(),
@@ -997,6 +1174,17 @@ fn symmetric(q: &ViscousStress) -> DMat3 {
     let number = |bits: u32| f64::from(f32::from_bits(bits));
     let ([xx, yy, zz, _], [xy, yz, zx, _]) = (q.normal.map(number), q.shear.map(number));
     DMat3::from_cols(DVec3::new(xx, xy, zx), DVec3::new(xy, yy, yz), DVec3::new(zx, yz, zz))
+}
+
+/// The centre-line of a frame in the layout of the shader.
+fn centre_line(line: &crate::needle::centre_line::CentreLine) -> CentreLine {
+    CentreLine {
+        per_length: (1.0 / line.spacing) as f32,
+        first_step: line.first_step as u32,
+        offset: line.offset.map(vec4),
+        rate: line.rate.map(vec4),
+        ..Zeroable::zeroed()
+    }
 }
 
 /// The input of step `number` in the layout of the shader.
@@ -1051,6 +1239,9 @@ impl Engine for GpuEngine {
             let inputs: Vec<StepInput> = numbered.map(|(n, s)| step_input(s, n, self.dt)).collect();
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&inputs));
         }
+        if let (Some(buffer), Some(line)) = (self.buffers.get("centre_line"), &plan.centre_line) {
+            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&centre_line(line)));
+        }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -1086,7 +1277,8 @@ impl Engine for GpuEngine {
     }
 
     fn read_state(&mut self) -> Result<State> {
-        const OPTIONAL: [&str; 8] = [
+        const OPTIONAL: [&str; 9] = [
+            "pair_states",
             "cell_stiffness",
             "tip_state",
             "free_tip",
@@ -1116,7 +1308,11 @@ impl Engine for GpuEngine {
                 "node_velocity" => state.velocity = read_all::<[f32; 4]>(bytes).map(vector).collect(),
                 "cell_stiffness" => state.stiffness = read_all::<f32>(bytes).map(f64::from).collect(),
                 "tip_state" => {
-                    state.tip_coordinate = read_all::<TipState>(bytes).next().map_or(0.0, |t| t.coordinate.into());
+                    for tip in read_all::<TipState>(bytes) {
+                        state.tip_coordinate = tip.coordinate.into();
+                        state.bond =
+                            Bond { stretch: tip.bond_stretch.into(), slid: tip.bond_slid.into(), gap: tip.gap.into() };
+                    }
                 }
                 "free_tip" => {
                     for t in read_all::<FreeTip>(bytes) {
@@ -1144,10 +1340,15 @@ impl Engine for GpuEngine {
                             overlap: m.overlap.into(),
                             axial_on: m.axial_on.into(),
                             touching: m.touching != 0.0,
+                            on_shaft: m.on_shaft != 0.0,
                             rest_radius: m.rest_radius.into(),
                             passed: m.passed != 0.0,
                         })
                         .collect();
+                }
+                "pair_states" => {
+                    let count = self.model.separation.pairs.len();
+                    state.pairs = read_all::<PairState>(bytes).map(|p| p.damage.into()).take(count).collect();
                 }
                 "plastic_state" => {
                     for (point, p) in state.points.iter_mut().zip(read_all::<PlasticState>(bytes)) {
@@ -1190,7 +1391,13 @@ impl Engine for GpuEngine {
         write("node_velocity", bytemuck::cast_slice(&v));
         let stiffness: Vec<f32> = state.stiffness.iter().map(|s| *s as f32).collect();
         write("cell_stiffness", bytemuck::cast_slice(&stiffness));
-        let tip = TipState { coordinate: state.tip_coordinate as f32, ..TipState::zeroed() };
+        let tip = TipState {
+            coordinate: state.tip_coordinate as f32,
+            bond_stretch: state.bond.stretch as f32,
+            bond_slid: state.bond.slid as f32,
+            gap: state.bond.gap as f32,
+            ..TipState::zeroed()
+        };
         write("tip_state", bytemuck::bytes_of(&tip));
         write("free_tip", bytemuck::bytes_of(&free_tip(&state.tip)));
         write("free_cells", bytemuck::cast_slice(&free_cells(&self.model, &state.cut_samples)));
@@ -1202,12 +1409,16 @@ impl Engine for GpuEngine {
                 overlap: c.overlap as f32,
                 axial_on: c.axial_on as f32,
                 touching: if c.touching { 1.0 } else { 0.0 },
+                on_shaft: if c.on_shaft { 1.0 } else { 0.0 },
                 passed: if c.passed { 1.0 } else { 0.0 },
                 rest_radius: c.rest_radius as f32,
                 ..Zeroable::zeroed()
             })
             .collect();
         write("contact_memory", bytemuck::cast_slice(&memory));
+        let pairs: Vec<PairState> =
+            state.pairs.iter().map(|d| PairState { damage: *d as f32, ..Zeroable::zeroed() }).collect();
+        write("pair_states", bytemuck::cast_slice(&pairs));
         let column = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
         let plastic: Vec<PlasticState> = state
             .points

@@ -99,6 +99,16 @@ impl Strips {
         self.slot(strip, k as u32, right + 2 * back, i as u32 - right, j as u32 - back)
     }
 
+    /// A slot of node (i, j, k) for a pair across the given axis. Stages that work on pairs of different axes at one node
+    /// find different slots: the other column along x for axis y, along y for axis z.
+    pub fn pair_slot(&self, [i, j, k]: [usize; 3], cells: [usize; 3], axis: usize) -> u32 {
+        let strip = ((k as u32) / self.layers).min(self.count - 1);
+        let inside = |at: usize, count: usize| at > 0 && at < count;
+        let right = u32::from(i == cells[0] || (axis == 1 && inside(i, cells[0])));
+        let back = u32::from(j == cells[1] || (axis == 2 && inside(j, cells[1])));
+        self.slot(strip, k as u32, right + 2 * back, i as u32 - right, j as u32 - back)
+    }
+
     /// Calls `visit` with node and slot of every corner of every column.
     fn for_each_slot(&self, block: &BlockMesh, mut visit: impl FnMut(usize, usize)) {
         let [nx, ny, nz] = block.cells();

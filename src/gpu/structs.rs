@@ -165,7 +165,7 @@ shared_structs! {
     }
     /// shaders/effects/puncture.wgsl
     struct PunctureParams {
-        transition_length: f32,
+        exit: f32,
         tip_stiffness: f32,
         residual_stiffness: f32,
         contact_stiffness: f32,
@@ -178,14 +178,24 @@ shared_structs! {
         softened_radius: f32,
         ring_radius: f32,
         shift: [f32; 4],
+        edge_radius: f32,
+        bore_radius: f32,
+        bore_grip: f32,
+        _pad2: u32,
         reference: [f32; 4],
         free_low: [u32; 4],
         free_count: [u32; 4],
+        membranes: u32,
+        rate_exponent: f32,
+        reference_speed: f32,
+        exit_fade: f32,
         segments: [[f32; 4]; 16],
     }
     /// shaders/effects/puncture.wgsl
     struct TipAnchor {
         surface: [f32; 4],
+        column: [u32; 4],
+        local: [f32; 4],
     }
     /// shaders/effects/puncture.wgsl
     struct TipAnchorLoad {
@@ -202,6 +212,21 @@ shared_structs! {
         dissipation: f32,
         spring_energy: f32,
         softening: f32,
+        membrane_impulse: f32,
+        bond_impulse: f32,
+        bond_dissipation: f32,
+        bond_stretch: f32,
+        bond_slid: f32,
+        gap: f32,
+        _pad0: f32,
+        _pad1: f32,
+    }
+    /// shaders/effects/adhesion.wgsl
+    struct AdhesionParams {
+        static_force: f32,
+        kinetic_force: f32,
+        stiffness: f32,
+        sliding_distance: f32,
     }
     /// shaders/effects/puncture.wgsl
     struct PathCell {
@@ -213,6 +238,51 @@ shared_structs! {
         material: u32,
         _pad0: u32,
         _pad1: u32,
+    }
+    /// shaders/shared/tied_nodes.wgsl
+    struct TiedNode {
+        copies: [u32; 4],
+        mass: f32,
+        whole_mass: f32,
+        _pad0: f32,
+        _pad1: f32,
+    }
+    /// shaders/effects/cohesive.wgsl
+    struct CohesiveParams {
+        onset: f32,
+        shear_onset: f32,
+        energy: f32,
+        shear_energy: f32,
+        exponent: f32,
+        penalty: f32,
+        inverse_ramp: f32,
+        torn_reach: f32,
+        pair_count: u32,
+        _pad0: u32,
+        _pad1: u32,
+        _pad2: u32,
+    }
+    /// shaders/effects/cohesive.wgsl
+    struct FacePair {
+        nodes: [u32; 4],
+        ring: [u32; 4],
+        first_way_and_area: [f32; 4],
+        second_way_and_start: [f32; 4],
+        contacts: [u32; 4],
+    }
+    /// shaders/effects/cohesive.wgsl
+    struct PairState {
+        damage: f32,
+        dissipation: f32,
+        stored: f32,
+        _pad: f32,
+    }
+    /// shaders/stages/measure_separation.wgsl
+    struct SeparationSums {
+        dissipation: f32,
+        stored: f32,
+        torn_area: f32,
+        _pad: f32,
     }
     /// shaders/effects/free_path.wgsl
     struct FreeTip {
@@ -249,6 +319,15 @@ shared_structs! {
         fade_length: f32,
         _pad: f32,
     }
+    /// shaders/effects/flexible_needle.wgsl
+    struct CentreLine {
+        per_length: f32,
+        first_step: u32,
+        _pad0: u32,
+        _pad1: u32,
+        offset: [[f32; 4]; 32],
+        rate: [[f32; 4]; 32],
+    }
     /// shaders/effects/indentation.wgsl
     struct IndentationParams {
         radius: f32,
@@ -264,6 +343,7 @@ shared_structs! {
     struct ContactNode {
         rest: [f32; 4],
         grid: [u32; 4],
+        surface: [f32; 4],
         node: u32,
         slot: u32,
         pushed: u32,
@@ -279,11 +359,11 @@ shared_structs! {
         overlap: f32,
         axial_on: f32,
         touching: f32,
+        on_shaft: f32,
         passed: f32,
         rest_radius: f32,
         _pad0: f32,
         _pad1: f32,
-        _pad2: f32,
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactSums {
@@ -296,7 +376,7 @@ shared_structs! {
         sliding_dissipation: f32,
         damping_dissipation: f32,
         stored: f32,
-        _pad: f32,
+        shaft: f32,
     }
     /// shaders/shared/cell_sums.wgsl
     struct CellSums {

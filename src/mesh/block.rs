@@ -4,8 +4,12 @@
 //! to whole cells of edge `h`; the entry point lies `axis_offset_cells` of a cell above a grid line. Outside it the
 //! edges form a geometric series whose ratio is fitted so that the block face is met exactly. In z the cells are
 //! uniform down to 4 mm below the deepest point and grow further below. Without a tool all cells are uniform.
+//!
+//! Surfaces that may separate are grid lines that occur twice: between the two lies a sheet of flat cells without volume
+//! (`is_gap`), whose corners are the two copies of each node. Copies that may not part are tied (see `separation`). Around
+//! the axis of a hollow needle the lines can be bent so that one ring of them is a circle (`Bore`).
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::scene::{Motion, Scene, Tissue};
 
@@ -15,11 +19,51 @@ use crate::scene::{Motion, Scene, Tissue};
 /// `(k * ny + j) * nx + i`; k grows upwards, the top face (z = 0) is the last plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlockMesh {
-    /// Grid lines per axis [m], ascending.
+    /// Grid lines per axis [m], ascending; a line that occurs twice may separate.
     pub lines: [Vec<f64>; 3],
+    /// Bends the lines into circles around a vertical axis.
+    pub bore: Option<Bore>,
+}
+
+/// A map of the xy plane that turns the square ring of grid lines at the distance `radius` from `centre` into a circle:
+/// with `c` the larger of the two distances from the axis,
+/// ```text
+/// X = centre + (x, y) ((1 - b) + b c/|(x, y)|),  b = c/radius inside, (outer - c)/(outer - radius) outside, 0 beyond outer
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bore {
+    /// Axis [m].
+    pub centre: DVec2,
+    /// Radius of the circle [m].
+    pub radius: f64,
+    /// Distance from the axis beyond which lines are straight [m].
+    pub outer: f64,
+}
+
+impl Bore {
+    /// Where a point of the square grid goes [m].
+    pub fn map(&self, point: DVec2) -> DVec2 {
+        let p = point - self.centre;
+        let c = p.abs().max_element();
+        let roundness = if c <= self.radius { c / self.radius } else { (self.outer - c) / (self.outer - self.radius) };
+        let b = roundness.clamp(0.0, 1.0);
+        let length = p.length();
+        if length == 0.0 { point } else { self.centre + p * ((1.0 - b) + b * c / length) }
+    }
 }
 
 impl BlockMesh {
+    /// A rectilinear block.
+    pub fn new(lines: [Vec<f64>; 3]) -> Self {
+        BlockMesh { lines, bore: None }
+    }
+
+    /// True for a flat cell between the two copies of a line.
+    pub fn is_gap(&self, cell: usize) -> bool {
+        let c = self.cell_coordinates(cell);
+        (0..3).any(|a| self.lines[a][c[a] + 1] == self.lines[a][c[a]])
+    }
+
     /// Cells per axis.
     pub fn cells(&self) -> [usize; 3] {
         std::array::from_fn(|a| self.lines[a].len() - 1)
@@ -63,10 +107,11 @@ impl BlockMesh {
     /// Rest position X of a node [m].
     pub fn rest_position(&self, node: usize) -> DVec3 {
         let [i, j, k] = self.node_coordinates(node);
-        DVec3::new(self.lines[0][i], self.lines[1][j], self.lines[2][k])
+        let square = DVec2::new(self.lines[0][i], self.lines[1][j]);
+        self.bore.map_or(square, |bore| bore.map(square)).extend(self.lines[2][k])
     }
 
-    /// Edge lengths of a cell [m].
+    /// Edge lengths of a cell between its grid lines [m].
     pub fn cell_size(&self, cell: usize) -> DVec3 {
         let c = self.cell_coordinates(cell);
         let d = |a: usize| self.lines[a][c[a] + 1] - self.lines[a][c[a]];
@@ -88,7 +133,52 @@ impl BlockMesh {
         ]
     }
 
-    /// Tributary volume of a node, an eighth of every cell around it [m^3].
+    /// The cell that holds a point of the block (or the nearest one) and the place in it, 0..1 per axis. Never a gap: a
+    /// point on a doubled line belongs to the cell above it.
+    pub fn locate(&self, x: DVec3) -> ([usize; 3], DVec3) {
+        let along = |a: usize, x: f64| {
+            let lines = &self.lines[a];
+            let i = lines.partition_point(|l| *l <= x).clamp(1, lines.len() - 1) - 1;
+            (i, ((x - lines[i]) / (lines[i + 1] - lines[i])).clamp(0.0, 1.0))
+        };
+        let (k, zeta) = along(2, x.z);
+        let Some(bore) = self.bore else {
+            let ((i, xi), (j, eta)) = (along(0, x.x), along(1, x.y));
+            return ([i, j, k], DVec3::new(xi, eta, zeta));
+        };
+        // The map keeps directions: bisect the distance along the ray from the axis.
+        let p = x.truncate() - bore.centre;
+        let reach = p.length();
+        let ray = if reach > 0.0 { p / reach } else { DVec2::X };
+        let (mut low, mut high) = (0.0, 2.0 * reach);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if (bore.map(bore.centre + ray * middle) - bore.centre).length() < reach {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let square = bore.centre + ray * (0.5 * (low + high));
+        let ((i, xi), (j, eta)) = (along(0, square.x), along(1, square.y));
+        // The cell is bilinear between its corners, the map is not: Newton's iteration within the cell.
+        let corner = |di: usize, dj: usize| self.rest_position(self.node_index(i + di, j + dj, 0)).truncate();
+        let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+        let mut local = DVec2::new(xi, eta);
+        for _ in 0..20 {
+            let (u, v) = (local.x, local.y);
+            let at = a * ((1.0 - u) * (1.0 - v)) + b * (u * (1.0 - v)) + c * (u * v) + d * ((1.0 - u) * v);
+            let along_u = (b - a) * (1.0 - v) + (c - d) * v;
+            let along_v = (d - a) * (1.0 - u) + (c - b) * u;
+            let miss = x.truncate() - at;
+            let det = along_u.perp_dot(along_v);
+            local += DVec2::new(miss.perp_dot(along_v), along_u.perp_dot(miss)) / det;
+        }
+        let local = local.clamp(DVec2::ZERO, DVec2::ONE);
+        ([i, j, k], local.extend(zeta))
+    }
+
+    /// Tributary volume of a node, an eighth of every cell around it, where all lines are straight [m^3].
     pub fn node_volume(&self, node: usize) -> f64 {
         let c = self.node_coordinates(node);
         (0..3)
@@ -117,7 +207,58 @@ const LINES_TO_GIVE_UP: usize = 3;
 impl BlockMesh {
     /// The grid of a scene; fine around the path of its tool, uniform without a tool.
     pub fn for_scene(scene: &Scene) -> BlockMesh {
-        BlockMesh::for_tissue(&scene.tissue, scene.tool.as_ref().map(|_| &scene.motion))
+        let motion = scene.tool.as_ref().map(|_| &scene.motion);
+        let mut mesh = BlockMesh::for_tissue(&scene.tissue, motion);
+        let Some(cohesive) = &scene.effects.cohesive else { return mesh };
+        if let (true, Some(bore)) = (scene.has_bore(), scene.needle().and_then(|n| n.bore)) {
+            mesh.follow_bore(&scene.tissue, scene.motion.entry, bore.edge);
+        }
+        if let Some(slit) = scene.slit_axis() {
+            let mut tissue = scene.tissue.clone();
+            // The slit lies on a line and its middle between two lines of the other axis: where a line lies near the needle's
+            // side, the face there opens half and the contact creates up to a tenth of the work (cells of 0.6 mm).
+            tissue.axis_offset_cells[slit] = 0.0;
+            tissue.axis_offset_cells[1 - slit] = 0.5;
+            mesh = BlockMesh::for_tissue(&tissue, motion);
+            mesh.split(slit, scene.motion.entry[slit]);
+        }
+        for plane in &cohesive.planes {
+            mesh.split(plane.axis, plane.at);
+        }
+        mesh
+    }
+
+    /// Lays lines on the square around a ring of the given radius, bends them to its circle and doubles them.
+    fn follow_bore(&mut self, tissue: &Tissue, entry: DVec3, radius: f64) {
+        let h = tissue.cell_size;
+        let centre = entry.truncate();
+        for axis in 0..2 {
+            let half = 0.5 * tissue.size[axis];
+            // From the axis outwards, in both directions.
+            let side = |face: f64| side_lines(face, radius, tissue.fine_radius, h, tissue.growth);
+            let below = side(half + centre[axis]);
+            let above = side(half - centre[axis]);
+            let mut lines: Vec<f64> = below.iter().rev().map(|d| centre[axis] - d).collect();
+            lines.push(centre[axis]);
+            lines.extend(above.iter().map(|d| centre[axis] + d));
+            let end = lines.len() - 1;
+            (lines[0], lines[end]) = (-half, half);
+            self.lines[axis] = lines;
+            self.split(axis, centre[axis] - radius);
+            self.split(axis, centre[axis] + radius);
+        }
+        self.bore = Some(Bore { centre, radius, outer: (3.0 * radius).max(radius + 2.0 * h) });
+    }
+
+    /// Moves the nearest inner line of an axis to `at` [m] and doubles it.
+    pub fn split(&mut self, axis: usize, at: f64) {
+        let lines = &mut self.lines[axis];
+        let inner = 1..lines.len() - 1;
+        let nearest = inner.min_by(|a, b| (lines[*a] - at).abs().total_cmp(&(lines[*b] - at).abs()));
+        if let Some(i) = nearest {
+            lines[i] = at;
+            lines.insert(i, at);
+        }
     }
 
     /// The grid of a block, fine around the path of `motion`; `None`: uniform cells.
@@ -125,25 +266,46 @@ impl BlockMesh {
         let h = tissue.cell_size;
         let half = tissue.size * 0.5;
         let Some(motion) = motion else {
-            return BlockMesh {
-                lines: [
-                    uniform_lines(-half.x, half.x, h),
-                    uniform_lines(-half.y, half.y, h),
-                    uniform_lines(-tissue.size.z, 0.0, h),
-                ],
-            };
+            return BlockMesh::new([
+                uniform_lines(-half.x, half.x, h),
+                uniform_lines(-half.y, half.y, h),
+                uniform_lines(-tissue.size.z, 0.0, h),
+            ]);
         };
-        let (low, high) = motion.reach();
+        let (low, high) = motion.reach(tissue.size.z);
         let lateral = |axis: usize| {
             let entry = motion.entry[axis];
             let zone = [low[axis] - tissue.fine_radius, high[axis] + tissue.fine_radius];
             let anchor = entry - tissue.axis_offset_cells[axis] * h;
             graded_lines([-half[axis], half[axis]], zone, anchor, h, tissue.growth)
         };
-        BlockMesh {
-            lines: [lateral(0), lateral(1), depth_lines(tissue.size.z, -low.z + FINE_BELOW_PATH, h, tissue.growth)],
+        BlockMesh::new([lateral(0), lateral(1), depth_lines(tissue.size.z, -low.z + FINE_BELOW_PATH, h, tissue.growth)])
+    }
+}
+
+/// Distances of grid lines from the axis of a bore up to a face: whole cells within the radius, edges `h` to the end of
+/// the fine zone, growing beyond.
+fn side_lines(face: f64, radius: f64, fine_radius: f64, h: f64, growth: f64) -> Vec<f64> {
+    let inner = (radius / h).round().max(1.0) as usize;
+    let mut lines: Vec<f64> = (1..=inner).map(|k| radius * k as f64 / inner as f64).collect();
+    let left = (face - radius) / h;
+    let fine = ((fine_radius - radius) / h).round().clamp(1.0, left.floor().max(1.0));
+    match series_to_face(|give_up| left - (fine - give_up), growth) {
+        Some((give_up, edges)) => {
+            let fine = fine as usize - give_up.min(fine as usize);
+            lines.extend((1..=fine).map(|k| radius + k as f64 * h));
+            let mut at = radius + fine as f64 * h;
+            for edge in edges {
+                at += edge * h;
+                lines.push(at);
+            }
+        }
+        None => {
+            let count = left.round().max(1.0) as usize;
+            lines.extend((1..=count).map(|k| radius + (face - radius) * k as f64 / count as f64));
         }
     }
+    lines
 }
 
 /// Uniform lines from `low` to `high` with an edge as close to `h` as whole cells allow.
@@ -245,8 +407,6 @@ fn series_edges(distance: f64, growth: f64) -> Option<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
     use crate::scene::Phase;
 
@@ -265,6 +425,7 @@ mod tests {
             entry: DVec3::new(entry[0] * 1e-3, entry[1] * 1e-3, 0.0),
             direction: direction.normalize(),
             phases: vec![Phase::Insert { speed: 2e-3, depth: depth * 1e-3 }],
+            vibration: None,
         }
     }
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use block::BlockMesh;
+pub use block::{BlockMesh, Bore};
 pub use tets::TetMesh;
 
 /// The mesh of a model.
@@ -81,9 +81,22 @@ impl Mesh {
     /// Rest volume of a cell [m^3].
     pub fn cell_volume(&self, cell: usize) -> f64 {
         match self {
-            Mesh::Block(mesh) => mesh.cell_size(cell).to_array().iter().product(),
+            Mesh::Block(mesh) => {
+                let size = mesh.cell_size(cell);
+                if mesh.bore.is_none() {
+                    return size.x * size.y * size.z;
+                }
+                // Prisms: the area of a quadrilateral is half the cross product of its diagonals.
+                let [a, b, c, d, ..] = mesh.cell_nodes(cell).map(|n| mesh.rest_position(n).truncate());
+                0.5 * (c - a).perp_dot(d - b) * size.z
+            }
             Mesh::Tets(mesh) => mesh.volume(cell),
         }
+    }
+
+    /// True for a flat cell between two copies of a grid line, which is no tissue.
+    pub fn is_gap(&self, cell: usize) -> bool {
+        self.as_block().is_some_and(|block| block.is_gap(cell))
     }
 
     /// Centre of a cell at rest [m].
@@ -97,7 +110,7 @@ impl Mesh {
         match self {
             Mesh::Block(mesh) => {
                 let steps = mesh.lines.iter().flat_map(|l| l.windows(2).map(|w| w[1] - w[0]));
-                steps.fold(f64::INFINITY, f64::min)
+                steps.filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min)
             }
             Mesh::Tets(mesh) => (0..mesh.tets.len()).map(|t| mesh.smallest_altitude(t)).fold(f64::INFINITY, f64::min),
         }

@@ -29,7 +29,21 @@ pub struct Profile {
     /// Shift of the section's centre per radius: zero for a cone; for a bevel the unit vector from the apex to the axis, so
     /// that all sections touch the line through the apex parallel to the axis.
     pub shift: DVec3,
+    /// The bore of a hollow needle.
+    pub bore: Option<BoreProfile>,
 }
+
+/// Radii of a hollow needle inside its shaft.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoreProfile {
+    /// Radius of the cutting edge [m].
+    pub edge: f64,
+    /// Radius of the bore [m].
+    pub radius: f64,
+}
+
+/// Half width of the section, in shaft radii, below which the push to the own side of a slit fades.
+const SLIT_FADE: f64 = 1.0 / 3.0;
 
 impl Profile {
     /// The profile of a needle that points along `direction`.
@@ -41,7 +55,8 @@ impl Profile {
                 -(e1 * heading.cos() + e2 * heading.sin())
             }
         };
-        Profile { radius: needle.radius, tip_length: needle.tip_length, shift }
+        let bore = needle.bore.map(|b| BoreProfile { edge: b.edge, radius: b.radius });
+        Profile { radius: needle.radius, tip_length: needle.tip_length, shift, bore }
     }
 
     /// Radius of the section at `s` behind the tip, and its slope d rc/ds.
@@ -51,6 +66,49 @@ impl Profile {
         } else {
             (self.radius, 0.0)
         }
+    }
+
+    /// Overlap of one face of a slit with the section, pushed towards its own side `side` (unit, lateral):
+    /// ```text
+    /// p = rho.side,  q = rho - side p,  w = sqrt(rc^2 - q^2),  phi = (w - p) w^2/(w^2 + b^2) - less,  b = R/3
+    /// ```
+    /// with the lateral vector `rho` from the section's centre: the way out to the face's own side, faded where the circle ends
+    /// (q = rc), so that the gradient stays bounded there and at the apex. A radial normal would push both faces to one side;
+    /// without the fading the contact at the ends of the slit creates half of the needle's work.
+    pub fn slit_face(&self, lever: DVec3, d: DVec3, side: DVec3, less: (f64, f64)) -> Overlap {
+        let s = lever.dot(d);
+        let (rc, slope) = self.section(s);
+        let rho = lever - d * s - self.shift * rc;
+        let p = rho.dot(side);
+        let q = rho - side * p;
+        let square = rc * rc - q.length_squared();
+        if square <= 0.0 {
+            return Overlap { value: -1.0, gradient: -side };
+        }
+        let w = square.sqrt();
+        let fade = square + (SLIT_FADE * self.radius).powi(2);
+        let part = square / fade;
+        // d phi / d w^2.
+        let rate = (1.0 - part) / fade * (w - p) + 0.5 * w / fade;
+        let lateral = -side * part - q * (2.0 * rate);
+        let along = (2.0 * rc * rate - lateral.dot(self.shift)) * slope - less.1;
+        Overlap { value: part * (w - p) - less.0, gradient: lateral + d * along }
+    }
+
+    /// Overlap of the tissue around a hollow needle with its outer wall (`inside` false) or of the core with its bore; both
+    /// surfaces leave the cutting edge with a rounded flank over the length of the tip.
+    pub fn tube_wall(&self, lever: DVec3, d: DVec3, inside: bool, less: (f64, f64)) -> Overlap {
+        let Some(bore) = self.bore else { return Overlap { value: -1.0, gradient: -d } };
+        let s = lever.dot(d);
+        let rho = lever - d * s;
+        let r = rho.length();
+        let e = if r > 1e-9 { rho / r } else { DVec3::ZERO };
+        let end = if inside { bore.radius } else { self.radius };
+        let t = (s / self.tip_length).clamp(0.0, 1.0);
+        let wall = bore.edge + (end - bore.edge) * t * t * (3.0 - 2.0 * t);
+        let slope = (end - bore.edge) * 6.0 * t * (1.0 - t) / self.tip_length;
+        let sign = if inside { -1.0 } else { 1.0 };
+        Overlap { value: sign * (wall - r) - less.0, gradient: (d * slope - e) * sign - d * less.1 }
     }
 
     /// Overlap of a point whose material lay `rest_radius` from the line of the tip, with the opened path:
@@ -95,6 +153,42 @@ mod tests {
                     let exact = phi(lever).gradient.dot(axis);
                     assert!((rate - exact).abs() < 1e-5, "{tip:?}, point {i}: {rate} against {exact}");
                 }
+            }
+        }
+    }
+
+    /// The same for the faces of a slit and both walls of a tube.
+    #[test]
+    fn gradients_of_separated_faces_are_derivatives() {
+        let direction = DVec3::new(0.3, -0.2, -0.9).normalize();
+        let (d, side) = (-direction, lateral_axes(direction).0);
+        let other = d.cross(side);
+        for tip in [TipShape::Cone, TipShape::Bevel { heading: 0.7 }] {
+            let bore = crate::scene::BoreShape { radius: 0.6e-3, edge: 0.65e-3, friction: 0.0 };
+            let needle = NeedleShape { tip, bore: Some(bore), ..NeedleShape::cone("test", 0.8e-3, 2.5e-3) };
+            let profile = Profile::new(&needle, direction);
+            let less = |x: DVec3| (0.1e-3 - 0.02 * x.dot(d), -0.02);
+            let laws: [&dyn Fn(DVec3) -> Overlap; 3] =
+                [&|x| profile.slit_face(x, d, side, less(x)), &|x| profile.tube_wall(x, d, false, less(x)), &|x| {
+                    profile.tube_wall(x, d, true, less(x))
+                }];
+            for (law, phi) in laws.iter().enumerate() {
+                let mut seen = 0;
+                for i in 0..40 {
+                    let t = f64::from(i);
+                    let lever = d * (0.25e-3 + 0.1e-3 * t) + side * 0.2e-3 * t.sin() + other * 0.2e-3 * (1.3 * t).cos();
+                    if phi(lever).value == -1.0 {
+                        continue;
+                    }
+                    seen += 1;
+                    let h = 1e-9;
+                    for axis in DVec3::AXES {
+                        let rate = (phi(lever + axis * h).value - phi(lever - axis * h).value) / (2.0 * h);
+                        let exact = phi(lever).gradient.dot(axis);
+                        assert!((rate - exact).abs() < 1e-4, "law {law}, {tip:?}, point {i}: {rate} against {exact}");
+                    }
+                }
+                assert!(seen > 20);
             }
         }
     }

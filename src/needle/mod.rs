@@ -1,12 +1,16 @@
-//! Motion of the rigid tool on the CPU, and the geometry of a planned path.
+//! Motion of the tool on the CPU, the flexible needle ([`beam`]), and the geometry of a planned path.
 
+pub mod banded;
+pub mod beam;
+pub mod centre_line;
+pub mod flexible;
 pub mod free_path;
 pub mod gap;
 
 use glam::DVec3;
 
-use crate::scene::Motion;
 use crate::scene::motion::{Leg, Placement};
+use crate::scene::{Motion, Vibration};
 
 /// Position and velocity of the tool tip at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +29,7 @@ pub struct ToolPose {
     pub phase: usize,
 }
 
-/// Pose of the tool over time, one leg per phase.
+/// Pose of the tool over time, one leg per phase; a vibration of the hub on top.
 #[derive(Debug, Clone)]
 pub struct Kinematics {
     /// Direction at the beginning: the tool is turned out of it without spin.
@@ -34,6 +38,7 @@ pub struct Kinematics {
     legs: Vec<(f64, Leg)>,
     end: f64,
     at_end: Placement,
+    vibration: Option<Vibration>,
 }
 
 impl Kinematics {
@@ -45,7 +50,7 @@ impl Kinematics {
             legs.push((time, leg));
             time += leg.duration;
         }
-        Kinematics { reference: motion.direction, legs, end: time, at_end: motion.end() }
+        Kinematics { reference: motion.direction, legs, end: time, at_end: motion.end(), vibration: motion.vibration }
     }
 
     /// Length of the motion [s].
@@ -70,7 +75,7 @@ impl Kinematics {
         })
     }
 
-    /// Pose at `time` [s]; after the end the tool stands still.
+    /// Pose at `time` [s]; after the end the phases stand still.
     pub fn pose(&self, time: f64) -> ToolPose {
         let last = self.legs.len().saturating_sub(1);
         let phase = self.legs.iter().rposition(|p| time >= p.0).unwrap_or(0);
@@ -80,12 +85,13 @@ impl Kinematics {
             let (start, leg) = self.legs[phase];
             leg.at(time - start)
         };
+        let (offset, shaking) = self.vibration.map_or((DVec3::ZERO, DVec3::ZERO), |v| v.at(time));
         ToolPose {
-            tip: at.tip,
-            velocity: at.velocity,
+            tip: at.tip + offset,
+            velocity: at.velocity + shaking,
             direction: at.direction,
             angular_velocity: swing_rate(self.reference, at.direction, at.turning),
-            depth: at.depth,
+            depth: at.depth + offset.dot(at.direction),
             phase: phase.min(last),
         }
     }

@@ -2,21 +2,67 @@
 
 use glam::DVec3;
 
-/// Force that the tool exerts on the tissue, in parts [N]; positive along the insertion direction. Means over the frame.
+/// Force that moves the tool, in parts [N]; positive along the insertion direction. Means over the frame. All parts but the
+/// inertia act on the tissue.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ForceParts {
-    /// Axial sum of the parts [N].
+    /// What the hand feels along the insertion: sum of the parts [N].
     pub axial: f64,
-    /// Tip law: puncture and cutting [N].
+    /// Tip law in the bulk: puncture and cutting [N].
     pub cutting: f64,
-    /// Contact normal on cone and shaft (or indenter) [N].
-    pub spreading: f64,
+    /// Tip law while the tip is in a membrane [N].
+    pub membrane: f64,
+    /// Contact normal on the tip of a needle, s < tip length, or on an indenter [N].
+    pub tip_spreading: f64,
+    /// Contact normal on the shaft [N].
+    pub shaft_spreading: f64,
     /// Friction [N].
     pub friction: f64,
+    /// Tissue that sticks to the tip [N].
+    pub adhesion: f64,
+    /// Mass of the needle times the acceleration of its prescribed motion, mean over the length of a frame [N].
+    pub inertia: f64,
     /// Lateral force on the tissue, world frame with the axial part removed [N].
     pub lateral: DVec3,
     /// Torque on the tissue about the tip, world frame [N m].
     pub torque: DVec3,
+}
+
+/// One addend of the axial force, as tables, charts and reports show it.
+#[derive(Debug, Clone, Copy)]
+pub struct ForcePart {
+    /// Name in legends.
+    pub name: &'static str,
+    /// Column of `force.csv`.
+    pub column: &'static str,
+    /// Red, green, blue; people with colour-blindness tell the parts apart (Okabe and Ito 2008).
+    pub colour: [u8; 3],
+    /// Its share of the axial force [N].
+    pub of: fn(&ForceParts) -> f64,
+}
+
+impl ForceParts {
+    /// The parts that add up to `axial`, from the bottom of a stack to its top. A new part is one line here: columns,
+    /// charts and reports follow this list.
+    pub const PARTS: [ForcePart; 7] = [
+        ForcePart { name: "cutting", column: "cutting_force_n", colour: [204, 121, 167], of: |f| f.cutting },
+        ForcePart { name: "membrane", column: "membrane_force_n", colour: [213, 94, 0], of: |f| f.membrane },
+        ForcePart {
+            name: "spreading, tip",
+            column: "tip_spreading_force_n",
+            colour: [0, 158, 115],
+            of: |f| f.tip_spreading,
+        },
+        ForcePart {
+            name: "spreading, shaft",
+            column: "shaft_spreading_force_n",
+            colour: [86, 180, 233],
+            of: |f| f.shaft_spreading,
+        },
+        ForcePart { name: "friction", column: "friction_force_n", colour: [230, 159, 0], of: |f| f.friction },
+        ForcePart { name: "adhesion", column: "adhesion_force_n", colour: [240, 228, 66], of: |f| f.adhesion },
+        ForcePart { name: "inertia", column: "inertia_force_n", colour: [128, 128, 128], of: |f| f.inertia },
+    ];
 }
 
 /// Energies [J] at the end of a frame. Work and dissipation are totals since t = 0.
@@ -35,12 +81,18 @@ pub struct EnergyAccount {
     pub friction: f64,
     /// Dissipated by the tip law and by the softening of the path.
     pub cutting: f64,
+    /// Dissipated by faces that separate, plus what they store.
+    pub cohesive: f64,
+    /// Dissipated by tissue that slips on the tip.
+    pub adhesion: f64,
     /// Dissipated by plastic flow, by damage and by the viscous terms.
     pub plastic: f64,
     pub damage: f64,
     pub viscous: f64,
-    /// Stored in contact, stick and tip springs, plus what contact damping dissipated.
+    /// Stored in contact, stick, tip and bond springs, plus what contact damping dissipated.
     pub contact: f64,
+    /// Gained and damped by a flexible needle since t = 0.
+    pub needle: f64,
     /// Largest |external| so far, the scale of the imbalance.
     pub external_max: f64,
 }
@@ -54,10 +106,13 @@ impl EnergyAccount {
             + self.damping
             + self.friction
             + self.cutting
+            + self.cohesive
+            + self.adhesion
             + self.plastic
             + self.damage
             + self.viscous
             + self.contact
+            + self.needle
     }
 
     /// (external - accounted) / largest external work; 0 while nothing has happened.
@@ -90,6 +145,25 @@ pub struct Health {
     pub not_finite: bool,
 }
 
+/// A flexible needle at the end of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NeedleRecord {
+    /// Where the tip is off the straight axis [m].
+    pub tip_offset: DVec3,
+    /// How far the tip stays behind that of a straight needle [m].
+    pub retreat: f64,
+    /// Largest distance of the centre-line from the axis [m].
+    pub largest_offset: f64,
+    /// Largest axial compression [N].
+    pub compression: f64,
+    /// Energy of bending [J].
+    pub bending_energy: f64,
+    /// True once the needle has buckled.
+    pub buckled: bool,
+    /// True where the beam did not find its balance.
+    pub unbalanced: bool,
+}
+
 /// One display frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FrameRecord {
@@ -109,7 +183,11 @@ pub struct FrameRecord {
     /// What each face exerts on the tissue at the end of the frame, indexed by `Face` [N]; zero without driven faces.
     pub reactions: [DVec3; 6],
     pub energy: EnergyAccount,
+    /// Zero without a flexible needle.
+    pub needle: NeedleRecord,
     pub health: Health,
+    /// What the bore of a hollow needle holds.
+    pub core: Option<CoreSample>,
 }
 
 /// Fields of one moment, for VTU files and pictures.
@@ -141,6 +219,8 @@ pub struct FieldSnapshot {
     pub material: Vec<f64>,
 }
 
+mod core_sample;
 mod recorder;
 
+pub use core_sample::{CoreSample, cells_inside};
 pub use recorder::Recorder;

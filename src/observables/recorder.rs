@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::{EnergyAccount, ForceParts, FrameRecord, Health};
 use crate::model::Model;
+use crate::scene::Tool;
 use crate::solver::engine::FrameSums;
 
 /// Adds up what the frames deliver, in f64.
@@ -11,6 +12,7 @@ use crate::solver::engine::FrameSums;
 pub struct Recorder {
     totals: EnergyAccount,
     contact_dissipation: f64,
+    cohesive_dissipation: f64,
     step: u64,
 }
 
@@ -30,14 +32,19 @@ impl Recorder {
         e.damping += sums.damping_dissipation;
         e.friction += sums.friction_dissipation;
         e.cutting += sums.tip_dissipation + sums.softening_dissipation;
+        self.cohesive_dissipation += sums.cohesive_dissipation;
+        e.cohesive = sums.cohesive_energy + self.cohesive_dissipation;
+        e.adhesion += sums.adhesion_dissipation;
         e.plastic += sums.plastic_dissipation;
         e.damage += sums.damage_dissipation;
         e.viscous = sums.viscous_dissipation;
         self.contact_dissipation += sums.contact_dissipation;
+        e.needle = sums.needle_energy;
         e.contact = sums.contact_energy + self.contact_dissipation;
         let mean_pose = model.kinematics.as_ref().map(|k| k.pose(0.5 * (begin + end)));
         let direction = mean_pose.map_or(DVec3::ZERO, |p| p.direction);
         let force = sums.impulse / duration;
+        let inertia = inertia(model, end);
         FrameRecord {
             frame: sums.frame,
             step: self.step,
@@ -45,16 +52,22 @@ impl Recorder {
             depth: mean_pose.map_or(0.0, |p| p.depth),
             phase: mean_pose.map_or(0, |p| p.phase),
             force: ForceParts {
-                axial: force.dot(direction),
+                axial: force.dot(direction) + inertia,
                 cutting: sums.cutting_impulse / duration,
-                spreading: sums.spreading_impulse / duration,
+                membrane: sums.membrane_impulse / duration,
+                tip_spreading: (sums.spreading_impulse - sums.shaft_impulse) / duration,
+                shaft_spreading: sums.shaft_impulse / duration,
                 friction: sums.friction_impulse / duration,
+                adhesion: sums.adhesion_impulse / duration,
+                inertia,
                 lateral: force - direction * force.dot(direction),
                 torque: sums.angular_impulse / duration,
             },
             tip_coordinate: sums.tip_coordinate,
             reactions: sums.reactions,
             energy: *e,
+            needle: Default::default(),
+            core: None,
             health: Health {
                 min_j: sums.min_j,
                 min_corner_j: sums.min_corner_j,
@@ -70,4 +83,21 @@ impl Recorder {
             },
         }
     }
+}
+
+/// Mass of the needle times the acceleration of its prescribed motion along the insertion, mean over the display frame
+/// before `end` [N]. The motion changes its speed at once; the mean makes a pulse of it that is one frame long. The tool
+/// stood still before t = 0.
+fn inertia(model: &Model, end: f64) -> f64 {
+    let (Some(kinematics), Some(Tool::Needle(needle))) = (&model.kinematics, &model.scene.tool) else {
+        return 0.0;
+    };
+    let frame = 1.0 / model.scene.solver.frame_rate;
+    let speed = |time: f64| {
+        let pose = kinematics.pose(time);
+        if time < 0.0 { 0.0 } else { pose.velocity.dot(pose.direction) }
+    };
+    // A frame ends on the millionth of itself where a phase does.
+    let moment = |time: f64| time + 1e-6 * frame;
+    needle.mass() * (speed(moment(end)) - speed(moment(end - frame))) / frame
 }

@@ -9,7 +9,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::curve::CurveFigures;
 use super::whole_file;
-use crate::observables::FrameRecord;
+use crate::observables::{ForceParts, FrameRecord};
 use crate::{Error, Result};
 
 /// Size of the chart [px].
@@ -22,9 +22,13 @@ pub(super) const HEAD: u32 = 84;
 // Colours that people with colour-blindness tell apart (Okabe and Ito 2008), each with its own dash or width.
 pub(super) const INWARD: RGBColor = RGBColor(0, 114, 178);
 pub(super) const OUTWARD: RGBColor = RGBColor(213, 94, 0);
-pub(super) const CUTTING: RGBColor = RGBColor(204, 121, 167);
-pub(super) const SPREADING: RGBColor = RGBColor(0, 158, 115);
-pub(super) const FRICTION: RGBColor = RGBColor(230, 159, 0);
+pub(super) const PINK: RGBColor = RGBColor(204, 121, 167);
+pub(super) const GREEN: RGBColor = RGBColor(0, 158, 115);
+pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);
+
+/// Dash and gap of the parts of the force, in their order [px].
+const PART_DASHES: [Option<(u32, u32)>; 6] =
+    [Some((7, 3)), None, Some((2, 3)), Some((10, 3)), Some((4, 2)), Some((1, 2))];
 
 /// Travel below which a run counts as one without insertion and is drawn over time [m].
 const LEAST_TRAVEL: f64 = 1e-6;
@@ -133,13 +137,6 @@ fn curves(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRe
     let turn = if over_depth { deepest } else { records.len().saturating_sub(1) };
     let inward = records.get(..=turn).unwrap_or(&[]);
     let outward = records.get(turn..).filter(|rest| rest.len() > 1).unwrap_or(&[]);
-    let part = |label, colour, dash, value: fn(&FrameRecord) -> f64| Curve {
-        label,
-        colour,
-        width: FINER * 3 / 2,
-        dash,
-        points: inward.iter().map(|r| (abscissa(r), value(r))).filter(|p| p.1.is_finite()).collect(),
-    };
     let axial = |label, colour, dash, records: &[&FrameRecord]| Curve {
         label,
         colour,
@@ -147,11 +144,19 @@ fn curves(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRe
         dash,
         points: records.iter().map(|r| (abscissa(r), r.force.axial)).collect(),
     };
-    let mut curves = vec![
-        part("cutting", CUTTING, Some((7, 3)), |r| r.force.cutting),
-        part("spreading", SPREADING, None, |r| r.force.spreading),
-        part("friction", FRICTION, Some((2, 3)), |r| r.force.friction),
-    ];
+    let mut curves: Vec<Curve> = ForceParts::PARTS
+        .iter()
+        .zip(PART_DASHES.into_iter().cycle())
+        // A part that the scene does not have has no line.
+        .filter(|(part, _)| inward.iter().any(|r| (part.of)(&r.force) != 0.0))
+        .map(|(part, dash)| Curve {
+            label: part.name,
+            colour: rgb(part.colour),
+            width: FINER * 3 / 2,
+            dash,
+            points: inward.iter().map(|r| (abscissa(r), (part.of)(&r.force))).filter(|p| p.1.is_finite()).collect(),
+        })
+        .collect();
     if !outward.is_empty() {
         curves.push(axial("axial, after full depth", OUTWARD, Some((9, 5)), outward));
     }
@@ -160,7 +165,7 @@ fn curves(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRe
     curves
 }
 
-/// Title and, below it, the legend in one row, outside the chart.
+/// Title and, below it, the legend outside the chart, in two rows where one is too short.
 pub(super) fn draw_head<DB: DrawingBackend>(
     head: &DrawingArea<DB, plotters::coord::Shift>,
     title: &str,
@@ -168,18 +173,18 @@ pub(super) fn draw_head<DB: DrawingBackend>(
 ) -> std::result::Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
     const CHARACTER_WIDTH: usize = 8;
     const SAMPLE: i32 = 34;
+    const LEFT: i32 = 78;
     let place = |x: i32, y: i32| (x * FINER as i32, y * FINER as i32);
-    let longest = (SIZE.0 as usize - 100) / 10;
-    let title: String = if title.chars().count() > longest {
-        title.chars().take(longest - 3).chain("...".chars()).collect()
-    } else {
-        title.to_string()
-    };
-    head.draw_text(&title, &("sans-serif", fine(21)).into_font().color(&BLACK), place(78, 16))?;
-    let mut x = 78;
-    let y = 62;
+    head.draw_text(&shortened(title), &("sans-serif", fine(21)).into_font().color(&BLACK), place(LEFT, 16))?;
+    let width = |curve: &Curve| SAMPLE + 8 + (curve.label.chars().count() * CHARACTER_WIDTH) as i32 + 22;
+    let one_row = LEFT + curves.iter().map(width).sum::<i32>() <= SIZE.0 as i32;
+    let mut x = LEFT;
+    let mut y = if one_row { 62 } else { 54 };
     // The two main lines first.
     for curve in curves.iter().rev() {
+        if x > LEFT && x + width(curve) > SIZE.0 as i32 {
+            (x, y) = (LEFT, y + 20);
+        }
         let style = curve.colour.stroke_width(curve.width);
         match curve.dash {
             None => head.draw(&PathElement::new(vec![place(x, y), place(x + SAMPLE, y)], style))?,
@@ -194,9 +199,23 @@ pub(super) fn draw_head<DB: DrawingBackend>(
         }
         let label = ("sans-serif", fine(15)).into_font().color(&BLACK).pos(Pos::new(HPos::Left, VPos::Center));
         head.draw_text(curve.label, &label, place(x + SAMPLE + 8, y))?;
-        x += SAMPLE + 8 + (curve.label.chars().count() * CHARACTER_WIDTH) as i32 + 22;
+        x += width(curve);
     }
     Ok(())
+}
+
+/// A title that fits above the chart.
+pub(super) fn shortened(title: &str) -> String {
+    let longest = (SIZE.0 as usize - 100) / 10;
+    if title.chars().count() > longest {
+        title.chars().take(longest - 3).chain("...".chars()).collect()
+    } else {
+        title.to_string()
+    }
+}
+
+pub(super) fn rgb([red, green, blue]: [u8; 3]) -> RGBColor {
+    RGBColor(red, green, blue)
 }
 
 /// Pixels to units of the drawing.

@@ -3,6 +3,8 @@
 //! Only frames on the way in count: those deeper than every frame before them. Holding, withdrawing and frames whose
 //! depth or force is not a finite number are left out.
 
+use serde::{Deserialize, Serialize};
+
 use crate::observables::FrameRecord;
 
 /// Travel after the peak within which the force has to fall, and in which the force after puncture is sought [m].
@@ -17,6 +19,8 @@ pub const LINEAR_AFTER_PUNCTURE: f64 = 2.0e-3;
 pub const LINEAR_AT_LEAST: f64 = 1.0e-3;
 /// Travel at the end of the insertion over which the force at full depth is averaged [m].
 pub const END_TRAVEL: f64 = 0.25e-3;
+/// Fraction of the largest force so far by which the force falls in a major drop.
+pub const MAJOR_DROP: f64 = 0.15;
 /// A drop smaller than this many standard deviations of the frame-to-frame noise is noise.
 const NOISE_FACTOR: f64 = 4.0;
 /// A peak below this fraction of the largest force is first contact, not puncture.
@@ -63,13 +67,13 @@ impl CurveFigures {
             force_at_max_depth: Some(at_end.iter().sum::<f64>() / at_end.len() as f64),
             ..Self::default()
         };
-        if let Some(puncture) = find_puncture(&curve, peak_force) {
-            let peak = curve[puncture];
-            let after = window_after(&curve, puncture).iter().map(|p| p.force).fold(peak.force, f64::min);
-            figures.puncture_force = Some(peak.force);
-            figures.puncture_depth = Some(peak.depth);
-            figures.force_after_puncture = Some(after);
-            figures.drop_fraction = Some((peak.force - after) / peak.force);
+        if let Some(puncture) =
+            find_drops(&curve, &median_of_three(&curve), DROP_FRACTION, NOISE_FACTOR * frame_noise(&curve), 1).first()
+        {
+            figures.puncture_force = Some(puncture.force);
+            figures.puncture_depth = Some(puncture.depth);
+            figures.force_after_puncture = Some(puncture.force_after);
+            figures.drop_fraction = Some(puncture.fraction());
         }
         let linear_from = if end.depth >= LINEAR_FROM + LINEAR_AT_LEAST {
             Some(LINEAR_FROM)
@@ -87,6 +91,38 @@ impl CurveFigures {
         }
         figures
     }
+}
+
+/// A sudden fall of the axial force on the way in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForceDrop {
+    /// Depth of the peak [m].
+    pub depth: f64,
+    /// Axial force at the peak [N].
+    pub force: f64,
+    /// Smallest axial force within [`DROP_TRAVEL`] after it [N].
+    pub force_after: f64,
+}
+
+impl ForceDrop {
+    /// Fall over the force at the peak.
+    pub fn fraction(&self) -> f64 {
+        (self.force - self.force_after) / self.force
+    }
+}
+
+/// All falls by at least `fraction` within [`DROP_TRAVEL`], from the depths [m] and axial forces [N] of a run in order of
+/// time. Every frame counts as it is, unlike in the search for the puncture.
+pub fn sudden_drops(curve: &[(f64, f64)], fraction: f64) -> Vec<ForceDrop> {
+    let mut deepest = f64::NEG_INFINITY;
+    let mut points = Vec::new();
+    for &(depth, force) in curve {
+        if depth.is_finite() && depth > deepest && force.is_finite() {
+            deepest = depth;
+            points.push(Point { depth, force });
+        }
+    }
+    find_drops(&points, &points, fraction, 0.0, usize::MAX)
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -109,6 +145,55 @@ pub fn frames_on_the_way_in(records: &[FrameRecord]) -> impl Iterator<Item = &Fr
     })
 }
 
+/// A fall of the axial force on the way in whose size is at least [`MAJOR_DROP`] of the largest force before it.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct MajorDrop {
+    /// Depth of the tip on the needle's axis at the peak [m]; it includes the dimple.
+    pub depth_m: f64,
+    /// How far the tip has cut into the material at the peak [m].
+    pub tip_coordinate_m: f64,
+    /// Axial force at the peak, and at the lowest point before it rises as much again [N].
+    pub force_n: f64,
+    pub force_after_n: f64,
+}
+
+/// The major drops of a curve, in order. A peak is one when the force falls below it by [`MAJOR_DROP`] of the largest force so
+/// far before it rises above the peak again; the drop is over when the force has risen by as much from its lowest point.
+pub fn major_drops(records: &[FrameRecord]) -> Vec<MajorDrop> {
+    let frames = frames_on_the_way_in(records).filter(|r| r.force.axial.is_finite());
+    let frames: Vec<&FrameRecord> = frames.collect();
+    let largest = frames.iter().map(|r| r.force.axial).fold(0.0, f64::max);
+    let mut drops: Vec<MajorDrop> = Vec::new();
+    let (mut falling, mut running, mut extreme) = (false, 0.0_f64, None::<&FrameRecord>);
+    for frame in frames {
+        let force = frame.force.axial;
+        running = running.max(force);
+        let needed = MAJOR_DROP * running;
+        let before = *extreme.get_or_insert(frame);
+        let further = if falling { force < before.force.axial } else { force >= before.force.axial };
+        if further {
+            extreme = Some(frame);
+        }
+        match drops.last_mut() {
+            Some(drop) if falling => drop.force_after_n = drop.force_after_n.min(force),
+            _ => {}
+        }
+        let turned = (force - before.force.axial).abs() >= needed && !further;
+        if turned && !falling && before.force.axial >= LEAST_PEAK * largest {
+            drops.push(MajorDrop {
+                depth_m: before.depth,
+                tip_coordinate_m: before.tip_coordinate,
+                force_n: before.force.axial,
+                force_after_n: force,
+            });
+        }
+        if turned {
+            (falling, extreme) = (!falling, Some(frame));
+        }
+    }
+    drops
+}
+
 /// Points after index `i` within [`DROP_TRAVEL`], at least one where there is one.
 fn window_after(curve: &[Point], i: usize) -> &[Point] {
     let rest = &curve[i + 1..];
@@ -116,45 +201,66 @@ fn window_after(curve: &[Point], i: usize) -> &[Point] {
     &rest[..within.max(1).min(rest.len())]
 }
 
-/// Index of the first peak after which the force falls by [`DROP_FRACTION`] within [`DROP_TRAVEL`], before it rises
-/// above the peak again. Sought on the median of three frames, so that one stray frame is no peak.
-fn find_puncture(curve: &[Point], largest: f64) -> Option<usize> {
-    if curve.len() < 3 {
-        return None;
-    }
-    let noise = frame_noise(curve);
-    let smooth: Vec<Point> = (0..curve.len())
+/// The median of each frame and its neighbours, so that one stray frame is no peak.
+fn median_of_three(curve: &[Point]) -> Vec<Point> {
+    (0..curve.len())
         .map(|i| {
             let mut force = match i {
-                0 => [curve[0].force; 3],
-                _ if i + 1 == curve.len() => [curve[i].force; 3],
+                _ if i == 0 || i + 1 == curve.len() => [curve[i].force; 3],
                 _ => [curve[i - 1].force, curve[i].force, curve[i + 1].force],
             };
             force.sort_by(f64::total_cmp);
             Point { depth: curve[i].depth, force: force[1] }
         })
-        .collect();
-    let candidate = (0..smooth.len()).find(|&i| {
-        let here = smooth[i];
-        if here.force <= 0.0 || here.force < LEAST_PEAK * largest {
-            return false;
+        .collect()
+}
+
+/// The first `at_most` peaks after which the force falls by `fraction`, and by at least `least` [N], within
+/// [`DROP_TRAVEL`], before it rises above the peak again. Sought on `smooth`, which has the points of `curve`; read off
+/// the curve.
+fn find_drops(curve: &[Point], smooth: &[Point], fraction: f64, least: f64, at_most: usize) -> Vec<ForceDrop> {
+    let mut drops = Vec::new();
+    if curve.len() < 3 {
+        return drops;
+    }
+    let largest = curve.iter().map(|p| p.force).fold(f64::NEG_INFINITY, f64::max);
+    // The bottom of the last drop: what lies before it belongs to that drop.
+    let mut from = 0;
+    while drops.len() < at_most {
+        let falls_after = |&i: &usize| {
+            let here = smooth[i];
+            if here.force <= 0.0 || here.force < LEAST_PEAK * largest {
+                return false;
+            }
+            let before = smooth[from..i].iter().rev().take_while(|p| p.depth >= here.depth - DROP_TRAVEL);
+            if before.map(|p| p.force).any(|force| force > here.force) {
+                return false;
+            }
+            let drop = (fraction * here.force).max(least);
+            window_after(smooth, i).iter().take_while(|p| p.force <= here.force).any(|p| p.force <= here.force - drop)
+        };
+        let Some(candidate) = (from..smooth.len()).find(falls_after) else { break };
+        // The median flattens a sharp peak: take the largest of the three frames themselves.
+        let nearby = candidate.saturating_sub(1)..=(candidate + 1).min(curve.len() - 1);
+        let peak = nearby.max_by(|&a, &b| curve[a].force.total_cmp(&curve[b].force)).unwrap_or(candidate);
+        let (mut bottom, mut force_after) = (peak, curve[peak].force);
+        for (i, p) in window_after(curve, peak).iter().enumerate() {
+            if p.force < force_after {
+                (bottom, force_after) = (peak + 1 + i, p.force);
+            }
         }
-        let above_before =
-            smooth[..i].iter().rev().take_while(|p| p.depth >= here.depth - DROP_TRAVEL).any(|p| p.force > here.force);
-        if above_before {
-            return false;
-        }
-        let drop = (DROP_FRACTION * here.force).max(NOISE_FACTOR * noise);
-        window_after(&smooth, i).iter().take_while(|p| p.force <= here.force).any(|p| p.force <= here.force - drop)
-    })?;
-    // The median flattens a sharp peak: take the largest of the three frames themselves.
-    let nearby = candidate.saturating_sub(1)..=(candidate + 1).min(curve.len() - 1);
-    nearby.max_by(|&a, &b| curve[a].force.total_cmp(&curve[b].force))
+        drops.push(ForceDrop { depth: curve[peak].depth, force: curve[peak].force, force_after });
+        from = bottom.max(candidate + 1);
+    }
+    drops
 }
 
 /// Standard deviation of the frame-to-frame noise [N], from the median size of the second differences: a smooth curve
 /// contributes little to them, and the few frames around a puncture do not move a median.
 fn frame_noise(curve: &[Point]) -> f64 {
+    if curve.len() < 3 {
+        return 0.0;
+    }
     let mut second: Vec<f64> = curve.windows(3).map(|w| (w[0].force - 2.0 * w[1].force + w[2].force).abs()).collect();
     second.sort_by(f64::total_cmp);
     // 1.4826: median of |x| to standard deviation; the second difference of white noise has variance 6.
@@ -293,6 +399,28 @@ mod tests {
     }
 
     #[test]
+    fn all_drops_of_a_saw_are_counted() {
+        // Teeth of 1 mm: up by 0.5 N, down by 0.2 N within 0.1 mm.
+        let saw = |d: f64| {
+            let (tooth, within) = ((d / 1e-3).floor(), (d / 1e-3).fract());
+            0.3 * tooth + if within <= 0.9 { 0.5 * within / 0.9 } else { 0.5 - 0.2 * (within - 0.9) / 0.1 }
+        };
+        let curve: Vec<(f64, f64)> = insertion(6.05e-3, saw)
+            .iter()
+            .chain(&insertion(3e-3, |_| -1.0))
+            .map(|r| (r.depth, r.force.axial))
+            .collect();
+        let drops = sudden_drops(&curve, 0.05);
+        assert_eq!(drops.len(), 6, "{drops:?}");
+        for (tooth, drop) in drops.iter().enumerate() {
+            near(Some(drop.depth), 1e-3 * tooth as f64 + 0.9e-3, 0.06e-3);
+            near(Some(drop.force - drop.force_after), 0.2, 0.08);
+        }
+        assert_eq!(sudden_drops(&curve, 0.3).len(), 1);
+        assert!(sudden_drops(&[], 0.1).is_empty());
+    }
+
+    #[test]
     fn withdrawal_is_left_out() {
         let mut records = insertion(12e-3, punctured);
         for i in 0..100 {
@@ -311,6 +439,39 @@ mod tests {
         near(figures.slope_after_puncture, 50.0, 1e-6);
         let too_short = CurveFigures::from_records(&insertion(3.5e-3, shallow));
         assert_eq!(too_short.slope_after_puncture, None);
+    }
+
+    #[test]
+    fn major_drops_are_counted_once() {
+        // Up to 1 N, down to 0.6, up to 1.2, a ripple of 0.1, down to 0.8 in two stairs.
+        let law = |d: f64| {
+            let points = [
+                (0.0, 0.0),
+                (3.0, 1.0),
+                (3.3, 0.6),
+                (6.0, 1.2),
+                (6.3, 1.1),
+                (6.6, 1.19),
+                (7.0, 1.0),
+                (7.3, 1.1),
+                (8.0, 0.8),
+            ];
+            let after = points.partition_point(|p| p.0 * 1e-3 <= d).clamp(1, points.len() - 1);
+            let (a, b) = (points[after - 1], points[after]);
+            a.1 + (b.1 - a.1) * (d * 1e3 - a.0) / (b.0 - a.0)
+        };
+        let mut records = insertion(8e-3, law);
+        for i in 0..50 {
+            records.push(record(8e-3 - f64::from(i) * 0.1e-3, -1.0));
+        }
+        let drops = major_drops(&records);
+        assert_eq!(drops.len(), 2, "{drops:?}");
+        for (drop, (depth, force, after)) in drops.iter().zip([(3e-3, 1.0, 0.6), (6e-3, 1.2, 0.8)]) {
+            near(Some(drop.depth_m), depth, 1e-9);
+            near(Some(drop.force_n), force, 1e-9);
+            near(Some(drop.force_after_n), after, 1e-9);
+        }
+        assert!(major_drops(&insertion(8e-3, |d| 100.0 * d)).is_empty());
     }
 
     #[test]

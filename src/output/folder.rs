@@ -12,15 +12,19 @@ pub const FORCE_TABLE: &str = "force.csv";
 pub const ENERGY_TABLE: &str = "energy.csv";
 pub const SUMMARY: &str = "summary.json";
 pub const FORCE_CHART: &str = "force.svg";
+/// Written where there is a tool.
+pub const FORCE_PARTS_CHART: &str = "force_parts.svg";
 /// Written where faces are driven.
 pub const SAMPLE_TABLE: &str = "sample.csv";
+/// What the bore of a hollow needle holds, per frame.
+pub const CORE_TABLE: &str = "core.csv";
 pub const SAMPLE_CHART: &str = "sample.svg";
 pub const FIELD_COLLECTION: &str = "frames.pvd";
 /// Folder of the VTU files `frame_00012.vtu`.
 pub const FIELD_FOLDER: &str = "frames";
 
-const SINGLE_FILES: [&str; 7] =
-    [FORCE_TABLE, ENERGY_TABLE, SUMMARY, FORCE_CHART, SAMPLE_TABLE, SAMPLE_CHART, FIELD_COLLECTION];
+const SINGLE_FILES: [&str; 8] =
+    [FORCE_TABLE, ENERGY_TABLE, SUMMARY, FORCE_CHART, FORCE_PARTS_CHART, SAMPLE_TABLE, SAMPLE_CHART, FIELD_COLLECTION];
 
 /// Where numbered folders go when the user names none.
 const DEFAULT_BASE: &str = "out";
@@ -38,6 +42,16 @@ pub enum PictureMoment {
     Depth(f64),
     /// Time [s], in a scene without a tool or with a free motion.
     Time(f64),
+}
+
+impl PictureMoment {
+    /// Name of its first picture, without the ending.
+    pub fn picture_stem(self) -> String {
+        match self {
+            PictureMoment::Depth(depth) => format!("stress_{:05.2}mm", depth * 1e3),
+            PictureMoment::Time(time) => format!("stress_{time:.4}s"),
+        }
+    }
 }
 
 impl OutputFolder {
@@ -112,10 +126,7 @@ impl OutputFolder {
     /// Path of a picture: `stress_12.00mm.png` or `stress_0.5000s.png`; a second picture of the same moment is
     /// `stress_12.00mm_2.png`.
     pub fn picture(&self, moment: PictureMoment) -> PathBuf {
-        let stem = match moment {
-            PictureMoment::Depth(depth) => format!("stress_{:05.2}mm", depth * 1e3),
-            PictureMoment::Time(time) => format!("stress_{time:.4}s"),
-        };
+        let stem = moment.picture_stem();
         let mut path = self.path.join(format!("{stem}.png"));
         let mut number = 2;
         while path.exists() {
@@ -234,6 +245,7 @@ mod tests {
             "summary.json",
             "summary.json.part",
             "force.svg",
+            "force_parts.svg",
             "sample.csv",
             "sample.svg",
             "frames.pvd",

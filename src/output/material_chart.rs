@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::chart::{
-    CUTTING, Curve, FINER, HEAD, INWARD, OUTWARD, SIZE, SPREADING, draw_head, fine, house_style, range, tick, widened,
+    Curve, FINER, GREEN, HEAD, INWARD, OUTWARD, PINK, SIZE, draw_head, fine, house_style, range, tick, widened,
 };
 use crate::material::Mode;
 use crate::material_test::{Leg, Row, peak};
@@ -53,8 +53,8 @@ fn colour(mode: Mode) -> RGBColor {
     match mode {
         Mode::Uniaxial => INWARD,
         Mode::Equibiaxial => OUTWARD,
-        Mode::Planar => SPREADING,
-        Mode::Shear => CUTTING,
+        Mode::Planar => GREEN,
+        Mode::Shear => PINK,
     }
 }
 

@@ -5,14 +5,14 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use super::chart::{CUTTING, Curve, FINER, FRICTION, HEAD, INWARD, OUTWARD, SIZE, SPREADING, draw_head, fine};
+use super::chart::{Curve, FINER, GREEN, HEAD, INWARD, ORANGE, OUTWARD, PINK, SIZE, draw_head, fine};
 use super::material_chart::{Mark, Panel};
 use super::sample::{DrivenFace, Motion, SamplePoint};
 use super::whole_file;
 use crate::observables::FrameRecord;
 use crate::{Error, Result};
 
-const COLOURS: [RGBColor; 6] = [INWARD, OUTWARD, SPREADING, CUTTING, FRICTION, RGBColor(86, 180, 233)];
+const COLOURS: [RGBColor; 6] = [INWARD, OUTWARD, GREEN, PINK, ORANGE, RGBColor(86, 180, 233)];
 
 /// Writes the chart, whole or not at all.
 pub fn write_sample_chart(path: &Path, title: &str, faces: &[DrivenFace], records: &[FrameRecord]) -> Result<()> {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::curve::{CurveFigures, frames_on_the_way_in};
+use super::curve::{CurveFigures, MajorDrop, frames_on_the_way_in, major_drops};
 use super::sample::{DrivenFace, SamplePoint};
 use super::tables::{hourglass_to_internal, kinetic_to_internal};
 use super::whole_file;
@@ -95,11 +95,22 @@ pub struct Summary {
     pub slope_after_puncture_n_per_m: Option<f64>,
     /// Coefficient of determination of the straight line from 5 mm to the deepest point.
     pub linear_fit_r2: Option<f64>,
+    /// Major drops of the force on the way in, in order.
+    #[serde(default)]
+    pub drops: Vec<MajorDrop>,
 
     /// Driven face with the largest nominal stress, that stress (tension positive) and the stretch at which it came.
     pub face: Option<String>,
     pub peak_nominal_stress_pa: Option<f64>,
     pub stretch_at_peak: Option<f64>,
+
+    /// Core in the bore of a hollow needle at the end: length and rest length [m], mass [kg], axial strain; and its rest length
+    /// over the length that was cut.
+    pub core_length_m: Option<f64>,
+    pub core_rest_length_m: Option<f64>,
+    pub core_mass_kg: Option<f64>,
+    pub core_strain: Option<f64>,
+    pub core_yield: Option<f64>,
 
     /// Largest |external work - accounted energy| of a frame over the largest external work of the run; not a number
     /// (`null`) if any frame had none.
@@ -140,6 +151,14 @@ impl Summary {
         self.max_depth_m = figures.max_depth;
         self.slope_after_puncture_n_per_m = figures.slope_after_puncture;
         self.linear_fit_r2 = figures.r2;
+        if let Some((last, core)) = records.last().and_then(|r| Some((r, r.core?))) {
+            self.core_length_m = Some(core.length);
+            self.core_rest_length_m = Some(core.rest_length);
+            self.core_mass_kg = Some(core.mass);
+            self.core_strain = Some(core.strain());
+            self.core_yield = (last.tip_coordinate > 0.0).then(|| core.rest_length / last.tip_coordinate);
+        }
+        self.drops = major_drops(records);
 
         let scale = records.iter().map(|r| r.energy.external_max).fold(0.0, f64::max);
         let residual = |r: &FrameRecord| (r.energy.external - r.energy.accounted()).abs();

@@ -6,31 +6,29 @@
 use std::fs::File;
 use std::path::PathBuf;
 
-use super::folder::{ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE};
+use super::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE};
 use super::sample::{DrivenFace, SAMPLE_COLUMNS, SamplePoint};
-use crate::observables::{EnergyAccount, FrameRecord};
+use crate::observables::{EnergyAccount, ForceParts, FrameRecord};
 use crate::{Error, Result};
 
 /// Columns of `force.csv`; the meaning is that of the fields of [`FrameRecord`].
-pub const FORCE_COLUMNS: [&str; 14] = [
-    "time_s",
-    "depth_m",
-    "phase",
-    "axial_force_n",
-    "cutting_force_n",
-    "spreading_force_n",
-    "friction_force_n",
-    "lateral_x_n",
-    "lateral_y_n",
-    "lateral_z_n",
-    "torque_x_nm",
-    "torque_y_nm",
-    "torque_z_nm",
-    "tip_coordinate_m",
-];
+pub fn force_columns() -> Vec<&'static str> {
+    let mut columns = vec!["time_s", "depth_m", "phase", "axial_force_n"];
+    columns.extend(ForceParts::PARTS.map(|part| part.column));
+    columns.extend([
+        "lateral_x_n",
+        "lateral_y_n",
+        "lateral_z_n",
+        "torque_x_nm",
+        "torque_y_nm",
+        "torque_z_nm",
+        "tip_coordinate_m",
+    ]);
+    columns
+}
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 25] = [
+pub const ENERGY_COLUMNS: [&str; 28] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -40,10 +38,13 @@ pub const ENERGY_COLUMNS: [&str; 25] = [
     "damping_j",
     "friction_j",
     "cutting_j",
+    "cohesive_j",
+    "adhesion_j",
     "plastic_j",
     "damage_j",
     "viscous_j",
     "contact_j",
+    "needle_j",
     "imbalance",
     "kinetic_to_internal",
     "hourglass_to_internal",
@@ -57,6 +58,10 @@ pub const ENERGY_COLUMNS: [&str; 25] = [
     "deleted_cells",
     "return_failures",
 ];
+
+/// Columns of `core.csv`.
+pub const CORE_COLUMNS: [&str; 8] =
+    ["time_s", "depth_m", "tip_coordinate_m", "length_m", "rest_length_m", "strain", "mass_kg", "severed"];
 
 /// Kinetic over internal energy, internal = elastic + hourglass; 0 where nothing is stored.
 pub fn kinetic_to_internal(energy: &EnergyAccount) -> f64 {
@@ -80,6 +85,8 @@ fn ratio(part: f64, whole: f64) -> f64 {
 pub struct Tables {
     force: Table,
     energy: Table,
+    /// With a hollow needle.
+    core: Option<Table>,
     /// Where faces are driven.
     sample: Option<(Vec<DrivenFace>, Table)>,
 }
@@ -108,15 +115,18 @@ impl Table {
 }
 
 impl Tables {
-    /// Creates the files with their header rows; that of the sample only where faces are driven.
-    pub fn create(folder: &OutputFolder, driven: &[DrivenFace]) -> Result<Self> {
+    /// Creates the files with their header rows; that of the sample only where faces are driven, that of the core only with a
+    /// hollow needle.
+    pub fn create(folder: &OutputFolder, driven: &[DrivenFace], hollow: bool) -> Result<Self> {
         let sample = match driven {
             [] => None,
             driven => Some((driven.to_vec(), Table::create(folder.file(SAMPLE_TABLE), &SAMPLE_COLUMNS)?)),
         };
+        let core = hollow.then(|| Table::create(folder.file(CORE_TABLE), &CORE_COLUMNS)).transpose()?;
         Ok(Self {
+            core,
             sample,
-            force: Table::create(folder.file(FORCE_TABLE), &FORCE_COLUMNS)?,
+            force: Table::create(folder.file(FORCE_TABLE), &force_columns())?,
             energy: Table::create(folder.file(ENERGY_TABLE), &ENERGY_COLUMNS)?,
         })
     }
@@ -125,6 +135,18 @@ impl Tables {
     pub fn append(&mut self, record: &FrameRecord) -> Result<()> {
         self.force.write_row(&force_row(record))?;
         self.energy.write_row(&energy_row(record))?;
+        if let (Some(table), Some(core)) = (&mut self.core, &record.core) {
+            table.write_row(&[
+                number(record.time),
+                number(record.depth),
+                number(record.tip_coordinate),
+                number(core.length),
+                number(core.rest_length),
+                number(core.strain()),
+                number(core.mass),
+                u8::from(core.severed).to_string(),
+            ])?;
+        }
         if let Some((faces, table)) = &mut self.sample {
             for face in faces {
                 table.write_row(&sample_row(face, &face.point(record)))?;
@@ -134,24 +156,13 @@ impl Tables {
     }
 }
 
-fn force_row(record: &FrameRecord) -> [String; FORCE_COLUMNS.len()] {
+fn force_row(record: &FrameRecord) -> Vec<String> {
     let f = &record.force;
-    [
-        number(record.time),
-        number(record.depth),
-        record.phase.to_string(),
-        number(f.axial),
-        number(f.cutting),
-        number(f.spreading),
-        number(f.friction),
-        number(f.lateral.x),
-        number(f.lateral.y),
-        number(f.lateral.z),
-        number(f.torque.x),
-        number(f.torque.y),
-        number(f.torque.z),
-        number(record.tip_coordinate),
-    ]
+    let mut row = vec![number(record.time), number(record.depth), record.phase.to_string(), number(f.axial)];
+    row.extend(ForceParts::PARTS.iter().map(|part| number((part.of)(f))));
+    row.extend([f.lateral, f.torque].iter().flat_map(|v| v.to_array()).map(number));
+    row.push(number(record.tip_coordinate));
+    row
 }
 
 fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
@@ -167,10 +178,13 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(e.damping),
         number(e.friction),
         number(e.cutting),
+        number(e.cohesive),
+        number(e.adhesion),
         number(e.plastic),
         number(e.damage),
         number(e.viscous),
         number(e.contact),
+        number(e.needle),
         number(e.imbalance()),
         number(kinetic_to_internal(e)),
         number(hourglass_to_internal(e)),

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use crate::mesh::{Mesh, TetMesh};
+use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::observables::FieldSnapshot;
 use crate::scene::{Scene, Tool};
 
@@ -128,6 +128,9 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
     };
     let mut slice = Slice::default();
     for cell in 0..mesh.cell_count() {
+        if mesh.is_gap(cell) {
+            continue;
+        }
         let nodes = mesh.cell_nodes(cell);
         let displacement: Vec<DVec3> =
             nodes.iter().map(|n| snapshot.displacement.get(*n).copied().unwrap_or_default()).collect();
@@ -187,8 +190,14 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
                 let (at, cells) = (block.cell_coordinates(cell), block.cells());
                 for (axis, at_max, triangles) in FACES {
                     let last = at[axis] + 1 == cells[axis];
-                    // A shared face is drawn once, by the cell above it.
-                    if at_max && !last {
+                    // A shared face is drawn once, by the cell above it; that of an open gap by both cells.
+                    let mut above = at;
+                    above[axis] += 1;
+                    let opened_above = at_max && !last && {
+                        let other = block.cell_index(above[0], above[1], above[2]);
+                        block.is_gap(other) && is_open(block, snapshot, other)
+                    };
+                    if at_max && !last && !opened_above {
                         continue;
                     }
                     let kind = if at_max || at[axis] == 0 {
@@ -197,7 +206,10 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
                         let mut below = at;
                         below[axis] -= 1;
                         let other = block.cell_index(below[0], below[1], below[2]);
-                        between(&snapshot.material, cell, other)
+                        match block.is_gap(other) && is_open(block, snapshot, other) {
+                            true => EdgeKind::Surface,
+                            false => between(&snapshot.material, cell, other),
+                        }
                     };
                     triangles.into_iter().for_each(|triangle| edge(triangle, kind));
                 }
@@ -211,6 +223,19 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
         }
     }
     slice
+}
+
+/// True where copies of a node in a gap cell have parted by more than can be seen.
+fn is_open(block: &BlockMesh, snapshot: &FieldSnapshot, gap: usize) -> bool {
+    const VISIBLE: f64 = 5e-6;
+    let nodes = block.cell_nodes(gap);
+    let u = |n: usize| snapshot.displacement.get(n).copied().unwrap_or_default();
+    (0..8).any(|i| {
+        (i + 1..8).any(|j| {
+            let (a, b) = (nodes[i], nodes[j]);
+            block.rest_position(a) == block.rest_position(b) && u(a).distance(u(b)) > VISIBLE
+        })
+    })
 }
 
 /// Corners of the four faces of a tetrahedron.
@@ -275,7 +300,7 @@ mod tests {
 
     fn mesh() -> Mesh {
         let lines = |low: f64, high: f64, n: usize| (0..=n).map(|i| low + (high - low) * i as f64 / n as f64).collect();
-        Mesh::Block(BlockMesh { lines: [lines(-0.01, 0.01, 5), lines(-0.01, 0.01, 4), lines(-0.016, 0.0, 4)] })
+        Mesh::Block(BlockMesh::new([lines(-0.01, 0.01, 5), lines(-0.01, 0.01, 4), lines(-0.016, 0.0, 4)]))
     }
 
     fn plane(up: DVec3) -> Plane {

@@ -27,7 +27,7 @@ pub struct SceneFile {
     /// Node sets of a mesh that are held.
     #[serde(default)]
     pub support: Vec<SupportTable>,
-    /// A rigid solid needle with a conical tip. At most one tool per scene.
+    /// A needle with a conical or bevelled tip, rigid without the effect `flexible_needle`. At most one tool per scene.
     pub needle: Option<NeedleTable>,
     /// A rigid sphere. At most one tool per scene.
     pub sphere: Option<SphereTable>,
@@ -36,7 +36,10 @@ pub struct SceneFile {
     /// Motion of the tool; required with a tool.
     pub motion: Option<MotionTable>,
     pub puncture: Option<PunctureTable>,
+    pub cohesive: Option<CohesiveTable>,
+    pub adhesion: Option<AdhesionTable>,
     pub friction: Option<FrictionTable>,
+    pub flexible_needle: Option<FlexibleNeedleTable>,
     pub indentation: Option<IndentationTable>,
     pub gravity: Option<GravityTable>,
     pub plasticity: Option<PlasticityTable>,
@@ -157,6 +160,18 @@ pub struct RegionTable {
     pub cutting_force_n: Option<f64>,
     /// As in `material`.
     pub cutting_energy_j_m2: Option<f64>,
+    /// A tough layer with a puncture energy of its own, e.g. skin or a capsule; with `layer_mm` only.
+    pub membrane: Option<MembraneTable>,
+}
+
+/// Energy that puncturing a layer takes beyond cutting through it: exactly one key.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MembraneTable {
+    /// The energy itself [mJ].
+    pub puncture_energy_mj: Option<f64>,
+    /// Energy per area of a slit as wide as the needle through the thickness of the layer [J/m^2].
+    pub toughness_j_m2: Option<f64>,
 }
 
 /// Lowest and highest corner.
@@ -308,7 +323,7 @@ pub struct FaceTable {
     pub traction_ramp_s: Option<f64>,
 }
 
-/// A rigid solid needle: cylinder and tip.
+/// A needle: cylinder and tip.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NeedleTable {
@@ -324,8 +339,16 @@ pub struct NeedleTable {
     pub bevel_angle_deg: Option<f64>,
     /// Heading of the apex of a bevel seen from the axis [deg]; for a vertical needle from +x towards +y; default 0.
     pub bevel_heading_deg: Option<f64>,
-    /// Needle material: a name in the library or a table; default "steel-304". The needle is rigid, so the material
-    /// is checked and reported only.
+    /// Diameter of the bore of a hollow needle that takes a core [mm]; needs the effects `puncture` and `cohesive`.
+    pub bore_diameter_mm: Option<f64>,
+    /// Where the cutting edge of a hollow needle lies in its wall: 0 at the bore, 1 at the outer diameter.
+    pub cutting_edge: Option<f64>,
+    /// Friction coefficient of the bore.
+    pub bore_friction: Option<f64>,
+    /// Length from the tip to the hub [mm]; default 100. With the density it gives the mass, whose inertia the hand feels.
+    pub length_mm: Option<f64>,
+    /// Needle material: a name in the library or a table; default "steel-304". It decides how the needle bends with the
+    /// effect `flexible_needle`.
     pub material: Option<NeedleMaterialEntry>,
 }
 
@@ -385,6 +408,20 @@ pub struct MotionTable {
     /// The phases, in order.
     #[serde(default)]
     pub phase: Vec<PhaseTable>,
+    /// Vibration of the hub on top of the phases.
+    pub vibration: Option<VibrationTable>,
+}
+
+/// A sinusoidal motion of the hub, from the start of the run on.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VibrationTable {
+    /// Amplitude [mm].
+    pub amplitude_mm: f64,
+    /// Frequency [Hz].
+    pub frequency_hz: f64,
+    /// Direction of the motion, any length; default: along the insertion.
+    pub direction: Option<[f64; 3]>,
 }
 
 /// One phase of the motion.
@@ -460,6 +497,24 @@ pub struct PunctureTable {
     pub entry_fade_mm: Option<f64>,
     /// "auto" (default): planned before the run for a straight motion, else free; "free": always found while the tip moves.
     pub path: Option<PathWord>,
+    /// Exponent of the speed of the needle in the tip forces, 0 to 1; default 0: no rate.
+    pub rate_exponent: Option<f64>,
+    /// Speed up to which the tip forces are the written ones [mm/s]; default 1.
+    pub reference_speed_mm_s: Option<f64>,
+}
+
+/// Parameters of the effect `adhesion`, which needs `puncture`: a model of the hypothesis that tissue sticks to the tip.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AdhesionTable {
+    /// Force at which the tissue lets go [N]; default 0.25.
+    pub static_force_n: Option<f64>,
+    /// Force at the end of a slip [N]; default 0.05.
+    pub kinetic_force_n: Option<f64>,
+    /// Stiffness of the bond [N/mm]; default 1.
+    pub stiffness_n_mm: Option<f64>,
+    /// Distance slid until it sticks anew [mm]: the spacing of the drops; default 1.
+    pub sliding_distance_mm: Option<f64>,
 }
 
 /// Parameters of the effect `friction`.
@@ -472,6 +527,54 @@ pub struct FrictionTable {
     pub stiffness_ratio: Option<f64>,
     /// Length over which mu grows along the shaft behind the cone [mm].
     pub fade_length_mm: Option<f64>,
+}
+
+/// Parameters of the effect `flexible_needle`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FlexibleNeedleTable {
+    /// Length from hub to tip [mm]; default 100.
+    pub free_length_mm: Option<f64>,
+    /// Number of elements, 4 to 200; default 40.
+    pub elements: Option<u32>,
+    /// Diameter of the bore [mm], 0: solid; default: the gauge's, solid for a needle without gauge.
+    pub inner_diameter_mm: Option<f64>,
+    /// Acceleration of free fall on the needle [m/s^2]; default: that of the effect `gravity` if it is on, else none.
+    pub gravity_m_s2: Option<[f64; 3]>,
+}
+
+/// Parameters of the effect `cohesive`: faces that separate. With a needle that cuts, its path opens on them: on a slit
+/// before a solid needle, on the ring of its cutting edge before a hollow one.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CohesiveTable {
+    /// Strength in opening [kPa].
+    pub strength_kpa: Option<f64>,
+    /// Strength in shear [kPa]; default: that in opening.
+    pub shear_strength_kpa: Option<f64>,
+    /// Fracture energy in opening [J/m^2].
+    pub energy_j_m2: Option<f64>,
+    /// Fracture energy in shear [J/m^2]; default: that in opening.
+    pub shear_energy_j_m2: Option<f64>,
+    /// Exponent of the mode mixity (Benzeggagh and Kenane).
+    pub exponent: Option<f64>,
+    /// Penalty stiffness over E/h; or give `penalty_pa_m`.
+    pub penalty_factor: Option<f64>,
+    /// Penalty stiffness [Pa/m].
+    pub penalty_pa_m: Option<f64>,
+    /// Planes across the whole block that may separate.
+    #[serde(default)]
+    pub plane: Vec<CohesivePlaneTable>,
+}
+
+/// A plane that may separate; the nearest grid line is moved there.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CohesivePlaneTable {
+    /// Axis of its normal: "x", "y" or "z".
+    pub axis: String,
+    /// Coordinate [mm]; z is negative below the top face.
+    pub at_mm: f64,
 }
 
 /// Parameters of the effect `indentation`.
@@ -490,6 +593,13 @@ pub struct IndentationTable {
 pub struct GravityTable {
     /// Acceleration of free fall [m/s^2]; default [0, 0, -9.81].
     pub acceleration_m_s2: Option<[f64; 3]>,
+}
+
+impl GravityTable {
+    /// Nothing weighs anything.
+    pub fn none() -> Self {
+        GravityTable { acceleration_m_s2: Some([0.0; 3]) }
+    }
 }
 
 /// Parameters of the effect `plasticity`.

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use motion::{Motion, Phase};
+pub use motion::{Motion, Phase, Vibration};
 
 use crate::effects::{self, EffectSet};
 use crate::material::ElasticLaw;
@@ -58,6 +58,28 @@ impl Scene {
         convert::load(path, overrides).map_err(Error::Scene)
     }
 
+    /// The needle, if the tool is one.
+    pub fn needle(&self) -> Option<&NeedleShape> {
+        match &self.tool {
+            Some(Tool::Needle(needle)) => Some(needle),
+            _ => None,
+        }
+    }
+
+    /// True where the tissue separates around a hollow needle.
+    pub fn has_bore(&self) -> bool {
+        self.effects.cohesive.is_some() && self.needle().is_some_and(|n| n.bore.is_some())
+    }
+
+    /// Axis of the normal of the plane that a solid needle slits: 0 where the direction has no x, 1 where it has no y.
+    pub fn slit_axis(&self) -> Option<usize> {
+        let solid = self.needle().is_some_and(|n| n.bore.is_none());
+        if self.effects.cohesive.is_none() || !solid || crate::model::has_free_path(self) {
+            return None;
+        }
+        (0..2).find(|a| self.motion.direction[*a].abs() < 1e-9)
+    }
+
     /// JSON schema of the scene file, for editors and for the `schema` command.
     pub fn schema() -> serde_json::Value {
         schemars::schema_for!(file::SceneFile).to_value()
@@ -97,6 +119,8 @@ pub struct TissueMaterial {
     pub damage: Option<effects::damage::Params>,
     /// Tip forces in this material; `None`: those of the scene's puncture table.
     pub cutting: Option<Cutting>,
+    /// A membrane: energy that puncturing this layer takes beyond cutting through it [J].
+    pub membrane_energy: Option<f64>,
 }
 
 impl TissueMaterial {
@@ -112,6 +136,7 @@ impl TissueMaterial {
             viscoelastic: None,
             damage: None,
             cutting: None,
+            membrane_energy: None,
         }
     }
 }
@@ -279,7 +304,7 @@ pub enum Tool {
     },
 }
 
-/// A rigid solid needle: a cylinder with a straight or oblique conical tip.
+/// A needle, solid to the tissue: a cylinder with a straight or oblique conical tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeedleShape {
     /// What the user calls it, e.g. `16G`.
@@ -290,8 +315,28 @@ pub struct NeedleShape {
     pub tip_length: f64,
     /// Shape of the tip.
     pub tip: TipShape,
-    /// Name of the needle material (rigid here; kept for reports).
+    /// What makes it hollow.
+    pub bore: Option<BoreShape>,
+    /// Name of the needle material.
     pub material: String,
+    /// Young's modulus [Pa] and density [kg/m^3] of the material, and diameter of the bore [m] (0: solid): how a flexible
+    /// needle bends.
+    pub youngs_modulus: f64,
+    pub density: f64,
+    pub inner_diameter: f64,
+    /// Length from the tip to the hub [m]; with the density it gives the mass.
+    pub length: f64,
+}
+
+/// The inside of a hollow needle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoreShape {
+    /// Radius of the bore [m].
+    pub radius: f64,
+    /// Radius of the cutting edge, between bore and outer radius [m].
+    pub edge: f64,
+    /// Friction coefficient of the bore (dimensionless).
+    pub friction: f64,
 }
 
 /// Shape of the tip of a needle.
@@ -315,9 +360,25 @@ impl NeedleShape {
         self.radius / self.tip_length
     }
 
-    /// A needle with a conical tip, of steel. Lengths in m.
+    /// Mass of a solid cylinder [kg]; the missing part of the tip does not count.
+    pub fn mass(&self) -> f64 {
+        std::f64::consts::PI * self.radius.powi(2) * self.length * self.density
+    }
+
+    /// A needle with a conical tip, of steel, 100 mm long. Lengths in m.
     pub fn cone(name: &str, radius: f64, tip_length: f64) -> Self {
-        NeedleShape { name: name.into(), radius, tip_length, tip: TipShape::Cone, material: "steel-304".into() }
+        NeedleShape {
+            name: name.into(),
+            radius,
+            tip_length,
+            tip: TipShape::Cone,
+            bore: None,
+            material: "steel-304".into(),
+            youngs_modulus: 193e9,
+            density: 7900.0,
+            inner_diameter: 0.0,
+            length: 0.1,
+        }
     }
 }
 

@@ -10,6 +10,28 @@ pub struct Motion {
     /// Unit vector of the insertion, into the tissue (z < 0).
     pub direction: DVec3,
     pub phases: Vec<Phase>,
+    /// What the hub does beside the phases.
+    pub vibration: Option<Vibration>,
+}
+
+/// A sinusoidal motion of the hub from t = 0 on: `amplitude sin(2 pi frequency t)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vibration {
+    /// Amplitude [m].
+    pub amplitude: f64,
+    /// Frequency [Hz].
+    pub frequency: f64,
+    /// Unit vector of the motion.
+    pub direction: DVec3,
+}
+
+impl Vibration {
+    /// Offset [m] and its exact derivative [m/s] at `time` [s].
+    pub fn at(&self, time: f64) -> (DVec3, DVec3) {
+        let rate = std::f64::consts::TAU * self.frequency;
+        let (sine, cosine) = (rate * time).sin_cos();
+        (self.direction * (self.amplitude * sine), self.direction * (self.amplitude * rate * cosine))
+    }
 }
 
 /// One phase of the motion. Depth is measured along the needle from the point where its axis meets the top face at rest
@@ -197,10 +219,15 @@ impl Motion {
         self.entry + self.direction * self.deepest()
     }
 
-    /// Box of the part of the needle's axis that comes to lie in the tissue [m].
-    pub fn reach(&self) -> (DVec3, DVec3) {
+    /// The same, not below the bottom of a block of height `height` [m].
+    pub fn deepest_point_in(&self, height: f64) -> DVec3 {
+        self.entry + self.direction * self.deepest().min(height / -self.direction.z)
+    }
+
+    /// Box of the part of the needle's axis that comes to lie in the tissue, a block of height `height` [m].
+    pub fn reach(&self, height: f64) -> (DVec3, DVec3) {
         if !self.is_free() {
-            let end = self.deepest_point();
+            let end = self.deepest_point_in(height);
             return (self.entry.min(end), self.entry.max(end));
         }
         let inside = |p: &Placement| {
@@ -214,14 +241,16 @@ impl Motion {
 
     /// Largest speed of all phases, of the tip or of the point at the surface [m/s].
     pub fn largest_speed(&self) -> f64 {
+        let shaking = self.vibration.map_or(0.0, |v| v.at(0.0).1.length());
         if self.is_free() {
             let speed = |p: &Placement| p.velocity.length().max(p.turning.length() * p.depth.abs());
-            return self.samples(1e-3).iter().map(speed).fold(0.0, f64::max);
+            return shaking + self.samples(1e-3).iter().map(speed).fold(0.0, f64::max);
         }
-        self.phases.iter().fold(0.0, |largest, phase| match *phase {
+        let phases = self.phases.iter().fold(0.0, |largest, phase| match *phase {
             Phase::Insert { speed, .. } | Phase::Withdraw { speed, .. } => speed.max(largest),
             _ => largest,
-        })
+        });
+        shaking + phases
     }
 }
 
@@ -242,6 +271,7 @@ mod tests {
                 Phase::Move { to: DVec3::new(3e-3, 1e-3, -8e-3), speed: 1e-3, direction: DVec3::NEG_Z },
                 Phase::Withdraw { speed: 2e-3, depth: -1e-3 },
             ],
+            vibration: None,
         };
         let legs = motion.legs();
         for pair in legs.windows(2) {

@@ -57,12 +57,14 @@ pub struct NeedlePreset {
     pub gauge: String,
     /// Outer diameter [m].
     pub outer_diameter: f64,
+    /// Bore of the regular wall [m].
+    pub inner_diameter: f64,
     pub source: String,
     /// Tolerance of the maker.
     pub range: String,
 }
 
-/// A needle material; the needle is rigid, the values are for reports and plausibility.
+/// A needle material; it decides how a flexible needle bends.
 #[derive(Debug, Clone)]
 pub struct NeedleMaterial {
     pub name: String,
@@ -136,6 +138,7 @@ fn read_needles() -> (Vec<NeedlePreset>, Vec<NeedleMaterial>) {
     struct Gauge {
         gauge: String,
         outer_diameter_mm: f64,
+        inner_diameter_mm: f64,
         source: String,
         range: String,
     }
@@ -154,6 +157,7 @@ fn read_needles() -> (Vec<NeedlePreset>, Vec<NeedleMaterial>) {
     let needles = library.needle.into_iter().map(|entry| NeedlePreset {
         gauge: entry.gauge,
         outer_diameter: entry.outer_diameter_mm * 1e-3,
+        inner_diameter: entry.inner_diameter_mm * 1e-3,
         source: entry.source,
         range: entry.range,
     });
@@ -197,6 +201,11 @@ mod tests {
     fn gauges_are_sorted_and_needles_plausible() {
         assert_eq!(needles().len(), 12);
         assert!(needles().windows(2).all(|w| w[0].outer_diameter > w[1].outer_diameter));
+        assert!(
+            needles()
+                .iter()
+                .all(|n| n.inner_diameter > 0.4 * n.outer_diameter && n.inner_diameter < 0.8 * n.outer_diameter)
+        );
         assert!(needle("16G").is_some() && needle_material("steel-304").is_some());
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::material::kinematics::{cofactor, jacobian_minus_one};
 use crate::material_point::{Material, PointState, Surroundings, Volumetric};
 use crate::mesh::tets::TetMesh;
-use crate::mesh::{CellNodes, Mesh};
+use crate::mesh::{BlockMesh, CellNodes, Mesh};
 use crate::model::Model;
 
 /// Hourglass coefficient of a linear elastic cube, [Joldes2008] via physics of the one-point hexahedron.
@@ -37,8 +37,94 @@ pub struct CellShape {
     pub volume: f64,
     /// Gradients `B_i` [1/m], one per node: `H = sum_i u_i (x) B_i`.
     gradients: [DVec3; 8],
-    /// Edge lengths of a hexahedron [m]; `None` for a tetrahedron.
-    size: Option<DVec3>,
+    /// What only a hexahedron has.
+    hexahedron: Option<Hexahedron>,
+}
+
+/// The base of a column of cells: what the shaders know of it.
+#[derive(Debug, Clone, Copy)]
+pub struct PrismBase {
+    /// An eighth of the gradients of xi and eta at the centre [1/m]; zero for a gap.
+    pub gradients: [DVec3; 2],
+    /// [m]
+    pub taper: DVec3,
+    /// [m^2]
+    pub area: f64,
+}
+
+impl PrismBase {
+    /// The base of the column that `cell` stands in.
+    pub fn new(block: &BlockMesh, cell: usize) -> Self {
+        let hexahedron = Hexahedron::new(block, cell);
+        let [xi, eta, _] = hexahedron.modes;
+        let cross = 4.0 * hexahedron.edges[0].truncate().perp_dot(hexahedron.edges[1].truncate());
+        // A rounded zero would have a cube root that is none.
+        let area = if block.is_gap(cell) { 0.0 } else { cross };
+        PrismBase { gradients: [xi, eta], taper: hexahedron.taper, area }
+    }
+}
+
+/// A prism between two planes z = const, bilinear in the plane: `X = centre + xi E_xi + eta E_eta + xi eta taper + zeta E_zeta`.
+#[derive(Debug, Clone, Copy)]
+struct Hexahedron {
+    /// Half edges through the centre, E_xi, E_eta, E_zeta [m].
+    edges: [DVec3; 3],
+    /// [m]; zero for a box.
+    taper: DVec3,
+    /// An eighth of the gradients of xi, eta and zeta at the centre [1/m]; zero for a gap cell, which carries nothing.
+    modes: [DVec3; 3],
+}
+
+impl Hexahedron {
+    fn new(block: &BlockMesh, cell: usize) -> Self {
+        let (edges, taper) = match block.bore {
+            None => {
+                let half = 0.5 * block.cell_size(cell);
+                ([DVec3::X * half.x, DVec3::Y * half.y, DVec3::Z * half.z], DVec3::ZERO)
+            }
+            Some(_) => {
+                let corners = block.cell_nodes(cell).map(|n| block.rest_position(n));
+                let sum = |sign: fn([f64; 3]) -> f64| {
+                    CORNERS.iter().zip(corners).map(|(c, x)| x * sign(*c)).sum::<DVec3>() / 8.0
+                };
+                ([sum(|c| c[0]), sum(|c| c[1]), sum(|c| c[2])], sum(|c| c[0] * c[1]))
+            }
+        };
+        let modes = match block.is_gap(cell) {
+            true => [DVec3::ZERO; 3],
+            false => {
+                let inverse = DMat3::from_cols(edges[0], edges[1], edges[2]).inverse().transpose();
+                [inverse.x_axis / 8.0, inverse.y_axis / 8.0, inverse.z_axis / 8.0]
+            }
+        };
+        Hexahedron { edges, taper, modes }
+    }
+
+    /// Largest |sum of +- a_m|^2 over the corners of three vectors.
+    fn largest_corner(a: [DVec3; 3]) -> f64 {
+        let squares: f64 = a.iter().map(|a| a.length_squared()).sum();
+        squares + 2.0 * (a[0].dot(a[1]).abs() + a[1].dot(a[2]).abs() + a[2].dot(a[0]).abs())
+    }
+
+    /// Smallest J at a corner, from its three edges.
+    fn smallest_corner_jacobian(&self, u: &[DVec3; 8]) -> f64 {
+        // Edges that meet in a corner, along xi, eta, zeta: node order of `cell_nodes`.
+        const NEIGHBOURS: [[usize; 3]; 8] =
+            [[1, 3, 4], [0, 2, 5], [3, 1, 6], [2, 0, 7], [5, 7, 0], [4, 6, 1], [7, 5, 2], [6, 4, 3]];
+        (0..8)
+            .map(|i| {
+                let c = CORNERS[i];
+                let rest = [
+                    (self.edges[0] + self.taper * c[1]) * 2.0,
+                    (self.edges[1] + self.taper * c[0]) * 2.0,
+                    self.edges[2] * 2.0,
+                ];
+                let now = |a: usize| rest[a] - (u[NEIGHBOURS[i][a]] - u[i]) * c[a];
+                DMat3::from_cols(now(0), now(1), now(2)).determinant()
+                    / DMat3::from_cols(rest[0], rest[1], rest[2]).determinant()
+            })
+            .fold(f64::INFINITY, f64::min)
+    }
 }
 
 impl CellShape {
@@ -46,12 +132,13 @@ impl CellShape {
         let nodes = mesh.cell_nodes(cell);
         match mesh {
             Mesh::Block(block) => {
-                let size = block.cell_size(cell);
+                let hexahedron = Hexahedron::new(block, cell);
+                let [x, y, z] = hexahedron.modes;
                 CellShape {
                     nodes,
-                    volume: size.x * size.y * size.z,
-                    gradients: CORNERS.map(|c| DVec3::from(c) / (4.0 * size)),
-                    size: Some(size),
+                    volume: mesh.cell_volume(cell),
+                    gradients: CORNERS.map(|c| x * c[0] + y * c[1] + z * c[2]),
+                    hexahedron: Some(hexahedron),
                 }
             }
             Mesh::Tets(tets) => {
@@ -61,7 +148,7 @@ impl CellShape {
                     nodes,
                     volume: tets.volume(cell),
                     gradients: [a, b, c, d, none, none, none, none],
-                    size: None,
+                    hexahedron: None,
                 }
             }
         }
@@ -94,17 +181,32 @@ impl CellShape {
         h
     }
 
-    /// `q_m = sum_i Gamma_mi u_i / 8`; zero for a tetrahedron, which has no hourglass modes.
+    /// Hourglass vectors `gamma_mi/8` of a node: the four base vectors less what a linear field has of them,
+    /// `gamma_xy = Gamma_xy - 8 taper.B` in a tapered prism [Flanagan1981]; zero in a gap.
+    fn hourglass_vector(&self, corner: usize) -> [f64; 4] {
+        let Some(hexahedron) = self.hexahedron else { return [0.0; 4] };
+        if self.volume == 0.0 {
+            return [0.0; 4];
+        }
+        let mut gamma = hourglass_signs(CORNERS[corner]).map(|g| g / 8.0);
+        gamma[2] -= hexahedron.taper.dot(self.gradients[corner]);
+        gamma
+    }
+
+    /// `q_m = sum_i gamma_mi u_i / 8`; zero for a tetrahedron, which has no hourglass modes.
     fn hourglass_modes(&self, u: &[DVec3; 8]) -> [DVec3; 4] {
         let mut q = [DVec3::ZERO; 4];
-        if self.size.is_some() {
-            for (u, signs) in u.iter().zip(CORNERS) {
-                for (q, gamma) in q.iter_mut().zip(hourglass_signs(signs)) {
-                    *q += *u * (gamma / 8.0);
-                }
+        for (corner, u) in u.iter().enumerate().take(self.nodes.len()) {
+            for (q, gamma) in q.iter_mut().zip(self.hourglass_vector(corner)) {
+                *q += *u * gamma;
             }
         }
         q
+    }
+
+    /// V^(1/3) for ratios, 1 where there is no volume [m].
+    fn scale(&self) -> f64 {
+        if self.volume > 0.0 { self.edge() } else { 1.0 }
     }
 }
 
@@ -212,7 +314,7 @@ impl Elements {
         let shape = CellShape::new(&model.mesh, cell);
         let bulk = model.material(cell).law.bulk_modulus;
         let volume = shape.volume;
-        let Some(size) = shape.size else {
+        let Some(hexahedron) = shape.hexahedron else {
             let mut bound = [0.0; 8];
             let lengths = shape.gradients().iter().map(|b| ((cof * *b).length(), b.length()));
             let (sum_cof, sum) = lengths.clone().fold((0.0, 0.0), |s, l| (s.0 + l.0, s.1 + l.1));
@@ -221,15 +323,13 @@ impl Elements {
             }
             return bound;
         };
-        let inv = 0.25 / size;
-        let [a, b, c] = [cof.x_axis * inv.x, cof.y_axis * inv.y, cof.z_axis * inv.z];
-        let cof_b = a.length_squared()
-            + b.length_squared()
-            + c.length_squared()
-            + 2.0 * (a.dot(b).abs() + b.dot(c).abs() + c.dot(a).abs());
+        let modes = hexahedron.modes;
+        let cof_b = Hexahedron::largest_corner(modes.map(|b| cof * b));
+        let b = Hexahedron::largest_corner(modes);
         let edge = shape.edge();
-        let hourglass = self.hourglass(model, cell) * edge * (1.0 + 3.0 * self.quartic * q2 / (edge * edge)) / 8.0;
-        [8.0 * volume * (bulk * cof_b + tangent * inv.length_squared()) + hourglass; 8]
+        let folding = q2 / (shape.scale() * shape.scale());
+        let hourglass = self.hourglass(model, cell) * edge * (1.0 + 3.0 * self.quartic * folding) / 8.0;
+        [8.0 * volume * (bulk * cof_b + tangent * b) + hourglass; 8]
     }
 
     fn hourglass(&self, model: &Model, cell: usize) -> f64 {
@@ -237,8 +337,9 @@ impl Elements {
     }
 
     /// E_h of an intact cell [J].
-    fn hourglass_energy(&self, model: &Model, cell: usize, edge: f64, q2: f64) -> f64 {
-        0.5 * self.hourglass(model, cell) * edge * q2 * (1.0 + 0.5 * self.quartic * q2 / (edge * edge))
+    fn hourglass_energy(&self, model: &Model, cell: usize, shape: &CellShape, q2: f64) -> f64 {
+        let folding = q2 / (shape.scale() * shape.scale());
+        0.5 * self.hourglass(model, cell) * shape.edge() * q2 * (1.0 + 0.5 * self.quartic * folding)
     }
 
     /// Volumetric answers of tetrahedra by averaged nodal pressure; `None` for hexahedra, which have their own.
@@ -297,7 +398,7 @@ impl Elements {
                 dt,
                 step,
                 remaining,
-                other_energy: self.hourglass_energy(model, cell, edge, q2) / shape.volume,
+                other_energy: self.hourglass_energy(model, cell, &shape, q2) / shape.volume.max(f64::MIN_POSITIVE),
             };
             let energy = averaged.unwrap_or_else(|| material.volumetric(h, 1.0)).energy;
             met = material.advance(h, energy, &around, state);
@@ -305,14 +406,13 @@ impl Elements {
         let intact = remaining * (1.0 - material.degradation(state, edge));
         let volumetric = averaged.unwrap_or_else(|| material.volumetric(h, intact));
         let p = material.stress(h, volumetric, intact, state);
-        let kh = intact * self.hourglass(model, cell) * edge * (1.0 + self.quartic * q2 / (edge * edge));
+        let folding = q2 / (shape.scale() * shape.scale());
+        let kh = intact * self.hourglass(model, cell) * edge * (1.0 + self.quartic * folding);
         let mut out = CellForces::default();
         for (i, b) in shape.gradients().iter().enumerate() {
             out.force[i] = p * *b * shape.volume;
-            if shape.size.is_some() {
-                for (q, gamma) in q.iter().zip(hourglass_signs(CORNERS[i])) {
-                    out.force[i] += *q * (kh * gamma / 8.0);
-                }
+            for (q, gamma) in q.iter().zip(shape.hourglass_vector(i)) {
+                out.force[i] += *q * (kh * gamma);
             }
         }
         let f = DMat3::IDENTITY + h;
@@ -358,11 +458,14 @@ impl Elements {
         let jacobian = 1.0 + jacobian_minus_one(h);
         CellMeasure {
             elastic: shape.volume * energy.stored,
-            hourglass: intact * self.hourglass_energy(model, cell, edge, q2),
+            hourglass: intact * self.hourglass_energy(model, cell, &shape, q2),
             viscous: shape.volume * (point.viscous_work - energy.viscous_stored),
             held: shape.volume * energy.viscous_stored,
             jacobian,
-            corner_jacobian: shape.size.map_or(jacobian, |size| smallest_corner_jacobian(u, size)),
+            corner_jacobian: match shape.hexahedron {
+                Some(hexahedron) if shape.volume > 0.0 => hexahedron.smallest_corner_jacobian(u),
+                _ => jacobian,
+            },
             damage,
         }
     }
@@ -438,22 +541,4 @@ pub fn cells_of_nodes(mesh: &TetMesh) -> (Vec<usize>, Vec<u32>) {
         }
     }
     (offsets, cells)
-}
-
-/// Smallest J at a corner of a hexahedron, from its three edges.
-fn smallest_corner_jacobian(u: &[DVec3; 8], size: DVec3) -> f64 {
-    // Edges that meet in a corner, each along its axis: node order of `cell_nodes`.
-    const NEIGHBOURS: [[usize; 3]; 8] =
-        [[1, 3, 4], [0, 2, 5], [3, 1, 6], [2, 0, 7], [5, 7, 0], [4, 6, 1], [7, 5, 2], [6, 4, 3]];
-    (0..8)
-        .map(|i| {
-            let column = |a: usize| {
-                let du = u[NEIGHBOURS[i][a]] - u[i];
-                let mut unit = DVec3::ZERO;
-                unit[a] = 1.0;
-                unit - du * (CORNERS[i][a] / size[a])
-            };
-            DMat3::from_cols(column(0), column(1), column(2)).determinant()
-        })
-        .fold(f64::INFINITY, f64::min)
 }

@@ -2,10 +2,12 @@
 
 use glam::DVec3;
 
+use crate::effects::adhesion::Bond;
 use crate::error::Result;
 use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::ToolPose;
+use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
 use crate::needle::free_path::FreeTip;
 use crate::scene::Face;
 
@@ -41,6 +43,8 @@ pub struct FramePlan {
     pub first_step: u64,
     /// One entry per step.
     pub steps: Vec<StepInput>,
+    /// How the needle is bent during the frame; `None`: straight.
+    pub centre_line: Option<CentreLine>,
 }
 
 impl StepInput {
@@ -75,28 +79,44 @@ impl StepInput {
 pub struct FrameSums {
     pub frame: u64,
     pub steps: u32,
-    /// Impulse on the tissue [N s]: tip springs, contact normals, friction, each along the insertion direction.
+    /// Impulse on the tissue [N s] along the insertion direction: tip law in the bulk and in membranes, tissue that sticks to the
+    /// tip, contact normals, friction.
     pub cutting_impulse: f64,
+    pub membrane_impulse: f64,
+    pub adhesion_impulse: f64,
     pub spreading_impulse: f64,
+    /// The part of `spreading_impulse` that acts on the shaft of a needle.
+    pub shaft_impulse: f64,
     pub friction_impulse: f64,
     /// Whole impulse [N s] and angular impulse about the tip [N m s], world frame.
     pub impulse: DVec3,
     pub angular_impulse: DVec3,
-    /// Work done by the tool [J].
+    /// Work done by the tool [J]; with a flexible needle that of its hub, once the run has booked the beam.
     pub tool_work: f64,
+    /// Impulse on the tissue, shared over the entries of the centre-line [N s]; zero without a flexible needle.
+    pub needle_loads: [DVec3; ENTRY_COUNT],
+    /// Total: gained and damped by a flexible needle [J].
+    pub needle_energy: f64,
     /// Dissipated by friction, by contact damping, by the tip law, by softening [J].
     pub friction_dissipation: f64,
     pub contact_dissipation: f64,
     pub tip_dissipation: f64,
     pub softening_dissipation: f64,
+    /// Dissipated by tissue that slips on the tip [J].
+    pub adhesion_dissipation: f64,
     /// Dissipated by plastic flow and by damage [J].
     pub plastic_dissipation: f64,
     pub damage_dissipation: f64,
     /// Total: dissipated by the Prony terms [J].
     pub viscous_dissipation: f64,
+    /// Dissipated by cohesive faces [J]; total: stored in them [J].
+    pub cohesive_dissipation: f64,
+    pub cohesive_energy: f64,
+    /// Total: torn area, damage times area over all pairs [m^2].
+    pub torn_area: f64,
     /// What each face exerts on the tissue at the last step [N]; zero without driven faces.
     pub reactions: [DVec3; 6],
-    /// Total: stored in contact, stick and tip springs [J].
+    /// Total: stored in contact, stick, tip and bond springs [J].
     pub contact_energy: f64,
     /// Total: material coordinate a of the tip [m].
     pub tip_coordinate: f64,
@@ -139,9 +159,13 @@ pub struct State {
     pub tip: FreeTip,
     /// Marked sample points per cell of the box of a free path, bit = x + 4 y + 16 z; empty on a planned one.
     pub cut_samples: Vec<u64>,
+    /// Tissue that sticks to the tip.
+    pub bond: Bond,
     /// Memory per contact node: stretch of the stick spring [m], overlap at activation [m], axial position at
     /// activation [m]; `touching` tells whether the last two are set.
     pub contact: Vec<ContactState>,
+    /// Damage D of every pair of copies that may separate.
+    pub pairs: Vec<f64>,
     /// History per cell; empty without `plasticity` and `viscoelastic`.
     pub points: Vec<PointState>,
 }
@@ -153,6 +177,8 @@ pub struct ContactState {
     pub overlap: f64,
     pub axial_on: f64,
     pub touching: bool,
+    /// True while it is pressed by the full shaft.
+    pub on_shaft: bool,
     /// On a free path: distance r0 from the axis where the tip passed [m], and whether it has.
     pub rest_radius: f64,
     pub passed: bool,

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::cpu::CpuEngine;
 use super::elements::{CellShape, CellStates, Elements};
-use super::engine::{Engine, FramePlan, State, StepInput};
+use super::engine::{Engine, FramePlan, FrameSums, State, StepInput};
 use super::stable_dt::{power_iteration, wave_speed_bound};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuEngine};
@@ -16,7 +16,8 @@ use crate::material::{Verdict, von_mises};
 use crate::material_point::PointState;
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
-use crate::observables::{FieldSnapshot, FrameRecord, Recorder};
+use crate::needle::flexible::FlexibleNeedle;
+use crate::observables::{CoreSample, FieldSnapshot, FrameRecord, NeedleRecord, Recorder};
 use crate::scene::Scene;
 
 /// Which engine the user wants.
@@ -27,6 +28,17 @@ pub enum EngineChoice {
     Auto,
     Gpu,
     Cpu,
+}
+
+impl EngineChoice {
+    /// As the command line has it.
+    pub fn key(self) -> &'static str {
+        match self {
+            EngineChoice::Auto => "auto",
+            EngineChoice::Gpu => "gpu",
+            EngineChoice::Cpu => "cpu",
+        }
+    }
 }
 
 impl FromStr for EngineChoice {
@@ -74,6 +86,11 @@ pub struct Simulation {
     /// Frames after which the state is read, so that no later frame may have been started.
     stops: BTreeSet<u64>,
     watch_stretch: bool,
+    /// The beam of a flexible needle; every frame waits for the one before.
+    needle: Option<FlexibleNeedle>,
+    /// Frames in which the beam did not find its balance.
+    unbalanced_frames: u64,
+    buckling_told: bool,
     /// Things the user should know, one sentence each.
     pub notices: Vec<String>,
 }
@@ -176,6 +193,10 @@ impl Simulation {
             return_failures: 0,
             stops: BTreeSet::new(),
             watch_stretch,
+            // The first frame is a single step.
+            needle: FlexibleNeedle::new(&model, dt),
+            unbalanced_frames: 0,
+            buckling_told: false,
             notices,
             model,
         })
@@ -223,15 +244,23 @@ impl Simulation {
     fn plan(&self, frame: u64) -> FramePlan {
         let first_step = self.first_step(frame);
         let last = self.first_step(frame + 1).min(self.total_steps.max(1));
-        FramePlan {
+        let mut plan = FramePlan {
             frame,
             first_step,
             steps: (first_step..last).map(|s| StepInput::at(&self.model, s as f64 * self.dt, self.dt)).collect(),
+            centre_line: None,
+        };
+        if let Some(needle) = &self.needle {
+            needle.bend(&mut plan, self.dt);
         }
+        plan
     }
 
     fn may_start(&self, frame: u64) -> bool {
-        let waits = self.watch_stretch || self.stops.range(self.collected..frame).next().is_some();
+        let waits = self.watch_stretch
+            || self.needle.is_some()
+            || self.model.has_bore()
+            || self.stops.range(self.collected..frame).next().is_some();
         frame < self.frames && frame - self.collected <= AHEAD && (!waits || frame == self.collected)
     }
 
@@ -247,11 +276,14 @@ impl Simulation {
         if self.collected == self.started {
             return Ok(None);
         }
-        let Some(sums) = self.engine.collect(true)? else {
+        let Some(mut sums) = self.engine.collect(true)? else {
             return Err(Error::Device("the engine lost a frame".into()));
         };
         self.collected += 1;
-        let record = self.recorder.record(&self.model, self.dt, &sums);
+        let bent = self.answer_of_the_needle(&mut sums);
+        let mut record = self.recorder.record(&self.model, self.dt, &sums);
+        record.needle = bent;
+        self.tell_of_the_needle(&record);
         if record.health.not_finite {
             return Err(self.diverged(&record));
         }
@@ -265,10 +297,53 @@ impl Simulation {
         if too_many_return_failures(self.return_failures, cell_steps) {
             return Err(self.flow_lost(&record, self.return_failures as f64 / cell_steps));
         }
+        if self.model.has_bore() {
+            let state = self.engine.read_state()?;
+            let pose = self.model.kinematics.as_ref().map(|k| k.pose(record.time));
+            record.core = pose.and_then(|pose| CoreSample::of(&self.model, &state, &pose));
+        }
         if self.watch_stretch {
             self.check_stretch(&record)?;
         }
         Ok(Some(record))
+    }
+
+    /// The beam's answer to the loads of the frame that was collected last.
+    fn answer_of_the_needle(&mut self, sums: &mut FrameSums) -> NeedleRecord {
+        let (dt, last) = (self.dt, self.total_steps.max(1));
+        let end = |frame: u64| self.first_step(frame + 1).min(last) as f64 * dt;
+        let next = (self.collected < self.frames)
+            .then(|| (end(self.collected), end(self.collected) - self.first_step(self.collected) as f64 * dt));
+        let broken = sums.not_finite || !sums.needle_loads.iter().all(|l| l.is_finite());
+        match &mut self.needle {
+            // Loads of a broken state mean nothing; the run stops right after.
+            Some(needle) if !broken => needle.answer(sums, f64::from(sums.steps) * dt, next),
+            _ => NeedleRecord::default(),
+        }
+    }
+
+    /// Notices about a needle that has buckled or whose beam was not in balance.
+    fn tell_of_the_needle(&mut self, record: &FrameRecord) {
+        let bent = &record.needle;
+        if bent.buckled && !self.buckling_told {
+            self.buckling_told = true;
+            self.notices.push(format!(
+                "the needle buckles at a depth of {:.2} mm: {:.3} N of compression, {:.2} mm from its axis, its tip {:.2} mm                  behind; take a thicker or stiffer needle or a shorter flexible_needle.free_length_mm",
+                record.depth * 1e3,
+                bent.compression,
+                bent.largest_offset * 1e3,
+                bent.retreat * 1e3
+            ));
+        }
+        if bent.unbalanced {
+            self.unbalanced_frames += 1;
+            if self.unbalanced_frames == 1 {
+                self.notices.push(format!(
+                    "the flexible needle did not find its balance at {:.4} s; its shape there is the best one found",
+                    record.time
+                ));
+            }
+        }
     }
 
     /// Where and how the state broke.

@@ -24,7 +24,21 @@ pub fn wave_speed_bound(model: &Model) -> f64 {
             bound[*node] += k;
         }
     }
-    let steps = bound.iter().zip(&model.node_mass).map(|(k, m)| 2.0 * (m / k).sqrt());
+    let mut mass = model.node_mass.clone();
+    for tie in &model.separation.ties {
+        let sum = |values: &[f64]| tie.iter().map(|n| values[*n as usize]).sum::<f64>();
+        let (k, m) = (sum(&bound), sum(&mass));
+        tie.iter().for_each(|n| (bound[*n as usize], mass[*n as usize]) = (k, m));
+    }
+    // A pair adds its stiffness once on the diagonal and once beside it.
+    if let Some(law) = model.cohesion {
+        for pair in &model.separation.pairs {
+            for node in pair.nodes {
+                bound[node as usize] += 2.0 * law.penalty * pair.area;
+            }
+        }
+    }
+    let steps = bound.iter().zip(&mass).map(|(k, m)| 2.0 * (m / k).sqrt());
     steps.fold(f64::INFINITY, f64::min)
 }
 

@@ -19,6 +19,8 @@ pub enum Stage {
     TetrahedronForces,
     /// Stress, hourglass force and stiffness bound of every hexahedron, as forces on its corners.
     ElementForces,
+    /// Traction and damage of faces that separate.
+    CohesiveForces,
     /// Contact of cone and shaft with the opened path, friction, and tip springs on the nodes.
     NeedleContact,
     /// Contact of a sphere or flat punch with the top face.
@@ -33,11 +35,13 @@ pub enum Stage {
     MeasureContact,
     /// Reactions of the six faces (once per frame).
     MeasureFaces,
+    /// Energies and torn area of faces that separate (once per frame).
+    MeasureSeparation,
 }
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 15] = [
+    pub const ALL: [Stage; 17] = [
         Stage::AdvanceTip,
         Stage::SoftenPath,
         Stage::AdvanceFreeTip,
@@ -46,6 +50,7 @@ impl Stage {
         Stage::AveragePressure,
         Stage::TetrahedronForces,
         Stage::ElementForces,
+        Stage::CohesiveForces,
         Stage::NeedleContact,
         Stage::IndenterContact,
         Stage::IntegrateNodes,
@@ -53,6 +58,7 @@ impl Stage {
         Stage::MeasureNodes,
         Stage::MeasureContact,
         Stage::MeasureFaces,
+        Stage::MeasureSeparation,
     ];
 
     /// File stem and label.
@@ -66,6 +72,7 @@ impl Stage {
             Stage::AveragePressure => "average_pressure",
             Stage::TetrahedronForces => "tetrahedron_forces",
             Stage::ElementForces => "element_forces",
+            Stage::CohesiveForces => "cohesive_forces",
             Stage::NeedleContact => "needle_contact",
             Stage::IndenterContact => "indenter_contact",
             Stage::IntegrateNodes => "integrate_nodes",
@@ -73,6 +80,7 @@ impl Stage {
             Stage::MeasureNodes => "measure_nodes",
             Stage::MeasureContact => "measure_contact",
             Stage::MeasureFaces => "measure_faces",
+            Stage::MeasureSeparation => "measure_separation",
         }
     }
 
@@ -89,6 +97,13 @@ impl Stage {
 
     /// True for the stages that run once per frame, after its last step.
     pub fn once_per_frame(self) -> bool {
-        matches!(self, Stage::MeasureCells | Stage::MeasureNodes | Stage::MeasureContact | Stage::MeasureFaces)
+        matches!(
+            self,
+            Stage::MeasureCells
+                | Stage::MeasureNodes
+                | Stage::MeasureContact
+                | Stage::MeasureFaces
+                | Stage::MeasureSeparation
+        )
     }
 }

@@ -37,10 +37,11 @@ const SUMMARY_KEYS: [&str; 31] = [
     "status",
 ];
 
-const RESULTS: [&str; 8] = [
+const RESULTS: [&str; 9] = [
     "energy.csv",
     "force.csv",
     "force.svg",
+    "force_parts.svg",
     "frames.pvd",
     "frames/frame_*.vtu",
     "stress_02.00mm.png",

@@ -98,7 +98,7 @@ pub fn block(size_mm: [f64; 3], cell_mm: f64) -> Scene {
 /// Gives a scene a tool that enters at the middle of the top face.
 pub fn with_tool(scene: &mut Scene, tool: Tool, direction: DVec3, phases: Vec<Phase>) {
     scene.tool = Some(tool);
-    scene.motion = Motion { entry: DVec3::ZERO, direction: direction.normalize(), phases };
+    scene.motion = Motion { entry: DVec3::ZERO, direction: direction.normalize(), phases, vibration: None };
 }
 
 /// A face whose listed components are held.
@@ -127,7 +127,7 @@ pub fn graded_mesh(cells: [usize; 3]) -> BlockMesh {
         lines.iter_mut().for_each(|l| *l -= shift);
         lines
     };
-    BlockMesh { lines: [lines(0), lines(1), lines(2)] }
+    BlockMesh::new([lines(0), lines(1), lines(2)])
 }
 
 /// Advances an engine by `steps` steps in one frame; `step` counts the steps since t = 0.
@@ -136,6 +136,7 @@ pub fn advance(engine: &mut dyn Engine, model: &Model, dt: f64, step: &mut u64, 
         frame: *step,
         first_step: *step,
         steps: (0..steps as u64).map(|s| StepInput::at(model, (*step + s) as f64 * dt, dt)).collect(),
+        centre_line: None,
     };
     *step += steps as u64;
     engine.start_frame(&plan).unwrap();

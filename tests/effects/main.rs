@@ -3,9 +3,12 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod adhesion;
+mod cohesive;
 mod damage;
 mod element;
 mod fibres;
+mod flexible_needle;
 mod friction;
 mod gravity;
 mod indentation;

@@ -6,7 +6,7 @@ use glam::DVec3;
 use stylet::effects::{mass_scaling, puncture};
 use stylet::material::ElasticLaw;
 use stylet::model::Model;
-use stylet::scene::{NeedleShape, Phase, Tool};
+use stylet::scene::{Cutting, NeedleShape, Phase, Region, RegionShape, Scene, Tool};
 use stylet::solver::engine::{Engine, FrameSums, State};
 use stylet::solver::stable_dt::wave_speed_bound;
 
@@ -17,6 +17,11 @@ const STEPS: usize = 5;
 
 /// The muscle of the scenes (E 60 kPa, nu 0.45) and a 2 mm needle, cells of 0.9 mm.
 fn insertion(depth: f64) -> Arc<Model> {
+    insertion_with(depth, |_| ())
+}
+
+/// The same with something changed.
+fn insertion_with(depth: f64, change: impl Fn(&mut Scene)) -> Arc<Model> {
     let mut scene = block([16.0, 16.0, 10.0], 0.9);
     scene.material.law = ElasticLaw::from_moduli(20_690.0, 200_000.0, 0.7);
     scene.faces[4] = held(true, true, true);
@@ -36,6 +41,7 @@ fn insertion(depth: f64) -> Arc<Model> {
         DVec3::NEG_Z,
         vec![Phase::Insert { speed, depth }],
     );
+    change(&mut scene);
     model(scene)
 }
 
@@ -153,4 +159,85 @@ fn the_energy_account_of_an_insertion_closes() {
         println!("{name}: work {work:.3e} J, gap {gap:.4}");
         at_most(&format!("{name}, energy gap over the work"), gap.abs(), 0.02);
     }
+}
+
+/// A membrane takes its energy beyond cutting, whether it is thicker or thinner than the transition length.
+#[test]
+fn the_puncture_energy_of_a_membrane_is_the_area_under_its_threshold() {
+    let energy = 0.08e-3;
+    for thickness in [1.0e-3, 0.2e-3] {
+        let model = insertion_with(6e-3, |scene| {
+            let mut material = scene.material.clone();
+            material.cutting = Some(Cutting { puncture_force: 0.5, cutting_force: 0.25 });
+            material.membrane_energy = Some(energy);
+            let shape = RegionShape::Layer { top: 4e-3, bottom: 4e-3 + thickness };
+            scene.regions.push(Region { name: "capsule".into(), shape, material });
+        });
+        let plan = model.puncture.as_ref().unwrap();
+        let marked: Vec<f64> = plan.segments.iter().filter(|s| s.membrane).map(|s| s.start).collect();
+        assert!(marked.len() == 1 && (marked[0] - 4e-3).abs() < 1e-9, "{marked:?}");
+        let step = 1e-7;
+        let inside = |i: &u32| plan.segment((f64::from(*i) + 0.5) * step).membrane;
+        let area: f64 = (0..70_000).filter(inside).map(|i| plan.threshold((f64::from(i) + 0.5) * step) - 0.25).sum();
+        close("puncture energy [J]", area * step, energy, 1e-3);
+    }
+}
+
+/// A needle ten times as fast as the reference speed cuts with 10^n times the force; n = 0 is the law without a rate.
+#[test]
+fn the_cutting_force_follows_the_rate_exponent() {
+    let plain = insertion(6e-3);
+    let rated = insertion_with(6e-3, |scene| scene.effects.puncture.as_mut().unwrap().rate_exponent = 0.2);
+    let dt = 0.8 * wave_speed_bound(&plain);
+    let at_end = |engine: &mut dyn Engine, model: &Model| {
+        let frames = run(engine, model, dt, false).0;
+        let last = &frames[frames.len() - 10..];
+        last.iter().map(|f| f.cutting_impulse).sum::<f64>() / (10.0 * STEPS as f64 * dt)
+    };
+    let pairs = engines(&plain, dt, STEPS).into_iter().zip(engines(&rated, dt, STEPS));
+    for ((name, mut a), (_, mut b)) in pairs {
+        let (a, b) = (at_end(a.as_mut(), &plain), at_end(b.as_mut(), &rated));
+        // The tip follows its threshold to the excess of one step.
+        close(&format!("{name}, force over force without a rate"), b / a, 10f64.powf(0.2), 0.02);
+    }
+}
+
+/// Out through a free bottom: no force on what is not there, no energy made, the same on both engines.
+#[test]
+fn the_tip_leaves_through_a_free_bottom() {
+    let model = insertion_with(16e-3, |scene| {
+        scene.tissue.size.z = 8e-3;
+        scene.faces[4] = Default::default();
+        scene.effects.puncture.as_mut().unwrap().puncture_force = 0.5;
+    });
+    let dt = 0.8 * wave_speed_bound(&model);
+    let exit = model.puncture.as_ref().unwrap().exit;
+    close("material coordinate of the exit [m]", exit, 8e-3, 1e-9);
+    let mut ends = Vec::new();
+    for (name, mut engine) in engines(&model, dt, STEPS) {
+        let frames = run(engine.as_mut(), &model, dt, false).0;
+        let out = frames.iter().position(|f| f.tip_coordinate >= exit).expect("the tip leaves");
+        for frame in &frames[out + 1..] {
+            assert_eq!(frame.cutting_impulse.abs(), 0.0, "{name}: a force beyond the bottom");
+            assert!(frame.tip_coordinate < exit + 0.02e-3, "{name}");
+        }
+        let (mut work, mut lost, mut largest): (f64, f64, f64) = (0.0, 0.0, 0.0);
+        let mut worst: f64 = 0.0;
+        for f in &frames {
+            work += f.tool_work;
+            largest = largest.max(work.abs());
+            assert!(f.tip_dissipation >= -1e-9 && f.softening_dissipation >= -1e-9);
+            lost += f.damping_dissipation + f.contact_dissipation + f.tip_dissipation + f.softening_dissipation;
+            let gap = work - lost - f.elastic - f.hourglass - f.kinetic - f.contact_energy;
+            worst = worst.max(-gap);
+        }
+        let end = frames.last().unwrap();
+        let gap = work - lost - end.elastic - end.hourglass - end.kinetic - end.contact_energy;
+        println!("{name}: out in frame {out} of {}, work {work:.3e} J, gap {:.4}", frames.len(), gap / largest);
+        at_most(&format!("{name}, energy created over the work"), worst / largest, 0.02);
+        ends.push((out, work));
+    }
+    let [(cpu, work), (gpu, gpu_work)] = ends[..] else { return };
+    assert!(cpu.abs_diff(gpu) <= 2, "{cpu} {gpu}");
+    close("work", gpu_work, work, 0.02);
 }

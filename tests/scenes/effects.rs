@@ -119,3 +119,14 @@ fn an_insertion_with_every_effect_keeps_its_energy() {
     assert!(energy.plastic > 0.0 && energy.viscous > 0.0, "{energy:?}");
     assert_eq!(run.records.iter().map(|r| r.health.return_failures).sum::<u32>(), 0);
 }
+
+#[test]
+fn tissue_that_sticks_makes_the_force_saw() {
+    let run = run("effects/adhesion.toml", &[], best_engine());
+    run.assert_sound();
+    let adhesion: Vec<f64> = run.records.iter().filter(|r| r.tip_coordinate > 2e-3).map(|r| r.force.adhesion).collect();
+    let (low, high) = adhesion.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), f| (a.min(*f), b.max(*f)));
+    println!("adhesion from {low:.3} to {high:.3} N, {:.3e} J", run.last().energy.adhesion);
+    assert!(low > 0.04 && low < 0.15 && high > 0.18 && high < 0.26);
+    assert!(run.last().energy.adhesion > 0.0);
+}

@@ -159,7 +159,7 @@ fn four_millimetres() -> (Vec<FrameSums>, State) {
     for frame in 0..frames {
         let first_step = frame * steps;
         let steps = (first_step..first_step + steps).map(|s| StepInput::at(&model, s as f64 * dt, dt)).collect();
-        engine.start_frame(&FramePlan { frame, first_step, steps }).unwrap();
+        engine.start_frame(&FramePlan { frame, first_step, steps, centre_line: None }).unwrap();
         sums.push(engine.collect(true).unwrap().unwrap());
     }
     (sums, engine.read_state().unwrap())

@@ -15,7 +15,16 @@ use stylet::solver::step::Stage;
 /// Features of a block of Mooney-Rivlin tissue.
 fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
     let laws = BTreeSet::from(["mooney_rivlin"]);
-    Features { loaded_faces, driven_faces, regions: false, tetrahedra: false, free_path: false, laws }
+    Features {
+        loaded_faces,
+        driven_faces,
+        regions: false,
+        tetrahedra: false,
+        free_path: false,
+        bore: false,
+        slit: false,
+        laws,
+    }
 }
 
 /// Features of a mesh of tetrahedra, whose faces cannot be loaded yet.
@@ -28,6 +37,8 @@ fn scenes() -> Vec<Features> {
     let mut scenes = vec![scene(false, false), scene(true, false), scene(false, true), scene(true, true)];
     scenes.push(Features { regions: true, ..scene(false, false) });
     scenes.push(Features { free_path: true, ..scene(false, false) });
+    scenes.push(Features { bore: true, ..scene(false, false) });
+    scenes.push(Features { slit: true, ..scene(true, true) });
     scenes.push(Features { free_path: true, regions: true, ..scene(true, true) });
     scenes.extend([tetrahedra(false, false), tetrahedra(true, false), tetrahedra(false, true)]);
     scenes
@@ -57,16 +68,19 @@ fn effect_set(wanted: impl Fn(usize) -> bool) -> EffectSet {
         fibres: wanted(3).then(Default::default),
         viscoelastic: wanted(4).then(Default::default),
         damage: wanted(5).then(Default::default),
-        puncture: wanted(6).then(Default::default),
-        indentation: wanted(7).then(Default::default),
-        friction: wanted(8).then(Default::default),
+        cohesive: wanted(6).then(Default::default),
+        puncture: wanted(7).then(Default::default),
+        adhesion: wanted(8).then(Default::default),
+        indentation: wanted(9).then(Default::default),
+        friction: wanted(10).then(Default::default),
+        flexible_needle: wanted(11).then(Default::default),
     };
     let expected: Vec<&str> = EFFECTS.iter().enumerate().filter(|e| wanted(e.0)).map(|e| e.1.key).collect();
     assert_eq!(set.keys(), expected, "order of the effect table");
     set
 }
 
-/// All 512 subsets: none, every single one, all pairs, all together and what lies between.
+/// All 4096 subsets: none, every single one, all pairs, all together and what lies between.
 fn all_sets() -> Vec<EffectSet> {
     (0..1usize << EFFECTS.len()).map(|bits| effect_set(|i| bits >> i & 1 == 1)).collect()
 }
@@ -192,7 +206,9 @@ fn shader_structs() -> BTreeMap<String, ShaderStruct> {
     let block = Features { regions: true, ..scene(true, true) };
     let every = effect_set(|_| true);
     let free = Features { free_path: true, ..block.clone() };
-    for r in [block, free, tetrahedra(true, true)].iter().flat_map(|features| reflected(&every, features)) {
+    let bore = Features { bore: true, ..block.clone() };
+    let slit = Features { slit: true, ..block.clone() };
+    for r in [block, free, bore, slit, tetrahedra(true, true)].iter().flat_map(|features| reflected(&every, features)) {
         for (_, ty) in r.module.types.iter() {
             let (naga::TypeInner::Struct { members, span }, Some(name)) = (&ty.inner, &ty.name) else {
                 continue;
@@ -242,6 +258,9 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "CellEnergy",
         "IsochoricFactors",
         "AnchorPlace",
+        "StraightColumn",
+        "BentColumn",
+        "Bend",
         "GridPlace",
         "MaterialPlace",
         "FreeContact",
@@ -281,16 +300,19 @@ fn a_wrong_layout_is_found_and_named() {
 }
 
 /// Words that would betray an effect, by its key.
-const TRACES: [(&str, &[&str]); 9] = [
+const TRACES: [(&str, &[&str]); 12] = [
     ("mass_scaling", &["mass_scaling", "stable_mass", "selective"]),
     ("gravity", &["gravity", "free fall"]),
     ("plasticity", &["yield", "hardening", "flow_plastically", "mandel"]),
     ("fibres", &["fibre_", "i4bar", "fibres["]),
     ("viscoelastic", &["visc", "prony[", "relax("]),
     ("damage", &["degradation(", "damage["]),
+    ("cohesive", &["cohesive", "pair_state", "separation_sums"]),
     ("puncture", &["puncture", "tip_", "needle", "soften", "remaining"]),
+    ("adhesion", &["adhesion"]),
     ("indentation", &["indent", "punch"]),
     ("friction", &["friction", "stick_", "coulomb"]),
+    ("flexible_needle", &["centre_line", "bend", "needle_loads"]),
 ];
 
 /// Lower-case source and binding names of all stages of a set.
@@ -358,8 +380,9 @@ fn an_absent_effect_leaves_no_trace() {
                 assert!(found.is_none(), "{stage} without {key}: {word:?} in {found:?}");
             }
         }
-        // Not a vacuous search: with the effect alone (or with a tool, for friction) the words are there.
-        let present = effect_set(|i| i == absent || (*key == "friction" && EFFECTS[i].key == "puncture"));
+        // Not a vacuous search: with the effect alone (or with a tool, for those that need one) the words are there.
+        let needs_tool = ["friction", "adhesion", "flexible_needle"].contains(key);
+        let present = effect_set(|i| i == absent || (needs_tool && EFFECTS[i].key == "puncture"));
         let all: String = text_of(&present, &scene(false, false)).into_iter().map(|t| t.1).collect();
         assert!(traces.iter().any(|word| all.contains(word)), "{key}: none of {traces:?} with it");
     }
@@ -424,7 +447,7 @@ fn the_readme_lists_the_stages_of_the_step() {
 
 #[test]
 fn tools_leave_no_trace_in_tetrahedra() {
-    let tools: Vec<usize> = (6..9).collect();
+    let tools: Vec<usize> = (6..12).collect();
     let (with, without) = (effect_set(|_| true), effect_set(|i| !tools.contains(&i)));
     let features = tetrahedra(true, true);
     assert_eq!(stages(&with, &features), stages(&without, &features));

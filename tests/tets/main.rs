@@ -27,7 +27,7 @@ use common::*;
 /// A grid of `cells` hexahedra of edge `edge` [m], each cut into six tetrahedra along its diagonal.
 fn cut_grid(cells: [usize; 3], edge: f64) -> TetMesh {
     let lines = cells.map(|count| (0..=count).map(|i| i as f64 * edge).collect());
-    let mesh = TetMesh::from_block(&BlockMesh { lines });
+    let mesh = TetMesh::from_block(&BlockMesh::new(lines));
     let volume = edge.powi(3) / 6.0;
     assert!((0..mesh.tets.len()).all(|t| (mesh.volume(t) / volume - 1.0).abs() < 1e-9));
     mesh

@@ -1,9 +1,11 @@
 //! The effects of a scene: which are on, what they need, their parameters.
 
 use super::super::file::*;
-use super::super::{FaceCondition, Motion, TissueMaterial, Tool};
+use super::super::{FaceCondition, Motion, NeedleShape, TissueMaterial, Tool};
 use super::{Check, MM, Within, parameters};
 use crate::effects::{self, EFFECTS, EffectSet};
+use crate::material::four_digits;
+use crate::needle::beam::{BeamParams, Section};
 
 impl Check<'_> {
     pub(super) fn effects(
@@ -53,6 +55,22 @@ impl Check<'_> {
                 "add [needle], [sphere] or [flat_punch], or remove the effect",
             );
         }
+        if listed("flexible_needle") && !(is_needle && listed("puncture")) {
+            self.problems.report(
+                &place("flexible_needle"),
+                "effect `flexible_needle` needs a needle and the effect `puncture`",
+                "nothing bends the needle",
+                "add [needle] and \"puncture\" to the list `effects`, or remove the effect",
+            );
+        }
+        if listed("adhesion") && !listed("puncture") {
+            self.problems.report(
+                &place("adhesion"),
+                "effect `adhesion` needs `puncture`: tissue sticks to a tip that is in it",
+                "nothing enters the tissue",
+                "add \"puncture\" to the list `effects`, or remove \"adhesion\"",
+            );
+        }
         if listed("damage") && !listed("plasticity") {
             self.problems.report(
                 &place("damage"),
@@ -62,7 +80,7 @@ impl Check<'_> {
             );
         }
         if file.tissue.mesh.is_some() {
-            for key in ["puncture", "indentation"] {
+            for key in ["puncture", "indentation", "cohesive"] {
                 if listed(key) {
                     self.needs_block(&place(key), &format!("effect `{key}`"));
                 }
@@ -76,7 +94,10 @@ impl Check<'_> {
         }
         for (key, present) in [
             ("puncture", file.puncture.is_some()),
+            ("cohesive", file.cohesive.is_some()),
+            ("adhesion", file.adhesion.is_some()),
             ("friction", file.friction.is_some()),
+            ("flexible_needle", file.flexible_needle.is_some()),
             ("indentation", file.indentation.is_some()),
             ("gravity", file.gravity.is_some()),
             ("plasticity", file.plasticity.is_some()),
@@ -108,8 +129,33 @@ impl Check<'_> {
                 .push("`solver.mass_scaling` has no effect: `mass_scaling` is not in the list `effects`.".into());
         }
         let puncture = self.puncture(&file.puncture.clone().unwrap_or_default());
+        let cohesive = self.cohesive(&file.cohesive.clone().unwrap_or_default(), &file.tissue);
+        if listed("cohesive") {
+            self.check_cohesive(&place("cohesive"), tool, motion, &cohesive, listed("puncture"));
+        } else if let Some(Tool::Needle(NeedleShape { bore: Some(_), .. })) = tool {
+            self.problems.report(
+                "needle.bore_diameter_mm",
+                "a hollow needle needs the effect `cohesive`: its core separates on the ring of the cutting edge",
+                "no separation in this scene",
+                "add \"cohesive\" to the list `effects`, or remove bore_diameter_mm",
+            );
+        }
+        let adhesion = self.adhesion(&file.adhesion.clone().unwrap_or_default());
         let friction = self.friction(&file.friction.clone().unwrap_or_default());
         let indentation = self.indentation(&file.indentation.clone().unwrap_or_default());
+        if listed("flexible_needle") && (motion.is_free() || puncture.always_free) {
+            self.problems.report(
+                &place("flexible_needle"),
+                "a flexible needle keeps to its planned path",
+                "with a free motion or puncture.path = \"free\"",
+                "move along one straight line, or remove the effect",
+            );
+        }
+        let flexible = listed("flexible_needle").then(|| {
+            let weight =
+                if listed("gravity") { file.gravity.clone().unwrap_or_default() } else { GravityTable::none() };
+            self.flexible_needle(&file.flexible_needle.clone().unwrap_or_default(), tool, motion, &weight)
+        });
         let acceleration = file.gravity.as_ref().and_then(|table| table.acceleration_m_s2);
         let gravity = effects::gravity::Params {
             acceleration: self.vector("gravity.acceleration_m_s2", acceleration.unwrap_or([0.0, 0.0, -9.81]), 1000.0),
@@ -135,9 +181,73 @@ impl Check<'_> {
             damage: listed("damage").then(|| {
                 parameters::damage_over(&file.damage.clone().unwrap_or_default(), Default::default(), plasticity)
             }),
+            cohesive: listed("cohesive").then_some(cohesive),
             puncture: listed("puncture").then_some(puncture),
+            adhesion: listed("adhesion").then_some(adhesion),
             indentation: listed("indentation").then_some(indentation),
             friction: listed("friction").then_some(friction),
+            flexible_needle: flexible,
+        }
+    }
+
+    fn flexible_needle(
+        &mut self,
+        table: &FlexibleNeedleTable,
+        tool: &Option<Tool>,
+        motion: &Motion,
+        weight: &GravityTable,
+    ) -> effects::flexible_needle::Params {
+        let default = effects::flexible_needle::Params::default();
+        // Reported above where there is none.
+        let Some(Tool::Needle(needle)) = tool else { return default };
+        let at = |key: &str| format!("flexible_needle.{key}");
+        let length = self.optional(
+            &at("free_length_mm"),
+            table.free_length_mm,
+            MM,
+            default.beam.length,
+            Within::Between(5.0, 500.0),
+        );
+        if length <= motion.deepest() {
+            self.problems.report(
+                &if table.free_length_mm.is_some() { at("free_length_mm") } else { "flexible_needle".into() },
+                format!(
+                    "the needle is {} mm long and goes {} mm deep: its hub would enter the tissue",
+                    length / MM,
+                    motion.deepest() / MM
+                ),
+                "longer than the deepest insertion",
+                format!("write free_length_mm above {}", motion.deepest() / MM),
+            );
+        }
+        let outer_diameter = 2.0 * needle.radius;
+        let inner_diameter = self.optional(
+            &at("inner_diameter_mm"),
+            table.inner_diameter_mm,
+            MM,
+            needle.inner_diameter,
+            Within::NotNegative(20.0),
+        );
+        if inner_diameter > 0.98 * outer_diameter {
+            self.problems.report(
+                &at("inner_diameter_mm"),
+                format!("the bore of {} mm leaves no wall of {} mm", inner_diameter / MM, outer_diameter / MM),
+                "at most 0.98 of the outer diameter",
+                "write the inner diameter of the tube, or 0 for a solid needle",
+            );
+        }
+        let elements = table.elements.map_or(default.beam.elements as f64, f64::from);
+        let elements = self.number(&at("elements"), elements, Within::Between(4.0, 200.0));
+        let acceleration = table.gravity_m_s2.or(weight.acceleration_m_s2).unwrap_or([0.0, 0.0, -9.81]);
+        effects::flexible_needle::Params {
+            beam: BeamParams {
+                length,
+                elements: elements as usize,
+                section: Section { outer_diameter, inner_diameter },
+                youngs_modulus: needle.youngs_modulus,
+                density: needle.density,
+            },
+            gravity: self.vector(&at("gravity_m_s2"), acceleration, 1000.0),
         }
     }
 
@@ -223,6 +333,14 @@ impl Check<'_> {
             ),
             entry_fade: self.optional(&at("entry_fade_mm"), t.entry_fade_mm, MM, d.entry_fade, Positive(100.0)),
             always_free: t.path == Some(PathWord::Free),
+            rate_exponent: self.optional(&at("rate_exponent"), t.rate_exponent, 1.0, d.rate_exponent, NotNegative(1.0)),
+            reference_speed: self.optional(
+                &at("reference_speed_mm_s"),
+                t.reference_speed_mm_s,
+                MM,
+                d.reference_speed,
+                Between(1e-3, 1e3),
+            ),
         };
         if params.softened_radius >= params.ring_radius {
             let key = if t.softened_radius_mm.is_some() { "softened_radius_mm" } else { "ring_radius_mm" };
@@ -242,6 +360,154 @@ impl Check<'_> {
                 "The cutting force {} N is larger than the puncture force {} N: the force will not drop at the puncture.",
                 params.cutting_force, params.puncture_force
             ));
+        }
+        params
+    }
+
+    fn cohesive(&mut self, t: &CohesiveTable, tissue: &TissueTable) -> effects::cohesive::Params {
+        use Within::{Between, Positive};
+        let d = effects::cohesive::Params::default();
+        let at = |key: &str| format!("cohesive.{key}");
+        let strength = self.optional(&at("strength_kpa"), t.strength_kpa, 1e3, d.strength, Positive(1e6));
+        let energy = self.optional(&at("energy_j_m2"), t.energy_j_m2, 1.0, d.energy, Positive(1e6));
+        let penalty = t.penalty_pa_m.map(|value| self.number(&at("penalty_pa_m"), value, Positive(1e15)));
+        if t.penalty_factor.is_some() && penalty.is_some() {
+            self.problems.report(
+                &at("penalty_factor"),
+                "the faces have two penalty stiffnesses",
+                "`penalty_factor` and `penalty_pa_m`",
+                "keep one of them",
+            );
+        }
+        let size = tissue.size_mm.unwrap_or([1000.0; 3]);
+        let planes = t
+            .plane
+            .iter()
+            .enumerate()
+            .filter_map(|(index, plane)| {
+                let path = at(&format!("plane.{index}"));
+                let Some(axis) = ["x", "y", "z"].iter().position(|a| *a == plane.axis) else {
+                    self.unknown_name(&format!("{path}.axis"), "axis", &plane.axis, &["x", "y", "z"]);
+                    return None;
+                };
+                let half = 0.5 * size[axis];
+                let (low, high) = if axis == 2 { (-size[2], 0.0) } else { (-half, half) };
+                let margin = 1e-3 * (high - low);
+                let value = self.number(&format!("{path}.at_mm"), plane.at_mm, Between(low + margin, high - margin));
+                Some(effects::cohesive::Plane { axis, at: value * MM })
+            })
+            .collect();
+        effects::cohesive::Params {
+            strength,
+            shear_strength: self.optional(
+                &at("shear_strength_kpa"),
+                t.shear_strength_kpa,
+                1e3,
+                strength,
+                Positive(1e6),
+            ),
+            energy,
+            shear_energy: self.optional(&at("shear_energy_j_m2"), t.shear_energy_j_m2, 1.0, energy, Positive(1e6)),
+            exponent: self.optional(&at("exponent"), t.exponent, 1.0, d.exponent, Between(0.1, 10.0)),
+            penalty,
+            penalty_factor: self.optional(
+                &at("penalty_factor"),
+                t.penalty_factor,
+                1.0,
+                d.penalty_factor,
+                Positive(1e6),
+            ),
+            planes,
+        }
+    }
+
+    /// What the effect `cohesive` needs around it.
+    fn check_cohesive(
+        &mut self,
+        place: &str,
+        tool: &Option<Tool>,
+        motion: &Motion,
+        params: &effects::cohesive::Params,
+        cuts: bool,
+    ) {
+        let needle = match tool {
+            Some(Tool::Needle(needle)) if cuts => Some(needle),
+            _ => None,
+        };
+        if needle.is_none() && params.planes.is_empty() {
+            self.problems.report(
+                place,
+                "effect `cohesive` has no face to separate",
+                "no needle that cuts and no plane",
+                "add [needle] with the effect `puncture`, or [[cohesive.plane]] with axis = \"z\" and at_mm = -5",
+            );
+        }
+        let Some(needle) = needle else { return };
+        let tilted = |axis: usize| motion.direction[axis].abs() > 1e-9;
+        if needle.bore.is_some() && (tilted(0) || tilted(1)) {
+            self.problems.report(
+                "motion",
+                "a hollow needle goes straight down: the grid follows its bore in vertical prisms",
+                "inclined direction",
+                "write direction = [0, 0, -1], or use a solid needle",
+            );
+        } else if tilted(0) && tilted(1) {
+            self.problems.report(
+                "motion",
+                "a slit lies on a grid plane that holds the direction of the needle",
+                "direction neither in the xz nor in the yz plane",
+                "turn the azimuth to 0 or 90 degrees, or remove \"cohesive\" (the path then opens by softening)",
+            );
+        }
+    }
+
+    fn adhesion(&mut self, t: &AdhesionTable) -> effects::adhesion::Params {
+        use Within::{NotNegative, Positive};
+        let d = effects::adhesion::Params::default();
+        let at = |key: &str| format!("adhesion.{key}");
+        let params = effects::adhesion::Params {
+            static_force: self.optional(&at("static_force_n"), t.static_force_n, 1.0, d.static_force, Positive(100.0)),
+            kinetic_force: self.optional(
+                &at("kinetic_force_n"),
+                t.kinetic_force_n,
+                1.0,
+                d.kinetic_force,
+                NotNegative(100.0),
+            ),
+            stiffness: self.optional(&at("stiffness_n_mm"), t.stiffness_n_mm, 1e3, d.stiffness, Positive(1e4)),
+            sliding_distance: self.optional(
+                &at("sliding_distance_mm"),
+                t.sliding_distance_mm,
+                MM,
+                d.sliding_distance,
+                Positive(100.0),
+            ),
+        };
+        let (fall, key) = (params.static_force - params.kinetic_force, |written: bool, key| {
+            if written { format!("adhesion.{key}") } else { "adhesion".to_string() }
+        });
+        if fall < 0.0 {
+            self.problems.report(
+                &key(t.kinetic_force_n.is_some(), "kinetic_force_n"),
+                format!(
+                    "the kinetic force {} N is above the static one, {} N",
+                    params.kinetic_force, params.static_force
+                ),
+                "nothing lets go",
+                "write a kinetic_force_n below static_force_n, e.g. 0.05 and 0.25",
+            );
+        } else if params.stiffness * params.sliding_distance <= fall {
+            self.problems.report(
+                &key(t.sliding_distance_mm.is_some(), "sliding_distance_mm"),
+                format!(
+                    "the bond of {} N/mm snaps back: its force falls by {} N within {} mm",
+                    params.stiffness * 1e-3,
+                    four_digits(fall),
+                    params.sliding_distance / MM
+                ),
+                "must be above (static_force_n - kinetic_force_n)/stiffness_n_mm",
+                format!("write a sliding_distance_mm above {}", four_digits(fall / params.stiffness / MM)),
+            );
         }
         params
     }

@@ -149,7 +149,7 @@ impl Check<'_> {
             self.snap_back(file, index, material, tissue.cell_size, &effects);
         }
         if mesh.is_none() {
-            self.geometry(&tissue, tool.as_ref(), &motion);
+            self.geometry(&tissue, tool.as_ref(), &motion, &faces[Face::ZMin as usize]);
         }
         self.overlaps(&regions, &tissue, mesh.as_deref());
         self.problems.check()?;
@@ -543,7 +543,7 @@ impl Check<'_> {
     }
 
     /// The path stays inside the block.
-    fn geometry(&mut self, tissue: &Tissue, tool: Option<&Tool>, motion: &Motion) {
+    fn geometry(&mut self, tissue: &Tissue, tool: Option<&Tool>, motion: &Motion, bottom: &FaceCondition) {
         let Some(tool) = tool else { return };
         let half = tissue.size * 0.5;
         let show = |p: DVec3| format!("({:.3}, {:.3}, {:.3}) mm", p.x / MM, p.y / MM, p.z / MM);
@@ -562,7 +562,9 @@ impl Check<'_> {
             self.free_geometry(tissue, tool, motion);
             return;
         }
-        let end = motion.deepest_point();
+        // A needle may leave through the bottom; what it does below does not matter here.
+        let through = matches!(tool, Tool::Needle(_)) && bottom.fixed == [false; 3];
+        let end = motion.deepest_point_in(tissue.size.z);
         // The shaft of a needle is inside the tissue, a sphere or punch is not.
         let radius = match tool {
             Tool::Needle(shape) => shape.radius,
@@ -587,7 +589,7 @@ impl Check<'_> {
                 }
             }
         }
-        if tissue.size.z + end.z < PATH_MARGIN {
+        if tissue.size.z + end.z < PATH_MARGIN && !through {
             let deepest = motion.phases.iter().enumerate().max_by(|a, b| {
                 let depth = |phase: &Phase| match *phase {
                     Phase::Insert { depth, .. } => depth,
@@ -600,13 +602,14 @@ impl Check<'_> {
                 &format!("motion.phase.{index}.depth_mm"),
                 format!(
                     "the path ends at {}, less than {} mm above the bottom at z = {:.3} mm",
-                    show(end),
+                    show(motion.deepest_point()),
                     PATH_MARGIN / MM,
                     -tissue.size.z / MM
                 ),
                 "too deep for this block",
                 format!(
-                    "write depth_mm of at most {:.3}, or enlarge tissue.size_mm",
+                    "write depth_mm of at most {:.3}, or enlarge tissue.size_mm, or let a needle leave with boundaries.z_min = \
+                     \"free\" (the sides hold the block)",
                     (tissue.size.z - PATH_MARGIN) / -motion.direction.z / MM
                 ),
             );

@@ -15,6 +15,9 @@ use crate::mesh::{Mesh, TetMesh};
 /// Most regions of a scene: the shaders hold 16 materials, and one is the tissue's own.
 const LARGEST_REGION_COUNT: usize = 15;
 
+/// Thinnest membrane: four of the largest advances of the tip in a step [m].
+const THINNEST_MEMBRANE: f64 = 0.05e-3;
+
 /// Keys of the shapes.
 const SHAPES: [&str; 5] = ["layer_mm", "box_mm", "sphere_mm", "cylinder_mm", "mesh_tag"];
 
@@ -237,6 +240,55 @@ impl Check<'_> {
         }
     }
 
+    /// Puncture energy of a membrane [J]: as written, or a slit as wide as the needle through its thickness.
+    fn membrane(
+        &mut self,
+        index: usize,
+        table: &MembraneTable,
+        shape: &RegionShape,
+        diameter: Option<f64>,
+    ) -> Option<f64> {
+        let at = |key: &str| format!("region.{index}.membrane.{key}");
+        let RegionShape::Layer { top, bottom } = shape else {
+            self.problems.report(
+                &format!("region.{index}.membrane"),
+                "only a layer can be a membrane",
+                "this region is no layer",
+                "give the region layer_mm = [top, bottom], or write puncture_force_n instead of membrane",
+            );
+            return None;
+        };
+        if bottom - top < THINNEST_MEMBRANE {
+            self.problems.report(
+                &format!("region.{index}.layer_mm"),
+                format!(
+                    "a membrane of {} mm is thinner than a few advances of the tip",
+                    four_digits((bottom - top) / MM)
+                ),
+                format!("must be {} mm thick at least", THINNEST_MEMBRANE / MM),
+                "write a thicker layer; its puncture energy stays as written",
+            );
+        }
+        match (table.puncture_energy_mj, table.toughness_j_m2) {
+            (Some(energy), None) => {
+                Some(self.number(&at("puncture_energy_mj"), energy, Within::Positive(100.0)) * 1e-3)
+            }
+            (None, Some(toughness)) => {
+                let toughness = self.number(&at("toughness_j_m2"), toughness, Within::Positive(1e6));
+                diameter.map(|diameter| toughness * diameter * (bottom - top))
+            }
+            (energy, _) => {
+                self.problems.report(
+                    &format!("region.{index}.membrane"),
+                    format!("the membrane has {} energies", if energy.is_some() { "two" } else { "no" }),
+                    "exactly one of puncture_energy_mj and toughness_j_m2",
+                    "write e.g. membrane = { puncture_energy_mj = 0.1 }",
+                );
+                None
+            }
+        }
+    }
+
     /// Tip forces of all materials.
     pub(super) fn cuttings(
         &mut self,
@@ -290,6 +342,18 @@ impl Check<'_> {
             any |= written != none;
             let chosen = if written != none { written } else { preset_cutting(presets[index].as_ref()) };
             region.material.cutting = cutting(&chosen, diameter, &scene);
+            if let Some(membrane) = &table.membrane {
+                any = true;
+                if table.puncture_force_n.or(table.material.puncture_force_n).is_some() {
+                    self.problems.report(
+                        &format!("region.{index}.membrane"),
+                        format!("region `{}` states a puncture force and the energy of a membrane", region.name),
+                        "both say how hard it is to puncture",
+                        "keep puncture_force_n or membrane; cutting_force_n may stand beside either",
+                    );
+                }
+                region.material.membrane_energy = self.membrane(index, membrane, &region.shape, diameter);
+            }
         }
         if any && effects.puncture.is_none() {
             self.notices

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::super::file::*;
 use super::super::motion::Placement;
-use super::super::{Motion, NeedleShape, Phase, TipShape, Tool, presets};
+use super::super::{BoreShape, Motion, NeedleShape, Phase, TipShape, Tool, Vibration, presets};
 use super::{Check, MM, Within};
 use crate::material::four_digits;
 
@@ -40,10 +40,13 @@ impl Check<'_> {
     }
 
     fn needle(&mut self, table: &NeedleTable) -> NeedleShape {
-        let (mut name, mut diameter) = (String::new(), MM);
+        let (mut name, mut diameter, mut inner_diameter) = (String::new(), MM, 0.0);
         match (&table.gauge, table.outer_diameter_mm) {
             (Some(gauge), None) => match presets::needle(gauge) {
-                Some(preset) => (name, diameter) = (preset.gauge.clone(), preset.outer_diameter),
+                Some(preset) => {
+                    (name, diameter) = (preset.gauge.clone(), preset.outer_diameter);
+                    inner_diameter = preset.inner_diameter;
+                }
                 None => {
                     let names: Vec<&str> = presets::needles().iter().map(|p| p.gauge.as_str()).collect();
                     self.unknown_name("needle.gauge", "needle gauge", gauge, &names);
@@ -62,21 +65,64 @@ impl Check<'_> {
         }
         let radius = 0.5 * diameter;
         let (tip, tip_length) = self.needle_tip(table, radius);
-        let material = match &table.material {
-            None => "steel-304".to_string(),
-            Some(NeedleMaterialEntry::Preset(name)) => {
-                if presets::needle_material(name).is_none() {
+        let bore = self.bore(table, radius);
+        let length = self.optional("needle.length_mm", table.length_mm, MM, 100.0 * MM, Within::Between(1.0, 1000.0));
+        let steel = NeedleShape::cone(&name, radius, tip_length);
+        // The bore that takes a core is that of the tube.
+        let inner_diameter = bore.map_or(inner_diameter, |b| 2.0 * b.radius);
+        let shape = NeedleShape { tip, bore, inner_diameter, length, ..steel };
+        match &table.material {
+            None => shape,
+            Some(NeedleMaterialEntry::Preset(name)) => match presets::needle_material(name) {
+                Some(m) => NeedleShape {
+                    material: name.clone(),
+                    youngs_modulus: m.youngs_modulus,
+                    density: m.density,
+                    ..shape
+                },
+                None => {
                     let names: Vec<&str> = presets::needle_materials().iter().map(|m| m.name.as_str()).collect();
                     self.unknown_name("needle.material", "needle material", name, &names);
+                    shape
                 }
-                name.clone()
-            }
+            },
             Some(NeedleMaterialEntry::Table(table)) => {
-                self.needle_material(table);
-                "constants".to_string()
+                let (youngs_modulus, density) = self.needle_material(table);
+                NeedleShape { material: "constants".into(), youngs_modulus, density, ..shape }
             }
+        }
+    }
+
+    /// What makes the needle hollow.
+    fn bore(&mut self, table: &NeedleTable, radius: f64) -> Option<BoreShape> {
+        let edge = self.optional("needle.cutting_edge", table.cutting_edge, 1.0, 0.25, Within::Between(0.0, 1.0));
+        let friction = self.optional("needle.bore_friction", table.bore_friction, 1.0, 0.05, Within::NotNegative(2.0));
+        let Some(diameter) = table.bore_diameter_mm else {
+            for (key, given) in [("cutting_edge", table.cutting_edge), ("bore_friction", table.bore_friction)] {
+                if given.is_some() {
+                    self.notices.push(format!("`needle.{key}` has no effect without needle.bore_diameter_mm."));
+                }
+            }
+            return None;
         };
-        NeedleShape { name, radius, tip_length, tip, material }
+        let inner = 0.5 * self.number("needle.bore_diameter_mm", diameter, Within::Between(0.02, 20.0)) * MM;
+        if inner >= radius {
+            self.problems.report(
+                "needle.bore_diameter_mm",
+                format!("the bore of {diameter} mm does not fit into the needle of {} mm", 2e3 * radius),
+                "must be smaller than the outer diameter",
+                "write e.g. bore_diameter_mm = 1.194 for 16G",
+            );
+        }
+        if table.bevel_angle_deg.is_some() {
+            self.problems.report(
+                "needle.bevel_angle_deg",
+                "a hollow needle has a ring for a tip, no bevel",
+                "bevel and bore",
+                "write tip_length_mm = 1.0 for the length of the ground edge",
+            );
+        }
+        Some(BoreShape { radius: inner, edge: inner + edge * (radius - inner), friction })
     }
 
     /// Shape and length of the tip.
@@ -117,8 +163,10 @@ impl Check<'_> {
         }
     }
 
-    fn needle_material(&mut self, table: &NeedleMaterialTable) {
-        self.number("needle.material.youngs_modulus_gpa", table.youngs_modulus_gpa, Within::Between(0.1, 2000.0));
+    /// Young's modulus [Pa] and density [kg/m^3].
+    fn needle_material(&mut self, table: &NeedleMaterialTable) -> (f64, f64) {
+        let key = "needle.material.youngs_modulus_gpa";
+        let youngs_modulus = self.number(key, table.youngs_modulus_gpa, Within::Between(0.1, 2000.0)) * 1e9;
         self.number("needle.material.poisson_ratio", table.poisson_ratio, Within::Between(0.0, 0.4999));
         // Density [kg/m^3] and how the file writes it.
         let (path, written, density) = match (table.density_g_cm3, table.density_g_mm3) {
@@ -131,11 +179,11 @@ impl Check<'_> {
                     "density_g_cm3 or density_g_mm3",
                     "write density_g_cm3 = 7.9 (steel)",
                 );
-                return;
+                return (youngs_modulus, 7900.0);
             }
         };
         if (800.0..=25_000.0).contains(&density) {
-            return;
+            return (youngs_modulus, density);
         }
         // A density in t/mm^3 taken for g/mm^3 is a million times too small.
         let as_tonnes = density * 1e6;
@@ -156,6 +204,7 @@ impl Check<'_> {
             "no needle material",
             guess,
         );
+        (youngs_modulus, density)
     }
 
     pub(super) fn motion(&mut self, file: &SceneFile, has_tool: bool) -> Motion {
@@ -186,7 +235,33 @@ impl Check<'_> {
         let direction = self.direction(table);
         let entry = DVec3::new(entry[0], entry[1], 0.0) * MM;
         let phases = self.phases(&table.phase, entry, direction);
-        Motion { entry, direction, phases }
+        let vibration = table.vibration.as_ref().map(|v| self.vibration(v, direction));
+        Motion { entry, direction, phases, vibration }
+    }
+
+    fn vibration(&mut self, table: &VibrationTable, insertion: DVec3) -> Vibration {
+        let direction = match table.direction {
+            None => insertion,
+            Some(vector) => {
+                let unit = self.vector("motion.vibration.direction", vector, 1e6).normalize_or_zero();
+                if unit == DVec3::ZERO {
+                    self.problems.report(
+                        "motion.vibration.direction",
+                        "the vibration has no direction",
+                        "a vector of length zero",
+                        "write e.g. direction = [1, 0, 0], or leave the key away: along the insertion",
+                    );
+                    insertion
+                } else {
+                    unit
+                }
+            }
+        };
+        Vibration {
+            amplitude: self.number("motion.vibration.amplitude_mm", table.amplitude_mm, Within::Positive(5.0)) * MM,
+            frequency: self.number("motion.vibration.frequency_hz", table.frequency_hz, Within::Positive(1000.0)),
+            direction,
+        }
     }
 
     fn direction(&mut self, table: &MotionTable) -> DVec3 {
@@ -252,7 +327,7 @@ impl Check<'_> {
                 "add [[motion.phase]] with kind = \"insert\", speed_mm_s = 2, depth_mm = 12",
             );
         }
-        let mut motion = Motion { entry, direction, phases: Vec::new() };
+        let mut motion = Motion { entry, direction, phases: Vec::new(), vibration: None };
         for (index, table) in tables.iter().enumerate() {
             self.keys_of_other_kinds(index, table);
             let begin = motion.end();

@@ -1,9 +1,12 @@
 //! The CPU engine: f64, rayon, written from the equations. Reference for the tests and fallback without an adapter.
 
+mod cohesive_forces;
 mod free_tip;
 mod indenter_contact;
 mod needle_contact;
 mod tip;
+
+pub use cohesive_forces::TORN_REACH;
 
 use std::sync::Arc;
 
@@ -12,10 +15,12 @@ use rayon::prelude::*;
 
 use super::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
+use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::ToolPose;
+use crate::needle::centre_line::CentreLine;
 use crate::scene::Face;
 
 /// Sums of one contact node over one step.
@@ -25,6 +30,8 @@ struct ContactSums {
     tip: DVec3,
     normal: DVec3,
     friction: DVec3,
+    /// The normal force acts on the shaft of a needle.
+    on_shaft: bool,
     /// Torque about the tip [N m].
     torque: DVec3,
     friction_work: f64,
@@ -41,6 +48,8 @@ pub struct CpuEngine {
     state: State,
     cells: Vec<CellForces>,
     external: Vec<DVec3>,
+    /// Stiffness bound that cohesive faces add at a node [N/m].
+    added_bound: Vec<f64>,
     tip_forces: Vec<(f64, [usize; 8], [f64; 8])>,
     tip_energy: f64,
     /// Force across the needle on every anchor of a free tip [N].
@@ -48,6 +57,10 @@ pub struct CpuEngine {
     contact_energy: f64,
     /// Plastic and damage dissipation that earlier frames have told [J].
     booked: (f64, f64),
+    /// Centre-line of a flexible needle in the frame under way.
+    centre_line: Option<CentreLine>,
+    /// Impulse of that frame on each contact node [N s]; used with a centre-line only.
+    node_impulse: Vec<DVec3>,
     finished: std::collections::VecDeque<FrameSums>,
     sums: FrameSums,
 }
@@ -64,7 +77,9 @@ impl CpuEngine {
             tip_coordinate: 0.0,
             tip: model.free_tip(),
             cut_samples: vec![0; model.puncture.as_ref().and_then(|p| p.free.as_ref()).map_or(0, |f| f.cell_count())],
+            bond: Bond::default(),
             contact: vec![ContactState::default(); model.contact_nodes.len()],
+            pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
         };
         let bytes = nodes * (3 * size_of::<DVec3>() + 8)
@@ -85,11 +100,14 @@ impl CpuEngine {
             state,
             cells: vec![CellForces::default(); cells],
             external: vec![DVec3::ZERO; nodes],
+            added_bound: vec![0.0; nodes],
             tip_forces: Vec::new(),
             tip_energy: 0.0,
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
             booked: (0.0, 0.0),
+            centre_line: None,
+            node_impulse: vec![DVec3::ZERO; model.contact_nodes.len()],
             finished: Default::default(),
             sums: FrameSums::default(),
             model,
@@ -104,7 +122,7 @@ impl CpuEngine {
             match &plan.free {
                 None => {
                     self.advance_tip(plan, &pose);
-                    self.soften_path(plan);
+                    self.soften_path(plan, &pose);
                 }
                 Some(free) => {
                     self.advance_free_tip(plan, free, &pose);
@@ -113,8 +131,10 @@ impl CpuEngine {
             }
         }
         self.element_forces(input);
+        self.added_bound.fill(0.0);
+        self.cohesive_forces(input.pose.as_ref());
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
-            self.needle_contact(plan, &pose);
+            self.needle_contact(plan, &pose, input.step);
         }
         if let (Some(_), Some(pose)) = (model.effects.indentation, input.pose) {
             self.indenter_contact(&pose);
@@ -163,7 +183,7 @@ impl CpuEngine {
         let selective = model.effects.mass_scaling.is_some();
         let gravity = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling());
         let (cells, elements) = (&self.cells, &self.elements);
-        let external = &self.external;
+        let (external, added_bound) = (&self.external, &self.added_bound);
         let result: (f64, f64, u32, u32) = self
             .state
             .displacement
@@ -172,13 +192,20 @@ impl CpuEngine {
             .enumerate()
             .with_min_len(256)
             .map(|(node, (u, v))| {
-                let (mut force, bound) = elements.gather(mesh, cells, node);
-                let scaled = model.node_mass[node];
-                let mut load = gravity * scaled;
-                if let Some(f) = model.node_load.get(node) {
-                    load += *f * input.load_factor;
+                let own = [node as u32];
+                // Tied copies move as one node: every copy sums over all of them and books its share of the mass.
+                let copies = model.separation.tied(node).unwrap_or(&own);
+                let (mut force, mut bound, mut scaled, mut load) = (DVec3::ZERO, 0.0, 0.0, DVec3::ZERO);
+                for copy in copies.iter().map(|n| *n as usize) {
+                    let (f, k) = elements.gather(mesh, cells, copy);
+                    force += f + external[copy];
+                    bound += k + added_bound[copy];
+                    scaled += model.node_mass[copy];
+                    load += gravity * model.node_mass[copy];
+                    load += model.node_load.get(copy).map_or(DVec3::ZERO, |f| *f * input.load_factor);
                 }
-                force += external[node] + load;
+                force += load;
+                let share = if copies.len() > 1 { model.node_mass[node] / scaled } else { 1.0 };
                 let mut mass = scaled;
                 let mut raised = 0;
                 if selective {
@@ -222,7 +249,7 @@ impl CpuEngine {
                 work += load.dot(mid) * dt;
                 *v = new;
                 *u += new * dt;
-                (alpha * mass * free_mid.length_squared() * dt, work, clamped, raised)
+                (share * alpha * mass * free_mid.length_squared() * dt, share * work, clamped, raised)
             })
             .reduce(|| (0.0, 0.0, 0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3));
         self.sums.damping_dissipation += result.0;
@@ -263,6 +290,8 @@ impl CpuEngine {
         if model.has_driven_faces() {
             sums.reactions = face_reactions(model, &elements.nodal_forces(&model.mesh, &self.cells));
         }
+        let torn = state.pairs.iter().zip(&model.separation.pairs).map(|(d, p)| d * p.area);
+        sums.torn_area = torn.sum();
         sums.kinetic = state.velocity.iter().zip(&model.node_mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
         sums.max_speed = state.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
         sums.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
@@ -276,6 +305,9 @@ impl FrameSums {
         let total = c.tip + c.normal + c.friction;
         self.cutting_impulse += c.tip.dot(pose.direction) * dt;
         self.spreading_impulse += c.normal.dot(pose.direction) * dt;
+        if c.on_shaft {
+            self.shaft_impulse += c.normal.dot(pose.direction) * dt;
+        }
         self.friction_impulse += c.friction.dot(pose.direction) * dt;
         self.impulse += total * dt;
         self.angular_impulse += c.torque * dt;
@@ -324,8 +356,12 @@ impl Engine for CpuEngine {
 
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {
         self.sums = FrameSums { frame: plan.frame, steps: plan.steps.len() as u32, ..Default::default() };
+        self.centre_line = plan.centre_line;
         for input in &plan.steps {
             self.step(input);
+        }
+        if let Some(pose) = plan.steps.last().and_then(|s| s.pose) {
+            self.share_needle_loads(&pose);
         }
         self.measure();
         self.finished.push_back(self.sums);

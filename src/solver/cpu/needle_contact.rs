@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::{ContactSums, CpuEngine};
-use crate::model::PuncturePlan;
+use crate::model::{ContactSurface, PuncturePlan};
+use crate::needle::centre_line::Bend;
 use crate::needle::free_path::{END_FADE, FreeTip, PASSED_MARGIN, WATCHED, faded_at_end};
 use crate::needle::gap::{Overlap, Profile};
 use crate::needle::{ToolPose, swing};
@@ -12,7 +13,7 @@ use crate::solver::engine::ContactState;
 impl CpuEngine {
     /// Stage `needle_contact`: nodes of the ring that the tip has passed stay outside the opened path (potential
     /// `1/2 k phi^2`, see `needle::gap`); friction on the shaft; tip springs.
-    pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
+    pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
         let d = -pose.direction;
         let k = plan.contact_stiffness;
@@ -22,13 +23,14 @@ impl CpuEngine {
         let tip = self.state.tip;
         let cone = profile.tip_length;
         let mut stored = self.tip_energy;
+        let line = self.centre_line;
         let mut tip_on_node: std::collections::HashMap<usize, DVec3> = Default::default();
         for (force, nodes, weights) in &self.tip_forces {
             for (n, w) in nodes.iter().zip(weights) {
                 *tip_on_node.entry(*n).or_default() += (pose.direction * *force + self.tip_sway) * *w;
             }
         }
-        for (contact, memory) in model.contact_nodes.iter().zip(&mut self.state.contact) {
+        for (index, (contact, memory)) in model.contact_nodes.iter().zip(&mut self.state.contact).enumerate() {
             let node = contact.node as usize;
             let x = model.mesh.rest_position(node) + self.state.displacement[node];
             let mut sums = ContactSums::default();
@@ -37,15 +39,23 @@ impl CpuEngine {
             }
             let relative = x - pose.tip;
             let s = relative.dot(d);
+            let bend = line.map_or(Bend::default(), |l| l.at(s, (step - l.first_step) as f64 * self.dt));
+            let from_axis = relative - bend.offset;
             let (touches, rest_radius, end) = match &plan.free {
                 None => (contact.pushed && contact.rest_axial < a && s > 0.0, contact.rest_radius, 0.0),
-                Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, relative, s, d),
+                Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, from_axis, s, d),
             };
             if !touches {
                 *memory =
                     ContactState { rest_radius: memory.rest_radius, passed: memory.passed, ..ContactState::default() };
             } else {
-                let free = profile.opened_path(relative, d, rest_radius, (0.0, 0.0));
+                let overlap = |less: (f64, f64)| match contact.surface {
+                    ContactSurface::OpenedPath => profile.opened_path(from_axis, d, rest_radius, less),
+                    ContactSurface::Slit { side } => profile.slit_face(from_axis, d, side, less),
+                    ContactSurface::OuterWall => profile.tube_wall(from_axis, d, false, less),
+                    ContactSurface::Bore => profile.tube_wall(from_axis, d, true, less),
+                };
+                let free = overlap((0.0, 0.0));
                 if !memory.touching {
                     memory.touching = true;
                     memory.overlap = free.value.max(0.0);
@@ -54,28 +64,39 @@ impl CpuEngine {
                 let travel = (s - memory.axial_on) / plan.params.entry_fade;
                 let fading = if travel > 0.0 && travel < 1.0 { -memory.overlap / plan.params.entry_fade } else { 0.0 };
                 let less = (memory.overlap * (1.0 - travel).clamp(0.0, 1.0), fading);
-                let mut overlap = profile.opened_path(relative, d, rest_radius, less);
+                let mut overlap = overlap(less);
                 if plan.free.is_some() {
                     overlap = faded_at_end(overlap, d, s, end, END_FADE * cone);
                 }
                 let Overlap { value: depth, gradient } = overlap;
+                let gradient = gradient - d * gradient.dot(bend.slope);
                 let steep = gradient.length();
                 let n = -gradient / steep;
-                let v = self.state.velocity[node] - pose.velocity - pose.angular_velocity.cross(relative);
+                let v = self.state.velocity[node] - pose.velocity - pose.angular_velocity.cross(relative) - bend.rate;
                 let vn = v.dot(n);
                 let mass = model.node_mass[node];
                 let damping = 2.0 * plan.params.contact_damping * (k * mass).sqrt();
                 let elastic = k * depth * steep;
                 let normal = if depth > 0.0 { (elastic - damping * vn).max(0.0) } else { 0.0 };
                 sums.normal = n * normal;
+                sums.on_shaft = s >= cone;
                 if depth > 0.0 {
                     sums.stored = 0.5 * k * depth * depth;
                     sums.damping_power = (elastic - normal) * vn;
                 }
+                if depth > 0.0 && contact.surface != ContactSurface::OpenedPath {
+                    // A separated face has half the mass of other nodes.
+                    self.added_bound[node] += 2.0 * k * steep * steep;
+                }
+                memory.on_shaft = depth > 0.0 && s >= cone;
                 memory.stick = match model.effects.friction {
                     Some(friction) if normal > 0.0 => {
                         let kt = friction.stiffness_ratio * k;
-                        let mu = friction.coefficient * ((s - cone) / friction.fade_length).clamp(0.0, 1.0);
+                        let coefficient = match (contact.surface, plan.needle.bore) {
+                            (ContactSurface::Bore, Some(bore)) => bore.friction,
+                            _ => friction.coefficient,
+                        };
+                        let mu = coefficient * ((s - cone) / friction.fade_length).clamp(0.0, 1.0);
                         let trial = memory.stick + (v - n * vn) * self.dt;
                         let trial = trial - n * trial.dot(n);
                         let length = trial.length();
@@ -95,8 +116,22 @@ impl CpuEngine {
             self.external[node] += total;
             stored += sums.stored;
             self.sums.book(&sums, pose, self.dt);
+            if line.is_some() {
+                self.sums.tool_work += total.dot(bend.rate) * self.dt;
+                self.node_impulse[index] += total * self.dt;
+            }
         }
         self.contact_energy = stored;
+    }
+
+    /// Shares the impulses of the frame over the entries of the centre-line, by where the nodes are at its end.
+    pub(super) fn share_needle_loads(&mut self, pose: &ToolPose) {
+        let Some(line) = self.centre_line else { return };
+        for (contact, impulse) in self.model.contact_nodes.iter().zip(&mut self.node_impulse) {
+            let node = contact.node as usize;
+            let x = self.model.mesh.rest_position(node) + self.state.displacement[node];
+            line.share(&mut self.sums.needle_loads, (pose.tip - x).dot(pose.direction), std::mem::take(impulse));
+        }
     }
 }
 

@@ -3,23 +3,30 @@
 use glam::DVec3;
 
 use super::CpuEngine;
+use crate::effects::adhesion::{self, Bond};
 use crate::mesh::BlockMesh;
 use crate::model::PuncturePlan;
 use crate::needle::ToolPose;
 use crate::solver::elements::{CORNERS, CellStates};
 
+/// An anchor at the material coordinate of the tip.
+struct PlacedAnchor {
+    /// Distance of the tip plane beyond it along the insertion, and its positive part inside the material [m].
+    distance: f64,
+    gap: f64,
+    /// d(x.t)/da.
+    stretch: f64,
+    nodes: [usize; 8],
+    weights: [f64; 8],
+}
+
 impl CpuEngine {
-    /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction`.
-    pub(super) fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> ([usize; 8], [f64; 8], [f64; 8]) {
-        let (mut c, mut xi, mut width) = ([0; 3], [0.0; 3], [0.0; 3]);
-        for a in 0..3 {
-            let lines = &mesh.lines[a];
-            let i = lines.partition_point(|l| *l <= x[a]).clamp(1, lines.len() - 1) - 1;
-            c[a] = i;
-            width[a] = lines[i + 1] - lines[i];
-            xi[a] = ((x[a] - lines[i]) / width[a]).clamp(0.0, 1.0);
-        }
-        let nodes = mesh.cell_nodes(mesh.cell_index(c[0], c[1], c[2]));
+    /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction` (in a bent grid the
+    /// direction of its axis).
+    fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> ([usize; 8], [f64; 8], [f64; 8]) {
+        let ([i, j, k], xi) = mesh.locate(x);
+        let cell = mesh.cell_index(i, j, k);
+        let width = mesh.cell_size(cell);
         let (mut weight, mut slope) = ([0.0; 8], [0.0; 8]);
         for (i, signs) in CORNERS.iter().enumerate() {
             let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (xi[a] - 0.5));
@@ -27,68 +34,110 @@ impl CpuEngine {
             weight[i] = n[0] * n[1] * n[2];
             slope[i] = d[0] * n[1] * n[2] + n[0] * d[1] * n[2] + n[0] * n[1] * d[2];
         }
-        (nodes, weight, slope)
+        (mesh.cell_nodes(cell), weight, slope)
     }
 
     /// Stage `advance_tip`: each anchor k carries a spring between the tip plane and the material point at `a`.
     ///
     /// `g_k = max(0, (p_tip - x_k).t)`, `F = k_tip/N sum g_k`, threshold `F_c(a)` falls from F_pun to F_cut over l_p;
-    /// where F > F_c: `a += min((F - F_c) / (k_tip lambda), cap)`, `lambda = <dx_k/da . t>` clamped to 0.2..3.
+    /// where F > F_c: `a += min((F - F_c) / (k_tip lambda), cap)`, `lambda = <dx_k/da . t>` clamped to 0.2..3. No spring from
+    /// `a = a_exit` on.
     pub(super) fn advance_tip(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
         let model = self.model.clone();
         let mesh = model.mesh.block();
-        let u = &self.state.displacement;
         let t = pose.direction;
-        let spring = plan.params.tip_stiffness / plan.anchors.len() as f64;
+        let count = plan.anchors.len() as f64;
+        let spring = plan.params.tip_stiffness / count;
         let tip_axial = (pose.tip - plan.path.entry).dot(t);
-        let gaps = |a: f64| -> Vec<(f64, f64, [usize; 8], [f64; 8])> {
+        let place = |u: &[DVec3], a: f64| -> Vec<PlacedAnchor> {
             plan.anchors
                 .iter()
                 .map(|anchor| {
                     let x = anchor.surface + t * a;
-                    let (nodes, weight, slope) = Self::locate(mesh, x, t);
+                    let (nodes, weights, slope) = Self::locate(mesh, x, t);
                     let (mut du, mut stretch) = (0.0, 1.0);
                     for i in 0..8 {
                         let along = u[nodes[i]].dot(t);
-                        du += weight[i] * along;
+                        du += weights[i] * along;
                         stretch += slope[i] * along;
                     }
-                    ((tip_axial - a - du).max(0.0), stretch, nodes, weight)
+                    let distance = tip_axial - a - du;
+                    let gap = if a < plan.exit { distance.max(0.0) } else { 0.0 };
+                    PlacedAnchor { distance, gap, stretch, nodes, weights }
                 })
                 .collect()
         };
+        let mean_distance = |anchors: &[PlacedAnchor]| anchors.iter().map(|p| p.distance).sum::<f64>() / count;
         let a = self.state.tip_coordinate;
-        let mut springs = gaps(a);
-        let force: f64 = springs.iter().map(|s| spring * s.0).sum();
+        let mut anchors = place(&self.state.displacement, a);
+        let bond_force = match model.effects.adhesion {
+            Some(adhesion) => self.advance_bond(&adhesion, mean_distance(&anchors), a > 0.0 && a < plan.exit),
+            None => 0.0,
+        };
+        let force: f64 = anchors.iter().map(|p| spring * p.gap).sum();
         let p = &plan.params;
-        let threshold = plan.threshold(a);
+        let speed = pose.velocity.length();
+        let threshold = plan.threshold(a) * p.rate_factor(speed);
         if force > threshold {
-            let lambda = springs.iter().map(|s| s.1).sum::<f64>() / springs.len() as f64;
-            let speed = pose.velocity.length();
+            let lambda = anchors.iter().map(|p| p.stretch).sum::<f64>() / count;
             let cap = if a == 0.0 { 0.005e-3 } else { 0.013e-3 };
             // A stab travels more than that in one step.
             let cap = f64::min(f64::max(cap, 1.25 * speed * self.dt), 4.0 * speed * self.dt);
             let advance = ((force - threshold) / (p.tip_stiffness * lambda.clamp(0.2, 3.0))).min(cap);
             self.state.tip_coordinate = a + advance;
-            let before = springs;
-            springs = gaps(a + advance);
+            let before = anchors;
+            anchors = place(&self.state.displacement, a + advance);
             // Force after the advance times the loss of stretch: with the force of the next step this closes the
             // trapezoidal rule of the leapfrog work; the loss of spring energy would count half a step twice.
-            let lost = before.iter().zip(&springs).map(|(b, s)| spring * s.0 * (b.0 - s.0));
+            let lost = before.iter().zip(&anchors).map(|(b, p)| spring * p.gap * (b.gap - p.gap));
             self.sums.tip_dissipation += lost.sum::<f64>();
         }
-        self.tip_energy = springs.iter().map(|s| 0.5 * spring * s.0 * s.0).sum();
-        self.tip_forces = springs.into_iter().map(|s| (spring * s.0, s.2, s.3)).collect();
+        self.state.bond.gap = mean_distance(&anchors);
+        let bond_energy = model.effects.adhesion.map_or(0.0, |p| 0.5 * p.stiffness * self.state.bond.stretch.powi(2));
+        self.tip_energy = anchors.iter().map(|p| 0.5 * spring * p.gap * p.gap).sum::<f64>() + bond_energy;
+        // Contact books the whole force of the anchors as cutting; what is not comes off here.
+        let membrane = match plan.segment(self.state.tip_coordinate).membrane {
+            true => anchors.iter().map(|p| spring * p.gap).sum::<f64>() * self.dt,
+            false => 0.0,
+        };
+        self.sums.membrane_impulse += membrane;
+        self.sums.adhesion_impulse += bond_force * self.dt;
+        self.sums.cutting_impulse -= membrane + bond_force * self.dt;
+        self.tip_forces =
+            anchors.into_iter().map(|p| (spring * p.gap + bond_force / count, p.nodes, p.weights)).collect();
+    }
+
+    /// Moves the bond between tip and tissue by what the tip has moved against its anchors, `distance` on average; returns
+    /// its force [N]. A tip outside the material, or drawn back by more than D, has no bond.
+    fn advance_bond(&mut self, p: &adhesion::Params, distance: f64, inside: bool) -> f64 {
+        let old = self.state.bond;
+        let motion = distance - old.gap;
+        let (stretch, slid) = match inside && distance > -p.sliding_distance {
+            true => p.advance(old.stretch, old.slid, motion),
+            false => (0.0, 0.0),
+        };
+        self.state.bond = Bond { stretch, slid, gap: old.gap };
+        // Mean force of both steps times the slip; nothing slips where there was and is no bond.
+        let slip = old.stretch + motion - stretch;
+        self.sums.adhesion_dissipation += 0.5 * p.stiffness * (old.stretch + stretch) * slip;
+        p.stiffness * stretch
     }
 
     /// Stage `soften_path`: factor `max(residual, 1 - phi ramp(a))`; the energy that a cell loses is dissipated.
-    pub(super) fn soften_path(&mut self, plan: &PuncturePlan) {
+    pub(super) fn soften_path(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
         let a = self.state.tip_coordinate;
         for path_cell in &plan.cells {
             let cell = path_cell.cell as usize;
             let length = path_cell.axial_end - path_cell.axial_start;
             let ramp = ((a - path_cell.axial_start) / length.max(1e-9)).clamp(0.0, 1.0);
-            let factor = (1.0 - path_cell.fraction * ramp).max(plan.params.residual_stiffness);
+            let factor = match plan.needle.bore {
+                // The core tears off where the tip stands when the needle begins to go back.
+                Some(_) => {
+                    let here = (path_cell.axial_start..path_cell.axial_end).contains(&a);
+                    if here && pose.velocity.dot(pose.direction) < 0.0 { 0.0 } else { 1.0 }
+                }
+                None => (1.0 - path_cell.fraction * ramp).max(plan.params.residual_stiffness),
+            };
             self.soften_cell(cell, factor);
         }
     }

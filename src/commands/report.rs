@@ -1,0 +1,306 @@
+//! `stylet report`: runs the scenes of a publication and writes one page with its numbers beside ours.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use serde::{Deserialize, Serialize};
+
+use super::run::{self, RunOptions};
+use crate::error::{Error, Result};
+use crate::output::report::CaseResults;
+use crate::output::report::lv2022::{CASES, Case, Report, SCENES};
+use crate::output::{Status, whole_file};
+use crate::scene::Scene;
+use crate::solver::simulation::EngineChoice;
+
+/// Names of the reports.
+pub const NAMES: [&str; 1] = ["lv2022"];
+
+/// Written beside the folders of the runs: what has been computed from which scene.
+const LEDGER: &str = "report.json";
+
+/// What the command line says.
+#[derive(Debug, Clone, Default)]
+pub struct ReportOptions {
+    /// One of [`NAMES`].
+    pub name: String,
+    pub engine: EngineChoice,
+    /// Folder of runs and page; `None`: `out/report_<name>`.
+    pub out: Option<PathBuf>,
+    /// Folder of the scenes; `None`: that of the repository.
+    pub scenes: Option<PathBuf>,
+    /// Coarse cells: a look at the page, no result.
+    pub quick: bool,
+    /// `key=value` texts for all scenes.
+    pub overrides: Vec<String>,
+    /// Compute everything again.
+    pub force: bool,
+}
+
+/// How a report ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ReportOutcome {
+    /// The page, and how many runs failed.
+    Page { path: PathBuf, failed: usize },
+    /// Stopped by the user; finished runs stay.
+    Interrupted { done: usize, of: usize },
+}
+
+/// The ledger: finished runs by name.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+struct Ledger {
+    report: String,
+    cases: BTreeMap<String, Finished>,
+}
+
+/// What a finished run was made from; another scene, override, engine or version makes it out of date.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+struct Finished {
+    scene: String,
+    overrides: Vec<String>,
+    engine: String,
+    version: String,
+    /// Seconds since 1970-01-01, UTC.
+    at: u64,
+}
+
+impl Finished {
+    fn is_made_from(&self, other: &Finished) -> bool {
+        Finished { at: 0, ..self.clone() } == Finished { at: 0, ..other.clone() }
+    }
+}
+
+/// A case that is to be run, its scene read and checked.
+struct Planned {
+    case: Case,
+    scene: Scene,
+    made_from: Finished,
+}
+
+/// Runs what is missing and writes the page `<name>.html` into the folder.
+///
+/// # Errors
+/// Wrong names, folders and scenes come before anything is run. A run that diverges does not stop the others: the page
+/// says so, and the outcome counts it.
+pub fn report(options: &ReportOptions, interrupted: &AtomicBool) -> Result<ReportOutcome> {
+    if !NAMES.contains(&options.name.as_str()) {
+        return Err(Error::input(
+            format!("there is no report `{}`", options.name),
+            format!("write one of: {}", NAMES.join(", ")),
+        ));
+    }
+    let planned = plan(options)?;
+    let out = options.out.clone().unwrap_or_else(|| default_out(options));
+    let mut ledger = open_ledger(&out, options, &planned)?;
+    let mut cases = Vec::new();
+    for (number, plan) in planned.iter().enumerate() {
+        let place = format!("case {} of {}, {}", number + 1, planned.len(), plan.case.name);
+        let results = match reusable(plan, &ledger, &out, &place) {
+            Some(results) => results,
+            None => {
+                eprintln!("{place}: {}", plan.scene.title);
+                ledger.cases.remove(plan.case.name);
+                ledger.write(&out)?;
+                match compute(plan, options.engine, &out, interrupted)? {
+                    Some((results, made_from)) => {
+                        if results.summary.status == Status::Ok {
+                            ledger.cases.insert(plan.case.name.into(), made_from);
+                            ledger.write(&out)?;
+                        }
+                        results
+                    }
+                    None => return Ok(ReportOutcome::Interrupted { done: cases.len(), of: planned.len() }),
+                }
+            }
+        };
+        cases.push((plan.case, results));
+    }
+    let failed = cases.iter().filter(|(_, results)| results.summary.status != Status::Ok).count();
+    let mut overrides: Vec<String> = Vec::new();
+    for text in planned.iter().flat_map(|plan| &plan.made_from.overrides) {
+        if !overrides.contains(text) {
+            overrides.push(text.clone());
+        }
+    }
+    let page = Report { cases, overrides, quick: options.quick, command: command(options), written: moment(now()) };
+    let path = out.join(format!("{}.html", options.name));
+    whole_file::write(&path, page.page()?.as_bytes())?;
+    Ok(ReportOutcome::Page { path, failed })
+}
+
+fn default_out(options: &ReportOptions) -> PathBuf {
+    PathBuf::from(format!("out/report_{}{}", options.name, if options.quick { "_quick" } else { "" }))
+}
+
+/// Reads and checks the scenes of all cases.
+fn plan(options: &ReportOptions) -> Result<Vec<Planned>> {
+    let folder = options.scenes.clone().unwrap_or_else(|| PathBuf::from(SCENES));
+    let mut planned = Vec::new();
+    for case in CASES {
+        let path = folder.join(format!("{}.toml", case.name));
+        let quick = if options.quick { case.quick } else { Some(&[][..]) };
+        let Some(quick) = quick else { continue };
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(reason) if reason.kind() == std::io::ErrorKind::NotFound && case.optional => continue,
+            Err(reason) => {
+                return Err(Error::input(
+                    format!("cannot read the scene {}: {reason}", path.display()),
+                    "call the program in the folder of the repository, or name the folder of the scenes with --scenes",
+                ));
+            }
+        };
+        let overrides: Vec<String> = quick.iter().map(|o| o.to_string()).chain(options.overrides.clone()).collect();
+        let scene = Scene::load(&path, &overrides)?;
+        let made_from = Finished {
+            scene: text,
+            overrides,
+            engine: options.engine.key().into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            at: 0,
+        };
+        planned.push(Planned { case, scene, made_from });
+    }
+    Ok(planned)
+}
+
+impl Ledger {
+    fn write(&self, out: &Path) -> Result<()> {
+        let path = out.join(LEDGER);
+        let text = serde_json::to_string_pretty(self).map_err(|e| Error::file(&path, std::io::Error::other(e)))?;
+        whole_file::write(&path, (text + "\n").as_bytes())
+    }
+}
+
+/// What the folder holds already. A folder with results that no report made is refused unless `--force`.
+fn open_ledger(out: &Path, options: &ReportOptions, planned: &[Planned]) -> Result<Ledger> {
+    let new = Ledger { report: options.name.clone(), ..Default::default() };
+    let path = out.join(LEDGER);
+    let found = match std::fs::read_to_string(&path) {
+        Ok(text) => serde_json::from_str::<Ledger>(&text).ok().filter(|ledger| ledger.report == options.name),
+        Err(reason) if reason.kind() == std::io::ErrorKind::NotFound => {
+            // Without a ledger the folder is new, unless there are results.
+            planned.iter().all(|plan| !out.join(plan.case.name).exists()).then(|| new.clone())
+        }
+        Err(_) => None,
+    };
+    let ledger = match found {
+        _ if options.force => new,
+        Some(ledger) => ledger,
+        None => {
+            return Err(Error::input(
+                format!("folder {} holds results that are not those of the report {}", out.display(), options.name),
+                "give another folder with --out, or replace the results with --force",
+            ));
+        }
+    };
+    let unusable = |reason: std::io::Error| {
+        Error::input(
+            format!("cannot write the report to {}: {reason}", out.display()),
+            "give a folder that you may write to with --out",
+        )
+    };
+    std::fs::create_dir_all(out).map_err(unusable)?;
+    match ledger.write(out) {
+        Err(Error::File { source, .. }) => Err(unusable(source)),
+        Err(error) => Err(error),
+        Ok(()) => Ok(ledger),
+    }
+}
+
+/// Finished results of the same scene, if the folder holds them whole.
+fn reusable(plan: &Planned, ledger: &Ledger, out: &Path, place: &str) -> Option<CaseResults> {
+    let finished = ledger.cases.get(plan.case.name)?;
+    if !finished.is_made_from(&plan.made_from) {
+        eprintln!("{place}: scene, overrides, engine or version have changed since the results were made");
+        return None;
+    }
+    let folder = out.join(plan.case.name);
+    match CaseResults::read(plan.case.name, plan.scene.clone(), &folder, &moment(finished.at)) {
+        Ok(results) if results.summary.status == Status::Ok => {
+            eprintln!("{place}: results of {} reused", results.finished);
+            Some(results)
+        }
+        Ok(_) => None,
+        Err(reason) => {
+            eprintln!("{place}: {reason}");
+            None
+        }
+    }
+}
+
+/// Runs one case; `None`: interrupted.
+fn compute(
+    plan: &Planned,
+    engine: EngineChoice,
+    out: &Path,
+    interrupted: &AtomicBool,
+) -> Result<Option<(CaseResults, Finished)>> {
+    let folder = out.join(plan.case.name);
+    // What lies there is of a report: `open_ledger` has seen to it.
+    let run_options = RunOptions { engine, out: Some(folder.clone()), force: true };
+    match run::run(plan.scene.clone(), &run_options, Instant::now(), interrupted) {
+        Ok(outcome) if outcome.summary.status == Status::Interrupted => return Ok(None),
+        Ok(outcome) => eprintln!("{}", run::describe(&outcome.summary)),
+        // A failed run is a finding: its results stay, and the page tells why it ended.
+        Err(error @ Error::Diverged { .. }) => eprintln!("error: {error}"),
+        Err(error) => return Err(error),
+    }
+    let made_from = Finished { at: now(), ..plan.made_from.clone() };
+    let results = CaseResults::read(plan.case.name, plan.scene.clone(), &folder, &moment(made_from.at))?;
+    Ok(Some((results, made_from)))
+}
+
+/// The command line that makes the same page, without the folder.
+fn command(options: &ReportOptions) -> String {
+    let mut text = format!("stylet report {}", options.name);
+    if options.quick {
+        text += " --quick";
+    }
+    if options.engine != EngineChoice::Auto {
+        text += &format!(" --engine {}", options.engine.key());
+    }
+    for set in &options.overrides {
+        text += &format!(" --set {set}");
+    }
+    text
+}
+
+fn now() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs())
+}
+
+/// `2022-03-01 14:05 UTC` from seconds since 1970.
+fn moment(seconds: u64) -> String {
+    let (days, rest) = (seconds / 86_400, seconds % 86_400);
+    // Years that begin on 1 March end with the leap day; 719468 days lie between 0000-03-01 and 1970-01-01.
+    let days = days + 719_468;
+    let (era, day_of_era) = (days / 146_097, days % 146_097);
+    let year = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year + year / 4 - year / 100);
+    let month_from_march = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
+    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
+    let year = year + 400 * era + u64::from(month <= 2);
+    format!("{year}-{month:02}-{day:02} {:02}:{:02} UTC", rest / 3600, rest / 60 % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_in_words() {
+        for (seconds, words) in [
+            (0, "1970-01-01 00:00 UTC"),
+            (951_782_400, "2000-02-29 00:00 UTC"),
+            (1_646_143_500, "2022-03-01 14:05 UTC"),
+            (4_107_542_399, "2100-02-28 23:59 UTC"),
+            (4_107_542_400, "2100-03-01 00:00 UTC"),
+        ] {
+            assert_eq!(moment(seconds), words);
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Cohesive faces: bilinear traction-separation on surfaces chosen when the scene is built, opened by load or by the tip.
+//!
+//! Opening `g = x_b - x_a` of two copies of a node, `n` the normal of the surface, `delta_n = g.n`, `delta_s = |g - n delta_n|`:
+//! ```text
+//! lambda   = sqrt(<delta_n>^2 + delta_s^2),  B = delta_s^2/lambda^2 (share of shear)              [m], -
+//! 1/lambda_0^2 = (1 - B)/d_n^2 + B/d_s^2,  d = strength/K                                         quadratic onset
+//! G_c      = G_I + (G_II - G_I) B^eta,  lambda_f = 2 G_c/(K lambda_0)                              [J/m^2], [m]
+//! D        = max(D, lambda_f (lambda - lambda_0)/(lambda (lambda_f - lambda_0)))                   0..1, irreversible
+//! T        = (1 - D) K g open;  closed: the normal part keeps K delta_n                            [Pa]
+//! ```
+//! Source: Turon et al. 2006 (bilinear law, one penalty for all modes), Camanho & Davila 2002 (quadratic onset),
+//! Benzeggagh & Kenane 1996 (mode mixity); answers in tests/references/04_cohesive.json. Nodal quadrature: each pair of
+//! copies carries the area of the faces around it.
+//!
+//! Tip. A face that the needle cuts is driven by the tip, `D >= (a - s0)/h` with the material coordinate a of the tip and
+//! that of the pair, s0: tissue stress alone opens no newton-sized path (the project's trials). The cutting force itself
+//! is that of the tip law (effect `puncture`). Where both copies lie on the full shaft the bond is gone: D = 1. Torn faces
+//! that close again touch while they overlap by less than 0.3 h; deeper ones have slid past each other.
+//!
+//! Energy: stored `1/2 (1 - D) K |g|^2 A`; a step in which D grows takes `1/2 K A dD g.g_before`, the trapezoidal rule of
+//! the leapfrog work. Range of validity: the process zone `E G_c/strength^2` spans a few faces; penalty K = factor E/h.
+
+use super::Effect;
+
+pub const EFFECT: Effect = Effect {
+    key: "cohesive",
+    define: "COHESIVE",
+    summary: "faces that separate: bilinear cohesion on the slit or bore of a needle and on chosen planes",
+    source: "Turon2006, Camanho2002, Benzeggagh1996",
+    cost: "one dispatch per step; doubled nodes on the surface; 80 B per pair; shorter time step by the penalty",
+};
+
+/// Parameters in SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Params {
+    /// Strength in opening and in shear [Pa].
+    pub strength: f64,
+    pub shear_strength: f64,
+    /// Fracture energies G_I and G_II [J/m^2].
+    pub energy: f64,
+    pub shear_energy: f64,
+    /// Exponent eta of the mode mixity.
+    pub exponent: f64,
+    /// Penalty stiffness K [Pa/m]; `None`: `penalty_factor` E/h with the Young's modulus and cell edge of the tissue.
+    pub penalty: Option<f64>,
+    pub penalty_factor: f64,
+    /// Planes across the whole block that may separate, beside the path of the needle.
+    pub planes: Vec<Plane>,
+}
+
+/// A plane of the block that may separate: all points with coordinate `at` [m] on the axis 0, 1 or 2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plane {
+    pub axis: usize,
+    pub at: f64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Params {
+            strength: 200e3,
+            shear_strength: 200e3,
+            energy: 20.0,
+            shear_energy: 20.0,
+            exponent: 1.45,
+            penalty: None,
+            penalty_factor: 20.0,
+            planes: Vec::new(),
+        }
+    }
+}
+
+/// The law with its penalty stiffness.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Law {
+    pub strength: f64,
+    pub shear_strength: f64,
+    pub energy: f64,
+    pub shear_energy: f64,
+    pub exponent: f64,
+    /// K [Pa/m].
+    pub penalty: f64,
+}
+
+impl Law {
+    /// The law of `params` for a tissue of Young's modulus `modulus` [Pa] and cells of edge `h` [m].
+    pub fn new(params: &Params, modulus: f64, h: f64) -> Self {
+        Law {
+            strength: params.strength,
+            shear_strength: params.shear_strength,
+            energy: params.energy,
+            shear_energy: params.shear_energy,
+            exponent: params.exponent,
+            penalty: params.penalty.unwrap_or(params.penalty_factor * modulus / h),
+        }
+    }
+
+    /// Fracture energy G_c at the share of shear B [J/m^2].
+    pub fn fracture_energy(&self, shear_share: f64) -> f64 {
+        self.energy + (self.shear_energy - self.energy) * shear_share.powf(self.exponent)
+    }
+
+    /// Openings at which damage begins and ends, lambda_0 and lambda_f [m].
+    pub fn openings(&self, shear_share: f64) -> (f64, f64) {
+        let (n, s) = (self.strength / self.penalty, self.shear_strength / self.penalty);
+        let onset = 1.0 / ((1.0 - shear_share) / (n * n) + shear_share / (s * s)).sqrt();
+        (onset, 2.0 * self.fracture_energy(shear_share) / (self.penalty * onset))
+    }
+
+    /// Damage that a monotonic opening reaches; `normal` and `shear` [m].
+    pub fn damage(&self, normal: f64, shear: f64) -> f64 {
+        let open = normal.max(0.0);
+        let lambda = open.hypot(shear);
+        if lambda == 0.0 {
+            return 0.0;
+        }
+        let (onset, end) = self.openings(shear * shear / (lambda * lambda));
+        (end * (lambda - onset) / (lambda * (end - onset))).clamp(0.0, 1.0)
+    }
+
+    /// Traction (normal, shear) [Pa] at damage `d`; a closed face keeps its normal stiffness.
+    pub fn traction(&self, normal: f64, shear: f64, d: f64) -> (f64, f64) {
+        let kept = if normal < 0.0 { 1.0 } else { 1.0 - d };
+        (kept * self.penalty * normal, (1.0 - d) * self.penalty * shear)
+    }
+}

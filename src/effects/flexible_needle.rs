@@ -1,0 +1,59 @@
+//! Flexible needle: the shaft bends between hub and tissue, and the tissue bends it.
+//!
+//! The needle is a beam clamped in its hub (`needle::beam`), solved implicitly once per display frame on the CPU; the tissue
+//! sees its centre-line `c(s)`, `s` behind the tip, as a table of 32 lateral offsets and rates,
+//! ```text
+//! contact: radial = lever - d s - c(s),  grad phi -> grad phi - d (grad phi . c'(s)),  v_needle = v_hub + dc/dt
+//! beam:    loads of the last frame, one per entry, shared by the same hats, so that sum f_i . dc_i is their work
+//! ```
+//! Staggered coupling: frame n moves the centre-line linearly from x_n to x_(n+1); its mean loads f_n, which belong to the mean
+//! line (x_n + x_(n+1))/2, and the springs `k_r` about that line (a Robin condition: the tissue's answer to a further move;
+//! along the axis the line goes on with the hub, and the tip adds its springs in series with the tissue around a disc, `16 mu R`)
+//! give x_(n+2). Stable where `k_r` is at least half the true stiffness per length; it is estimated as that of a rigid circle
+//! in an incompressible ring,
+//! ```text
+//! k_r = 4 pi mu / (ln(b/R) - (b^2 - R^2)/(b^2 + R^2))                                      [N/m^2]
+//! ```
+//! with the stiffest tissue and b half the smaller width of the block; softened path and contact springs make the true one
+//! smaller. Source: this project; beam [Crisfield1991].
+//! Assumptions: the path is cut along the planned line of the material, so that needle and tissue bend together, and no curved
+//! path is cut. Range of validity: the centre-line leaves the axis by less than the free length permits small slopes in the
+//! tissue (0.3 rad).
+
+use glam::DVec3;
+
+use super::Effect;
+use crate::needle::beam::{BeamParams, Section};
+
+pub const EFFECT: Effect = Effect {
+    key: "flexible_needle",
+    define: "FLEXIBLE_NEEDLE",
+    summary: "the needle is a beam clamped in its hub: it bends, and buckles where it is too thin",
+    source: "Crisfield1991; coupling: this project",
+    cost: "1.5 KiB; one beam solution per display frame, which waits for the frame before",
+};
+
+/// Parameters in SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Free length, elements, section and material.
+    pub beam: BeamParams,
+    /// Acceleration of free fall on the needle [m/s^2]; zero: weightless.
+    pub gravity: DVec3,
+}
+
+impl Default for Params {
+    /// An 18G tube of steel with 100 mm of free length.
+    fn default() -> Self {
+        Params {
+            beam: BeamParams {
+                length: 100e-3,
+                elements: 40,
+                section: Section { outer_diameter: 1.27e-3, inner_diameter: 0.838e-3 },
+                youngs_modulus: 193e9,
+                density: 7900.0,
+            },
+            gravity: DVec3::ZERO,
+        }
+    }
+}
