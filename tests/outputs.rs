@@ -635,7 +635,7 @@ fn a_sample_is_written_per_driven_face() {
     // 16 mm between the faces, 20 x 20 mm: pulled to a stretch of 1.5, 40 N are 100 kPa.
     let faces = DrivenFace::of_scene(&driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &mesh);
     let records = pulled(Face::ZMax, DVec3::Z, 40.0);
-    let mut tables = Tables::create(&folder, &faces).unwrap();
+    let mut tables = Tables::create(&folder, &faces, false).unwrap();
     for (rows, record) in records.iter().enumerate() {
         tables.append(record).unwrap();
         let text = fs::read_to_string(folder.file(SAMPLE_TABLE)).unwrap();
