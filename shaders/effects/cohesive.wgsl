@@ -31,7 +31,7 @@ struct FacePair {
     // Rest way between the other two [m], and in w the material coordinate s0 where the tip drives the pair, beyond every
     // path where it does not [m].
     second_way_and_start: vec4<f32>,
-    // Contact nodes of the copies, a pair without any names one that the needle never touches; z, w unused.
+    // Contact nodes of the copies, a pair without any names one that is never touched; z, w unused.
     contacts: vec4<u32>,
 }
 

@@ -24,10 +24,10 @@ struct PunctureParams {
     ring_radius: f32,
     // Shift of a section's centre per radius: zero for a cone, from the apex to the axis for a bevel; w unused.
     shift: vec4<f32>,
-    // Radii of the cutting edge and of the bore [m]; friction coefficient of the bore.
+    // Radii of the cutting edge and of the bore [m]; coefficient mu of the bore.
     edge_radius: f32,
     bore_radius: f32,
-    bore_friction: f32,
+    bore_grip: f32,
     _pad2: u32,
     // Of a free path: direction of the needle before the run, to which `shift` belongs; first cell and cells per axis of
     // the box of `free_cells`; w unused.

@@ -9,7 +9,7 @@ fn layer_edge(k: u32) -> CellEdge {
     return CellEdge(edge.x, edge.y, edge.z, 0.0);
 }
 
-struct Column {
+struct BentColumn {
     // An eighth of the gradients of xi (x, y) and of eta (x, y) at the centre [1/m]; zero for a gap.
     gradients: vec4<f32>,
     // [m]
@@ -18,6 +18,8 @@ struct Column {
     area: f32,
     cube_root: f32,
 }
+
+alias Column = BentColumn;
 
 fn column_at(i: u32, j: u32) -> Column {
     let at = params.cells_x + params.cells_y + params.cells_z + 2u * (j * params.cells_x + i);

@@ -7,10 +7,12 @@ fn layer_edge(k: u32) -> CellEdge {
     return cell_edges[params.cells_x + params.cells_y + k];
 }
 
-struct Column {
+struct StraightColumn {
     x: CellEdge,
     y: CellEdge,
 }
+
+alias Column = StraightColumn;
 
 fn column_at(i: u32, j: u32) -> Column {
     return Column(cell_edges[i], cell_edges[params.cells_x + j]);

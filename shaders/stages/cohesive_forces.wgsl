@@ -38,6 +38,12 @@ fn cohesive_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     var damage = max(state.damage, opening_damage(normal_opening, length(shear)));
 #ifdef PUNCTURE
     damage = max(damage, clamp((tip_state.coordinate - pair.second_way_and_start.w) * cohesive.inverse_ramp, 0.0, 1.0));
+#ifdef BORE
+    // The core tears off as a whole when the motion turns back: no bond is left above its base.
+    let backward = dot(step_input.velocity.xyz, step_input.direction.xyz) < 0.0;
+    let above = pair.second_way_and_start.w < tip_state.coordinate;
+    damage = max(damage, select(0.0, 1.0, backward && above));
+#endif
     // Where both copies lie on the full shaft the bond is gone.
     damage = max(damage, contact_memory[pair.contacts.x].on_shaft * contact_memory[pair.contacts.y].on_shaft);
 #endif

@@ -23,7 +23,7 @@
 #ifdef NODE_WORK
 #import shared/node_work
 #endif
-#ifdef COHESIVE
+#ifdef TIED
 #import shared/tied_nodes
 #endif
 
@@ -42,16 +42,16 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         return;
     }
     let place = node_place(node);
-#ifdef COHESIVE
+#ifdef TIED
     // Every copy sums over all of them, in the same order, and books its share of the mass.
-    let copies = tied_nodes[node];
+    let tied = tied_nodes[node];
+    let copies = tied.copies;
     var sum = vec4<f32>(0.0);
-    var scaled_mass = 0.0;
     for (var copy = 0u; copy < 4u && copies[copy] != NO_NODE; copy++) {
         sum += gathered_force(node_place(copies[copy]));
-        scaled_mass += node_mass[copies[copy]];
     }
-    let share = node_mass[node] / scaled_mass;
+    let scaled_mass = tied.whole_mass;
+    let share = tied.mass / scaled_mass;
 #else
     let sum = gathered_force(place);
     let scaled_mass = node_mass[node];
@@ -69,7 +69,7 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
 #ifdef LOADED_FACES
     var load = node_load[node].xyz * step_input.load_factor;
-#ifdef COHESIVE
+#ifdef TIED
     for (var copy = 0u; copy < 4u && copies[copy] != NO_NODE; copy++) {
         load += select(node_load[copies[copy]].xyz, vec3<f32>(0.0), copies[copy] == node) * step_input.load_factor;
     }
@@ -103,14 +103,14 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #ifdef LOADED_FACES
     work += params.dt * 0.5 * dot(load, old.xyz + next);
 #endif
-#ifdef COHESIVE
+#ifdef TIED
     work *= share;
 #endif
     node_work[node] += work;
 #endif
     let mid = 0.5 * (old.xyz + next) * is_free;
     var taken = params.mass_damping * params.dt * mass * dot(mid, mid);
-#ifdef COHESIVE
+#ifdef TIED
     taken *= share;
 #endif
     let damped = old.w + taken;

@@ -183,7 +183,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let grown = clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);
         var coefficient = friction.coefficient;
 #ifdef BORE
-        coefficient = select(puncture.bore_friction, coefficient, contact.surface.w > 0.0);
+        coefficient = select(puncture.bore_grip, coefficient, contact.surface.w > 0.0);
 #endif
         let allowed = coefficient * grown * pressure / kt;
         let trial = stick_trial(memory.stick.xyz, (v - n * vn) * params.dt, n);

@@ -79,7 +79,8 @@ pub const SOURCES: &[(&str, &str)] = &[
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 18] = [
+pub const SCENE_DEFINES: [&str; 19] = [
+    "TIED",
     "SLIT",
     "BORE",
     "FREE_PATH",

@@ -111,6 +111,8 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     define("REGIONS", features.regions);
     define("TETRAHEDRA", features.tetrahedra);
     let separates = !features.tetrahedra && effects.cohesive.is_some() && effects.puncture.is_some();
+    // Grid lines are doubled where faces may separate: copies that stay together move as one.
+    define("TIED", !features.tetrahedra && effects.cohesive.is_some());
     define("BORE", features.bore && separates);
     define("SLIT", features.slit && separates);
     define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
@@ -987,7 +989,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             shift: vec4(plan.profile.shift),
             edge_radius: plan.profile.bore.map_or(0.0, |b| b.edge as f32),
             bore_radius: plan.profile.bore.map_or(0.0, |b| b.radius as f32),
-            bore_friction: plan.needle.bore.map_or(0.0, |b| b.friction as f32),
+            bore_grip: plan.needle.bore.map_or(0.0, |b| b.friction as f32),
             reference: vec4(plan.path.direction),
             free_low,
             free_count,
@@ -1122,14 +1124,15 @@ fn face_pairs(model: &Model, layout: &Layout) -> Vec<FacePair> {
     pairs
 }
 
-fn tied_nodes(model: &Model) -> Vec<[u32; 4]> {
+fn tied_nodes(model: &Model) -> Vec<TiedNode> {
     (0..model.mesh.node_count())
         .map(|node| {
             let mut copies = [u32::MAX; 4];
             let own = [node as u32];
             let tied = model.separation.tied(node).unwrap_or(&own);
             copies.iter_mut().zip(tied).for_each(|(place, copy)| *place = *copy);
-            copies
+            let whole: f64 = tied.iter().map(|n| model.node_mass[*n as usize]).sum();
+            TiedNode { copies, mass: model.node_mass[node] as f32, whole_mass: whole as f32, ..Zeroable::zeroed() }
         })
         .collect()
 }

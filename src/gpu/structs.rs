@@ -180,7 +180,7 @@ shared_structs! {
         shift: [f32; 4],
         edge_radius: f32,
         bore_radius: f32,
-        bore_friction: f32,
+        bore_grip: f32,
         _pad2: u32,
         reference: [f32; 4],
         free_low: [u32; 4],
@@ -238,6 +238,14 @@ shared_structs! {
         material: u32,
         _pad0: u32,
         _pad1: u32,
+    }
+    /// shaders/shared/tied_nodes.wgsl
+    struct TiedNode {
+        copies: [u32; 4],
+        mass: f32,
+        whole_mass: f32,
+        _pad0: f32,
+        _pad1: f32,
     }
     /// shaders/effects/cohesive.wgsl
     struct CohesiveParams {

@@ -188,22 +188,25 @@ impl FlexibleNeedle {
         }
         let h = self.beam.element_length();
         let count = self.beam.node_count();
-        // Where the hub was on the axis when the tissue gave these loads, and where it will be: a needle that keeps its shape
-        // finds the same loads there (cutting goes on), one that stays behind finds less.
+        // The loads belong to the middle of the frame. A needle that keeps its shape goes on with the hub and finds the same
+        // loads there (cutting goes on); one whose tip stays behind finds less. Of a tip that already stays behind, half of
+        // that motion is expected to go on: all of it would make the coupling unstable.
         let middle = 0.5 * (self.start.nodes[0] + self.end.nodes[0]);
         let straight_on = self.kinematics.pose(time).tip - axis * self.params.beam.length - middle;
-        let ahead = axis * axis.dot(straight_on);
+        let ahead = straight_on.dot(axis) - 0.5 * 1.5 * (self.end.retreat - self.start.retreat);
         for n in 1..count {
             let mean = 0.5 * (self.start.nodes[n] + self.end.nodes[n]);
-            let last = n == count - 1;
             // The top face of the tissue is z = 0.
-            if mean.z < 0.0 {
-                let k = self.tissue_stiffness * if last { 0.5 * h } else { h };
-                let along = if last { k + self.tip_stiffness } else { k };
-                let line = DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
-                let stiffness = (DMat3::IDENTITY - line) * k + line * along;
-                loads.springs[n] = Some(NodeSpring { stiffness, anchor: mean + ahead });
+            if mean.z >= 0.0 {
+                continue;
             }
+            let last = n == count - 1;
+            let k = self.tissue_stiffness * if last { 0.5 * h } else { h };
+            let mut spring = NodeSpring::lateral(k, axis, mean + axis * ahead);
+            if last {
+                spring.stiffness += DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z) * self.tip_stiffness;
+            }
+            loads.springs[n] = Some(spring);
         }
         self.step(loads, transmitted, time, length);
         record

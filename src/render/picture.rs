@@ -19,7 +19,7 @@ use super::stroke_font;
 use crate::mesh::Mesh;
 use crate::needle::gap::Profile;
 use crate::observables::FieldSnapshot;
-use crate::scene::{Scene, Tool};
+use crate::scene::{NeedleShape, Scene, Tool};
 
 /// Width where the scene names none, and bounds of what it may name [px].
 const DEFAULT_WIDTH: u32 = 900;
@@ -383,6 +383,8 @@ enum ToolShape {
     /// Cylinder behind a tip of the given length (0 for a flat end) [m], its axis beside the line of the apex [m]
     /// (positive towards `back.perp()`; 0 for a cone).
     Rod { radius: f64, cone: f64, beside: f64 },
+    /// Tube whose walls grow from the cutting edge to the outer and the inner radius over `ground` behind the tip [m].
+    Tube { outer: f64, inner: f64, edge: f64, ground: f64 },
     /// Sphere on a thin rod [m].
     Sphere { radius: f64 },
 }
@@ -393,6 +395,9 @@ impl ToolDrawing {
         let in_plane = |v: DVec3| DVec2::new(v.dot(plane.right), v.dot(plane.up));
         let back = (-in_plane(direction)).try_normalize().unwrap_or(DVec2::Y);
         let shape = match scene.tool.as_ref()? {
+            Tool::Needle(NeedleShape { radius, tip_length, bore: Some(bore), .. }) => {
+                ToolShape::Tube { outer: *radius, inner: bore.radius, edge: bore.edge, ground: *tip_length }
+            }
             Tool::Needle(needle) => {
                 let shift = Profile::new(needle, direction).shift;
                 let beside = needle.radius * in_plane(shift).dot(back.perp());
@@ -414,6 +419,11 @@ impl ToolDrawing {
                 let grown = if along < cone { along / cone } else { 1.0 };
                 along >= 0.0 && (across - beside * grown).abs() <= radius * grown
             }
+            ToolShape::Tube { outer, inner, edge, ground } => {
+                let grown = (along / ground).clamp(0.0, 1.0);
+                let walls = (edge + (inner - edge) * grown)..=(edge + (outer - edge) * grown);
+                along >= 0.0 && walls.contains(&across.abs())
+            }
             ToolShape::Sphere { radius } => (p - radius * self.back).length() <= radius,
         }
     }
@@ -423,6 +433,24 @@ impl ToolDrawing {
         let length = 4.0 * f64::from(layout.size.0 + layout.size.1) / layout.pixels_per_metre;
         match self.shape {
             ToolShape::Rod { .. } => self.draw_rod(canvas, layout, self.shape, length),
+            ToolShape::Tube { outer, inner, edge, ground } => {
+                for side in [-1.0, 1.0] {
+                    let at = |along: f64, across: f64| {
+                        layout.place(self.tip + along * self.back + side * across * self.back.perp())
+                    };
+                    let [light, dark] = [steel(-0.2), steel(0.6)];
+                    let tip = at(0.0, edge);
+                    canvas.patch([tip, tip, at(ground, inner), at(ground, outer)], [light, light, dark, light]);
+                    canvas.patch(
+                        [at(ground, outer), at(ground, inner), at(length, inner), at(length, outer)],
+                        [light, dark, dark, light],
+                    );
+                    for wall in [inner, outer] {
+                        canvas.round_line([tip, at(ground, wall)], 1.6 * layout.unit, INK);
+                        canvas.round_line([at(ground, wall), at(length, wall)], 1.6 * layout.unit, INK);
+                    }
+                }
+            }
             ToolShape::Sphere { radius } => {
                 let stem = Self { tip: self.tip + radius * self.back, ..*self };
                 let rod = ToolShape::Rod { radius: 0.25 * radius, cone: 0.0, beside: 0.0 };

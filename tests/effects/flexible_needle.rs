@@ -9,7 +9,7 @@ use stylet::model::Model;
 use stylet::needle::centre_line::{CentreLine, ENTRY_COUNT};
 use stylet::observables::FrameRecord;
 use stylet::scene::{Motion, NeedleShape, Phase, Scene, TipShape, Tool, Vibration};
-use stylet::solver::engine::{Engine, FramePlan, FrameSums, StepInput};
+use stylet::solver::engine::{FramePlan, FrameSums, StepInput};
 use stylet::solver::simulation::{EngineChoice, Simulation};
 
 use crate::common::*;
@@ -205,7 +205,7 @@ fn a_thin_needle_buckles_and_is_told() {
     assert!(last.needle.retreat < 8e-3, "the tip cannot stay further behind than the hub went");
     // A snap goes on within a frame, during which the beam sees the loads of the frame before: an error of the coupling, which
     // the account shows.
-    at_most("imbalance", imbalance(&records), 0.15);
+    at_most("imbalance", imbalance(&records), 0.2);
     // The tip is held by the tissue, so that up to the load of a clamped and pinned needle is needed.
     assert!(records.iter().all(|r| r.needle.compression < 2.0 * 8.18 * critical));
 }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::CpuEngine;
+use crate::needle::ToolPose;
 use crate::separation::FacePair;
 
 /// Overlap and slip of torn faces, in cells, beyond which they do not touch any more.
@@ -10,11 +11,12 @@ pub const TORN_REACH: f64 = 0.3;
 
 impl CpuEngine {
     /// Traction of every pair on its two copies, damage by opening, by the tip and by the shaft.
-    pub(super) fn cohesive_forces(&mut self) {
+    pub(super) fn cohesive_forces(&mut self, pose: Option<&ToolPose>) {
         let model = self.model.clone();
         let Some(law) = model.cohesion else { return };
         let h = model.scene.tissue.cell_size;
         let place = |node: u32| model.mesh.rest_position(node as usize) + self.state.displacement[node as usize];
+        let turned_back = model.has_bore() && pose.is_some_and(|p| p.velocity.dot(p.direction) < 0.0);
         let mut stored = 0.0;
         for (pair, damage) in model.separation.pairs.iter().zip(&mut self.state.pairs) {
             let [a, b] = pair.nodes.map(|n| n as usize);
@@ -27,6 +29,10 @@ impl CpuEngine {
             *damage = damage.max(law.damage(normal_opening, shear.length()));
             if let Some(s0) = pair.tip_driven {
                 *damage = damage.max(((self.state.tip_coordinate - s0) / h).clamp(0.0, 1.0));
+                // The core tears off as a whole when the needle turns back: no bond is left above its base.
+                if turned_back && s0 < self.state.tip_coordinate {
+                    *damage = 1.0;
+                }
                 // Where both copies lie on the full shaft the bond is gone.
                 let on_shaft = |node: usize| {
                     let at = model.contact_nodes.binary_search_by_key(&(node as u32), |c| c.node);

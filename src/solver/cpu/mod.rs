@@ -132,7 +132,7 @@ impl CpuEngine {
         }
         self.element_forces(input);
         self.added_bound.fill(0.0);
-        self.cohesive_forces();
+        self.cohesive_forces(input.pose.as_ref());
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             self.needle_contact(plan, &pose, input.step);
         }
