@@ -272,7 +272,8 @@ impl CpuEngine {
         sums.hourglass = measures.iter().map(|m| m.hourglass).sum();
         sums.viscous_dissipation = measures.iter().map(|m| m.viscous).sum();
         // What deletion has taken out may be turned inside out.
-        let present = || measures.iter().filter(|m| m.damage < 1.0);
+        let is_severed = |cell: usize| state.stiffness.get(cell) == Some(&0.0);
+        let present = || measures.iter().enumerate().filter(|(c, m)| m.damage < 1.0 && !is_severed(*c)).map(|(_, m)| m);
         sums.deleted_cells = (measures.len() - present().count()) as u32;
         sums.largest_damage = measures.iter().map(|m| m.damage).fold(0.0, f64::max);
         sums.min_j = present().map(|m| m.jacobian).fold(f64::INFINITY, f64::min);
