@@ -279,8 +279,10 @@ impl CpuEngine {
         sums.min_j = present().map(|m| m.jacobian).fold(f64::INFINITY, f64::min);
         sums.min_corner_j = present().map(|m| m.corner_jacobian).fold(f64::INFINITY, f64::min);
         let inverted = |m: &CellMeasure| m.damage < 1.0 && (m.jacobian <= 0.0 || m.corner_jacobian <= 0.0);
-        sums.inverted_cells = measures.iter().filter(|m| inverted(m)).count() as u32;
-        sums.inverted_cell = measures.iter().position(inverted).map(|c| c as u32);
+        let mut broken =
+            measures.iter().enumerate().filter(|(c, m)| inverted(m) && !is_severed(*c)).map(|(c, _)| c as u32);
+        sums.inverted_cell = broken.next();
+        sums.inverted_cells = u32::from(sums.inverted_cell.is_some()) + broken.count() as u32;
         let dissipated = state.points.iter().enumerate().fold((0.0, 0.0), |sum, (cell, p)| {
             let v = model.mesh.cell_volume(cell);
             (sum.0 + v * p.plastic_dissipation, sum.1 + v * p.damage_dissipation)
