@@ -44,25 +44,27 @@ impl Recorder {
         let mean_pose = model.kinematics.as_ref().map(|k| k.pose(0.5 * (begin + end)));
         let direction = mean_pose.map_or(DVec3::ZERO, |p| p.direction);
         let force = sums.impulse / duration;
-        let inertia = inertia(model, end);
+        let mut parts = ForceParts {
+            cutting: sums.cutting_impulse / duration,
+            membrane: sums.membrane_impulse / duration,
+            tip_spreading: (sums.spreading_impulse - sums.shaft_impulse) / duration,
+            shaft_spreading: sums.shaft_impulse / duration,
+            friction: sums.friction_impulse / duration,
+            adhesion: sums.adhesion_impulse / duration,
+            inertia: inertia(model, end),
+            lateral: force - direction * force.dot(direction),
+            torque: sums.angular_impulse / duration,
+            ..Default::default()
+        };
+        // The parts were summed along the direction of each step, which on a free path turns within a frame.
+        parts.axial = ForceParts::PARTS.iter().map(|part| (part.of)(&parts)).sum();
         FrameRecord {
             frame: sums.frame,
             step: self.step,
             time: end,
             depth: mean_pose.map_or(0.0, |p| p.depth),
             phase: mean_pose.map_or(0, |p| p.phase),
-            force: ForceParts {
-                axial: force.dot(direction) + inertia,
-                cutting: sums.cutting_impulse / duration,
-                membrane: sums.membrane_impulse / duration,
-                tip_spreading: (sums.spreading_impulse - sums.shaft_impulse) / duration,
-                shaft_spreading: sums.shaft_impulse / duration,
-                friction: sums.friction_impulse / duration,
-                adhesion: sums.adhesion_impulse / duration,
-                inertia,
-                lateral: force - direction * force.dot(direction),
-                torque: sums.angular_impulse / duration,
-            },
+            force: parts,
             tip_coordinate: sums.tip_coordinate,
             reactions: sums.reactions,
             energy: *e,

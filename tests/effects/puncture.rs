@@ -117,6 +117,14 @@ fn both_engines_see_the_same_first_millimetres() {
     let duration = STEPS as f64 * dt;
     let runs: Vec<Vec<FrameSums>> =
         engines(&model, dt, STEPS).into_iter().map(|(_, mut e)| run(e.as_mut(), &model, dt, false).0).collect();
+    for run in &runs {
+        for f in run {
+            let parts =
+                f.cutting_impulse + f.membrane_impulse + f.spreading_impulse + f.friction_impulse + f.adhesion_impulse;
+            // Sums of f32 in another order; 0.6 N over the frame.
+            assert!((parts + f.impulse.z).abs() <= 1e-5 * 0.6 * duration, "{parts:e} N s of {:e}", -f.impulse.z);
+        }
+    }
     let [cpu, gpu] = &runs[..] else { return };
     let force = |f: &FrameSums| -f.impulse.z / duration;
     let largest = cpu.iter().map(force).fold(0.0, f64::max);

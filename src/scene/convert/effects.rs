@@ -143,6 +143,19 @@ impl Check<'_> {
         let adhesion = self.adhesion(&file.adhesion.clone().unwrap_or_default());
         let friction = self.friction(&file.friction.clone().unwrap_or_default());
         let indentation = self.indentation(&file.indentation.clone().unwrap_or_default());
+        if motion.is_free() || puncture.always_free {
+            if listed("adhesion") {
+                self.problems.report(
+                    &place("adhesion"),
+                    "effect `adhesion` needs a path that is planned before the run",
+                    "the path of this scene is found while the tip moves",
+                    "write a straight motion and drop puncture.path = \"free\", or remove \"adhesion\"",
+                );
+            }
+            if puncture.rate_exponent != 0.0 {
+                self.notices.push("`puncture.rate_exponent` has no effect on a free path.".into());
+            }
+        }
         if listed("flexible_needle") && (motion.is_free() || puncture.always_free) {
             self.problems.report(
                 &place("flexible_needle"),

@@ -149,7 +149,8 @@ impl Check<'_> {
             self.snap_back(file, index, material, tissue.cell_size, &effects);
         }
         if mesh.is_none() {
-            self.geometry(&tissue, tool.as_ref(), &motion, &faces[Face::ZMin as usize]);
+            let open_bottom = faces[Face::ZMin as usize].fixed == [false; 3] && effects.cohesive.is_none();
+            self.geometry(&tissue, tool.as_ref(), &motion, open_bottom);
         }
         self.overlaps(&regions, &tissue, mesh.as_deref());
         self.problems.check()?;
@@ -543,7 +544,7 @@ impl Check<'_> {
     }
 
     /// The path stays inside the block.
-    fn geometry(&mut self, tissue: &Tissue, tool: Option<&Tool>, motion: &Motion, bottom: &FaceCondition) {
+    fn geometry(&mut self, tissue: &Tissue, tool: Option<&Tool>, motion: &Motion, open_bottom: bool) {
         let Some(tool) = tool else { return };
         let half = tissue.size * 0.5;
         let show = |p: DVec3| format!("({:.3}, {:.3}, {:.3}) mm", p.x / MM, p.y / MM, p.z / MM);
@@ -563,7 +564,7 @@ impl Check<'_> {
             return;
         }
         // A needle may leave through the bottom; what it does below does not matter here.
-        let through = matches!(tool, Tool::Needle(_)) && bottom.fixed == [false; 3];
+        let through = matches!(tool, Tool::Needle(_)) && open_bottom;
         let end = motion.deepest_point_in(tissue.size.z);
         // The shaft of a needle is inside the tissue, a sphere or punch is not.
         let radius = match tool {
