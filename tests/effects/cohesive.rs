@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 use serde_json::Value;
 use stylet::effects::cohesive::{Law, Params, Plane};
 use stylet::effects::{mass_scaling, puncture};
+use stylet::material::ElasticLaw;
 use stylet::model::Model;
 use stylet::scene::{BoreShape, FaceDrive, NeedleShape, Phase, Tool};
 use stylet::solver::engine::{Engine, FrameSums, State};
@@ -67,9 +68,12 @@ fn tables_of_the_law() {
     close("critical length", longest, number(&bar["critical_length_m"]), 1e-9);
 }
 
-/// A thin column of material A, 0.5 mm tall, torn on a plane at mid height; sides on rollers.
+/// A thin column, 0.5 mm tall, torn on a plane at mid height; sides on rollers. Ten times stiffer than material A: with a
+/// softer one the uniform opening is unstable, one side tears first (seen in f32, whose rounding starts it) and the mixed
+/// mode takes 9 % more.
 fn column(cell: f64, shear: bool) -> Arc<Model> {
     let mut scene = block([1.0, 1.0, 0.5], cell);
+    scene.material.law = ElasticLaw::from_moduli(66e3, 2e6, 0.7);
     scene.effects.cohesive = Some(Params {
         strength: 26e3,
         shear_strength: 40e3,
@@ -80,7 +84,7 @@ fn column(cell: f64, shear: bool) -> Arc<Model> {
         planes: vec![Plane { axis: 2, at: -0.25e-3 }],
         ..Params::default()
     });
-    scene.effects.mass_scaling = Some(mass_scaling::Params { factor: 300.0 });
+    scene.effects.mass_scaling = Some(mass_scaling::Params { factor: 1200.0 });
     scene.solver.mass_damping = 200.0;
     for face in 0..4 {
         // In shear nothing but the sliding direction moves, so that the state stays homogeneous.
