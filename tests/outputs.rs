@@ -232,6 +232,7 @@ fn a_named_folder_is_made_and_not_reused() {
         "summary.json",
         "force.svg",
         "force_parts.svg",
+        "core.csv",
         "sample.csv",
         "sample.svg",
         "frames.pvd",

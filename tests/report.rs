@@ -138,22 +138,20 @@ fn a_hollow_needle_has_a_section_where_its_scene_exists() {
     assert!(output.status.success(), "{}", errors(&output));
     assert!(page(&out).contains("The run tells nothing about a core."));
 
-    // What a run of a hollow needle adds to its files shows without a change of the report.
+    // What a run of a hollow needle adds to its files.
     let summary = out.join("hollow/summary.json");
     let text = std::fs::read_to_string(&summary).unwrap();
-    std::fs::write(&summary, text.replacen("{", "{\n  \"core_length_m\": 0.00425,", 1)).unwrap();
-    let table = out.join("hollow/force.csv");
-    let rows = std::fs::read_to_string(&table).unwrap();
-    let rows: Vec<String> = rows
-        .lines()
-        .enumerate()
-        .map(|(n, row)| if n == 0 { format!("{row},core_length_m") } else { format!("{row},{}", 1e-5 * n as f64) })
-        .collect();
-    std::fs::write(&table, rows.join("\n")).unwrap();
+    std::fs::write(&summary, text.replace("\"core_length_m\": null", "\"core_length_m\": 0.00425")).unwrap();
+    std::fs::write(
+        out.join("hollow/core.csv"),
+        "time_s,depth_m,tip_coordinate_m,length_m,rest_length_m,strain,mass_kg,severed\n\
+         0.1,0.001,0.001,0,0,0,0,0\n0.2,0.002,0.002,0.001,0.0011,-0.09,1e-6,0\n",
+    )
+    .unwrap();
     let output = call(&[&arguments[..], &sets].concat());
     assert_eq!(errors(&output).matches("reused").count(), 4, "{}", errors(&output));
     let text = page(&out);
-    assert!(text.contains("<td>core_length_m</td><td class=\"number\">0.00425</td>"));
+    assert!(text.contains("<td>length in the bore, mm</td><td class=\"number\">4.25</td>"));
     assert!(text.contains("length of the core [mm]") && !text.contains("all its needles are solid"));
 }
 

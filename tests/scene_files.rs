@@ -213,26 +213,26 @@ fn wrong_motion() {
 
 #[test]
 fn free_motions_that_cannot_be() {
-    let hold = "kind = \"hold\"\nduration_s = 0.5";
+    let hold = "[[motion.phase]]\nkind = \"hold\"\nduration_s = 0.5";
     for (phase, marker, expected) in [
-        ("kind = \"move\"\nspeed_mm_s = 2.0", "[[motion.phase]]", "add to_mm"),
-        ("kind = \"move\"\nto_mm = [3.0, 0.0, -8.0]", "[[motion.phase]]", "add speed_mm_s"),
+        ("kind = \"move\"\nspeed_mm_s = 2.0", "# this", "add to_mm"),
+        ("kind = \"move\"\nto_mm = [3.0, 0.0, -8.0]", "# this", "add speed_mm_s"),
         ("kind = \"move\"\nspeed_mm_s = 2.0\nto_mm = [0.0, 0.0, -12.0]", "to_mm", "is there already"),
-        ("kind = \"move\"\nspeed_mm_s = 2.0\nto_mm = [9.5, 0.0, -8.0]", "[[motion.phase]]", "less than"),
-        ("kind = \"move\"\nspeed_mm_s = 2.0\nto_mm = [1.0, 0.0, -15.5]", "[[motion.phase]]", "above z = -15.000"),
+        ("kind = \"move\"\nspeed_mm_s = 2.0\nto_mm = [9.5, 0.0, -8.0]", "# this", "less than"),
+        ("kind = \"move\"\nspeed_mm_s = 2.0\nto_mm = [1.0, 0.0, -15.5]", "# this", "above z = -15.000"),
         (
             "kind = \"move\"\nspeed_mm_s = 2.0\nto_mm = [1.0, 0.0, -8.0]\nduration_s = 1.0",
             "duration_s",
             "remove this key",
         ),
-        ("kind = \"turn\"\nrate_deg_s = 10.0", "[[motion.phase]]", "add angle_deg"),
-        ("kind = \"turn\"\nrate_deg_s = 10.0\nangle_deg = 0.0", "[[motion.phase]]", "direction already"),
+        ("kind = \"turn\"\nrate_deg_s = 10.0", "# this", "add angle_deg"),
+        ("kind = \"turn\"\nrate_deg_s = 10.0\nangle_deg = 0.0", "# this", "direction already"),
         ("kind = \"turn\"\nrate_deg_s = 10.0\nangle_deg = 85.0", "angle_deg", "from 0 to 80"),
-        ("kind = \"turn\"\nangle_deg = 10.0", "[[motion.phase]]", "add rate_deg_s"),
+        ("kind = \"turn\"\nangle_deg = 10.0", "# this", "add rate_deg_s"),
         ("kind = \"reposition\"\nentry_mm = [3.0, 0.0]", "kind = \"reposition\"", "12 mm deep"),
         ("kind = \"hold\"\nduration_s = 0.5\npivot_mm = [0.0, 0.0, 0.0]", "pivot_mm", "remove this key"),
     ] {
-        assert_refused(&[(hold, phase)], marker, &[expected]);
+        assert_refused(&[(hold, &format!("[[motion.phase]] # this\n{phase}"))], marker, &[expected]);
     }
 }
 

@@ -47,6 +47,7 @@ struct FreeCell {
 // Constants of src/needle/free_path.rs.
 const SAMPLES: f32 = 4.0;
 const SLACK: f32 = 0.2e-3;
+const TURNING: f32 = 0.3e-3;
 const MARKED_BEHIND: f32 = 0.5;
 const LOOK_AHEAD: f32 = 1.05;
 const PASSED_MARGIN: f32 = 0.05e-3;

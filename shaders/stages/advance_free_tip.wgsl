@@ -149,9 +149,7 @@ fn move_tip() {
     }
     sway -= t * dot(sway, t);
     old_sway = sway;
-    let back = pulled_back(fx, fy, fz, t);
-    let turned = dot(back, back) > 1e-6;
-    let direction = select(free_tip.along.xyz, back * inverseSqrt(max(dot(back, back), 1e-12)), turned);
+    let direction = free_tip.along.xyz;
     let stretch = clamp(dot(fx * direction.x + fy * direction.y + fz * direction.z, t), 0.2, 3.0);
 
     // What lies just ahead: farther than a sample that the tip's plane has marked.
@@ -193,18 +191,21 @@ fn move_tip() {
     let next = X + direction * (advance - retreat) + slip;
     let coordinate = max(free_tip.coordinate + advance - retreat, 0.0);
     let leaves = retreat > 0.0 && next.z > 0.0;
-    let across = free_tip.across.xyz;
     free_tip.material = material;
     free_tip.advance = select(0.0, advance + length(slip), retreat == 0.0 && coordinate > 0.0);
     free_tip.inside = select(1.0, 0.0, leaves);
     free_tip.coordinate = select(coordinate, 0.0, leaves);
     free_tip.entry = select(entry, 0.0, leaves);
     free_tip.place = vec4<f32>(select(within_block(next), next, leaves), 0.0);
-    free_tip.along = select(free_tip.along, vec4<f32>(direction, 0.0), goes);
-    free_tip.across = vec4<f32>(
-        select(across, normalize(across - direction * dot(across, direction)), goes),
-        0.0,
-    );
+    // T follows the pulled-back direction of the needle.
+    let wanted = pulled_back(fx, fy, fz, t);
+    let square = dot(wanted, wanted);
+    let way = (advance + retreat + length(slip)) / TURNING;
+    let part = select(0.0, min(way, 1.0), square > 1e-6);
+    let along = normalize(mix(direction, wanted * inverseSqrt(max(square, 1e-12)), part));
+    let across = free_tip.across.xyz;
+    free_tip.along = vec4<f32>(along, 0.0);
+    free_tip.across = vec4<f32>(normalize(across - along * dot(across, along)), 0.0);
 }
 
 @compute @workgroup_size(32)

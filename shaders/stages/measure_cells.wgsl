@@ -37,16 +37,16 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     for (var index = thread; index < params.cell_count; index += params.measure_threads) {
         let cell = measured_cell(index);
         let energy = cell.energy;
-        sums.overstretched_cells += select(0u, 1u, cell.apart > LARGEST_DIFFERENCE && cell.volume > 0.0);
         sums.elastic += energy.elastic;
         sums.hourglass += energy.hourglass;
 #ifdef HISTORY
         book_history(&sums, index, cell.volume, energy.held);
 #endif
-        sums.least_intact = min(sums.least_intact, energy.intact / cell.kept);
+        sums.least_intact = min(sums.least_intact, select(1.0, energy.intact / cell.kept, cell.kept > 0.0));
         // What has been deleted may be turned inside out; a gap between two copies of a line is no tissue.
         let tissue = cell.volume > 0.0;
         let present = tissue && energy.intact > 0.0;
+        sums.overstretched_cells += select(0u, 1u, cell.apart > LARGEST_DIFFERENCE && present);
         sums.deleted_cells += select(0u, 1u, tissue && !present);
         sums.min_jacobian = select(sums.min_jacobian, min(sums.min_jacobian, energy.jacobian), present);
         let smallest = min(sums.min_corner_jacobian, energy.corner_jacobian);

@@ -52,7 +52,7 @@ fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> FreeCo
     let old = contact_memory[index].passed == 1.0;
     // The dimple before the puncture is no opened path.
     let passes = free_tip.coordinate > 0.0 && ahead <= 0.0 && ahead > -ring && radius < ring;
-    let passed = free_tip.inside == 1.0 && select(passes, ahead <= 0.0 || s > -PASSED_MARGIN, old);
+    let passed = free_tip.inside == 1.0 && s > -PASSED_MARGIN && (old || passes);
     for (var once = select(1u, 0u, passed != old); once == 0u; once++) {
         var fresh = ContactMemory();
         fresh.passed = select(0.0, 1.0, passed);

@@ -8,7 +8,7 @@
 //! anchors   X_k = X + o_k, o_k in the plane through X normal to T (not above the surface), k = 1..N
 //! gaps      g_k = (p - x(X_k)).t + (X_k - X).T,  force k_tip/N max(0, g_k) along t
 //! sway      l = (1 - t t)(p - <x(X_k)> + <X_k - X>),  force k_tip/N l on every anchor: the tissue holds the tip
-//! advance   where F = sum of the forces > F_c:  X += T da,  T = F^-1 t/|F^-1 t|,  da as in the tip law
+//! advance   where F = sum of the forces > F_c:  X += T da,  da as in the tip law;  T follows F^-1 t/|F^-1 t| over TURNING
 //! slip      where k_tip |l| > min(F, F_c):  X += F^-1 (the part of l that is too long)
 //! retreat   where <g_k> < -SLACK:  X -= T (-SLACK - <g_k>)/lambda, without force: the needle draws back in its own track
 //! ```
@@ -41,6 +41,10 @@ pub const SAMPLES: usize = 4;
 /// Gap between the retreating tip and the material point that it leaves behind [m].
 pub const SLACK: f64 = 0.2e-3;
 
+/// Way over which T turns to the pulled-back direction of the needle [m]. With T always there, the anchors follow every tilt
+/// of the tissue around them instead of resisting it, and the tip rattles (438 clamped nodes on the way to 12 mm).
+pub const TURNING: f64 = 0.3e-3;
+
 /// Depth behind the tip's plane in which samples are marked, in softened radii.
 pub const MARKED_BEHIND: f64 = 0.5;
 
@@ -48,7 +52,7 @@ pub const MARKED_BEHIND: f64 = 0.5;
 pub const LOOK_AHEAD: f64 = 1.05;
 
 /// How far before the tip a passed node may come in space until it counts as not passed [m]. In sheared tissue the plane
-/// normal to T is oblique to the needle: by that plane alone loaded nodes would be let go (7 % of all work was lost).
+/// normal to T is oblique to the needle, and by that plane alone loaded nodes would be let go.
 pub const PASSED_MARGIN: f64 = 0.05e-3;
 
 /// Distance from the needle's axis, in needle radii, from which a node that the tip has not passed is watched.
@@ -58,7 +62,7 @@ pub const WATCHED: f64 = 1.5;
 pub const SLIP_CAP: f64 = 13e-6;
 
 /// Largest loss of stiffness of a cell, as a part of the whole, per cell edge of advance: a plane of samples is passed at
-/// once, and a jump of a quarter of the stiffness shakes the tissue (with cells of 0.6 mm 438 clamped nodes).
+/// once, and a jump of a quarter of the stiffness would shake the tissue.
 pub const SOFTENING_RATE: f64 = 1.5;
 
 /// Length over which the overlap fades at the front end of what a node touches, in tip lengths.

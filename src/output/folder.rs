@@ -23,8 +23,17 @@ pub const FIELD_COLLECTION: &str = "frames.pvd";
 /// Folder of the VTU files `frame_00012.vtu`.
 pub const FIELD_FOLDER: &str = "frames";
 
-const SINGLE_FILES: [&str; 8] =
-    [FORCE_TABLE, ENERGY_TABLE, SUMMARY, FORCE_CHART, FORCE_PARTS_CHART, SAMPLE_TABLE, SAMPLE_CHART, FIELD_COLLECTION];
+const SINGLE_FILES: [&str; 9] = [
+    FORCE_TABLE,
+    ENERGY_TABLE,
+    SUMMARY,
+    FORCE_CHART,
+    FORCE_PARTS_CHART,
+    SAMPLE_TABLE,
+    CORE_TABLE,
+    SAMPLE_CHART,
+    FIELD_COLLECTION,
+];
 
 /// Where numbered folders go when the user names none.
 const DEFAULT_BASE: &str = "out";
@@ -246,6 +255,7 @@ mod tests {
             "summary.json.part",
             "force.svg",
             "force_parts.svg",
+            "core.csv",
             "sample.csv",
             "sample.svg",
             "frames.pvd",

@@ -5,7 +5,7 @@ pub mod lv2022;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::folder::{FORCE_TABLE, PictureMoment, SUMMARY};
+use super::folder::{CORE_TABLE, FORCE_TABLE, PictureMoment, SUMMARY};
 use super::parts_chart::ForceStack;
 use super::summary::Summary;
 use crate::observables::ForceParts;
@@ -24,52 +24,37 @@ pub struct CaseResults {
     pub summary: Summary,
     /// Everything that the summary file holds, keys that this version does not know included, in the order of the file.
     pub figures: Vec<(String, serde_json::Value)>,
-    /// Columns of the force table by name; an empty cell is NaN.
-    pub force: BTreeMap<String, Vec<f64>>,
+    pub force: Columns,
+    /// With a hollow needle.
+    pub core: Option<Columns>,
 }
 
-impl CaseResults {
-    /// Reads the folder of a run. The error tells the file and what is wrong with it.
-    pub fn read(name: &str, scene: Scene, folder: &Path, finished: &str) -> Result<Self> {
-        let path = folder.join(SUMMARY);
-        let broken = |path: &Path, reason: &dyn std::fmt::Display| {
-            Error::file(path, std::io::Error::other(format!("not what a run of this version writes: {reason}")))
-        };
-        let text = std::fs::read_to_string(&path).map_err(|reason| Error::file(&path, reason))?;
-        let summary: Summary = serde_json::from_str(&text).map_err(|reason| broken(&path, &reason))?;
-        let all: serde_json::Map<String, serde_json::Value> =
-            serde_json::from_str(&text).map_err(|reason| broken(&path, &reason))?;
-        let mut figures: Vec<(String, serde_json::Value)> = all.into_iter().collect();
-        figures.sort_by_key(|(key, _)| text.find(&format!("\"{key}\":")));
+/// A table of numbers by the name of its columns; an empty cell is NaN.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Columns(BTreeMap<String, Vec<f64>>);
 
-        let path = folder.join(FORCE_TABLE);
-        let mut reader = csv::Reader::from_path(&path).map_err(|reason| Error::file(&path, reason.into()))?;
+impl Columns {
+    fn read(path: &Path) -> Result<Self> {
+        let mut reader = csv::Reader::from_path(path).map_err(|reason| Error::file(path, reason.into()))?;
         let names: Vec<String> =
-            reader.headers().map_err(|reason| broken(&path, &reason))?.iter().map(str::to_string).collect();
-        let mut force: BTreeMap<String, Vec<f64>> = names.iter().map(|name| (name.clone(), Vec::new())).collect();
+            reader.headers().map_err(|reason| broken(path, &reason))?.iter().map(str::to_string).collect();
+        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
         for row in reader.records() {
-            let row = row.map_err(|reason| broken(&path, &reason))?;
-            for (name, field) in names.iter().zip(row.iter()) {
+            let row = row.map_err(|reason| broken(path, &reason))?;
+            for ((name, column), field) in names.iter().zip(&mut columns).zip(row.iter()) {
                 let value = if field.is_empty() { Ok(f64::NAN) } else { field.parse() };
-                let value = value.map_err(|_| broken(&path, &format!("`{field}` in the column {name}")))?;
-                force.entry(name.clone()).or_default().push(value);
+                column.push(value.map_err(|_| broken(path, &format!("`{field}` in the column {name}")))?);
             }
         }
-        let needed = ["time_s", "depth_m", "axial_force_n"];
-        let missing = needed.into_iter().chain(ForceParts::PARTS.map(|p| p.column)).find(|c| !force.contains_key(*c));
-        if let Some(column) = missing {
-            return Err(broken(&path, &format!("the column {column} is missing")));
-        }
-        let (name, folder, finished) = (name.into(), folder.into(), finished.into());
-        Ok(Self { name, scene, folder, finished, summary, figures, force })
+        Ok(Self(names.into_iter().zip(columns).collect()))
     }
 
-    /// A column of the force table; nothing where the run has none of that name.
+    /// A column; nothing where the table has none of that name.
     pub fn column(&self, name: &str) -> &[f64] {
-        self.force.get(name).map_or(&[], Vec::as_slice)
+        self.0.get(name).map_or(&[], Vec::as_slice)
     }
 
-    /// Rows of the force table deeper than every row before them.
+    /// Rows deeper than every row before them.
     pub fn way_in(&self) -> Vec<usize> {
         let mut deepest = f64::NEG_INFINITY;
         let mut rows = Vec::new();
@@ -83,16 +68,50 @@ impl CaseResults {
     }
 
     /// Depth [m] and the value of a column on the way in.
-    pub fn curve(&self, column: &str) -> Vec<(f64, f64)> {
-        let (depth, value) = (self.column("depth_m"), self.column(column));
+    pub fn curve(&self, name: &str) -> Vec<(f64, f64)> {
+        let (depth, value) = (self.column("depth_m"), self.column(name));
         self.way_in().into_iter().filter_map(|row| Some((depth[row], *value.get(row)?))).collect()
+    }
+}
+
+fn broken(path: &Path, reason: &dyn std::fmt::Display) -> Error {
+    Error::file(path, std::io::Error::other(format!("not what a run of this version writes: {reason}")))
+}
+
+impl CaseResults {
+    /// Reads the folder of a run. The error tells the file and what is wrong with it.
+    pub fn read(name: &str, scene: Scene, folder: &Path, finished: &str) -> Result<Self> {
+        let path = folder.join(SUMMARY);
+        let text = std::fs::read_to_string(&path).map_err(|reason| Error::file(&path, reason))?;
+        let summary: Summary = serde_json::from_str(&text).map_err(|reason| broken(&path, &reason))?;
+        let all: serde_json::Map<String, serde_json::Value> =
+            serde_json::from_str(&text).map_err(|reason| broken(&path, &reason))?;
+        let mut figures: Vec<(String, serde_json::Value)> = all.into_iter().collect();
+        figures.sort_by_key(|(key, _)| text.find(&format!("\"{key}\":")));
+
+        let path = folder.join(FORCE_TABLE);
+        let force = Columns::read(&path)?;
+        let needed = ["time_s", "depth_m", "axial_force_n"];
+        let missing = needed.into_iter().chain(ForceParts::PARTS.map(|p| p.column)).find(|c| !force.0.contains_key(*c));
+        if let Some(column) = missing {
+            return Err(broken(&path, &format!("the column {column} is missing")));
+        }
+        let path = folder.join(CORE_TABLE);
+        let core = path.exists().then(|| Columns::read(&path)).transpose()?;
+        let (name, folder, finished) = (name.into(), folder.into(), finished.into());
+        Ok(Self { name, scene, folder, finished, summary, figures, force, core })
+    }
+
+    /// Depth [m] and a column of the force table on the way in.
+    pub fn curve(&self, column: &str) -> Vec<(f64, f64)> {
+        self.force.curve(column)
     }
 
     /// Parts of the force over the depth on the way in.
     pub fn stack(&self) -> ForceStack {
-        let rows = self.way_in();
+        let rows = self.force.way_in();
         let at = |column: &str, scale: f64| -> Vec<f64> {
-            let column = self.column(column);
+            let column = self.force.column(column);
             rows.iter().map(|&row| column[row] * scale).collect()
         };
         ForceStack {

@@ -502,7 +502,7 @@ impl Check<'_> {
             let Some(list) = list else { continue };
             let path = format!("outputs.{key}");
             let by_time_too = has_tool && motion.is_free();
-            if by_depth != has_tool && !(by_time_too && !by_depth) {
+            if by_depth != has_tool && (by_depth || !by_time_too) {
                 let (has, other) = if has_tool { ("a tool", "depth_mm") } else { ("no tool", "s") };
                 let stem = key.trim_end_matches("_depth_mm").trim_end_matches("_s");
                 self.problems.report(

@@ -8,7 +8,7 @@ use crate::mesh::BlockMesh;
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
 use crate::needle::ToolPose;
 use crate::needle::free_path::{
-    FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SLACK, SLIP_CAP, SOFTENING_RATE, anchor_offset,
+    FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SLACK, SLIP_CAP, SOFTENING_RATE, TURNING, anchor_offset,
 };
 use crate::solver::elements::CORNERS;
 
@@ -128,8 +128,7 @@ impl CpuEngine {
         let mut moved = false;
         if tip.inside {
             let f = before.gradient;
-            let direction = pulled_back(f, t);
-            let direction = if direction.length() > 1e-3 { direction.normalize() } else { tip.along };
+            let direction = tip.along;
             let stretch = (f * direction).dot(t).clamp(0.2, 3.0);
             // What lies just ahead: farther than a sample that the tip's plane has marked.
             let (cell, _, width) = grid_place(mesh, within_block(mesh, tip.place));
@@ -174,8 +173,12 @@ impl CpuEngine {
             if moved {
                 tip.place += direction * (advance - retreat) + slip;
                 tip.coordinate = (tip.coordinate + advance - retreat).max(0.0);
-                tip.along = direction;
-                tip.across = (tip.across - direction * tip.across.dot(direction)).normalize();
+                let wanted = pulled_back(f, t);
+                if wanted.length() > 1e-3 {
+                    let part = ((advance + retreat + slip.length()) / TURNING).min(1.0);
+                    tip.along = direction.lerp(wanted.normalize(), part).normalize();
+                }
+                tip.across = tip.across.reject_from(tip.along).normalize();
                 if retreat == 0.0 && tip.coordinate > 0.0 {
                     tip.advance = advance + slip.length();
                 }

@@ -272,14 +272,17 @@ impl CpuEngine {
         sums.hourglass = measures.iter().map(|m| m.hourglass).sum();
         sums.viscous_dissipation = measures.iter().map(|m| m.viscous).sum();
         // What deletion has taken out may be turned inside out.
-        let present = || measures.iter().filter(|m| m.damage < 1.0);
+        let is_severed = |cell: usize| state.stiffness.get(cell) == Some(&0.0);
+        let present = || measures.iter().enumerate().filter(|(c, m)| m.damage < 1.0 && !is_severed(*c)).map(|(_, m)| m);
         sums.deleted_cells = (measures.len() - present().count()) as u32;
         sums.largest_damage = measures.iter().map(|m| m.damage).fold(0.0, f64::max);
         sums.min_j = present().map(|m| m.jacobian).fold(f64::INFINITY, f64::min);
         sums.min_corner_j = present().map(|m| m.corner_jacobian).fold(f64::INFINITY, f64::min);
         let inverted = |m: &CellMeasure| m.damage < 1.0 && (m.jacobian <= 0.0 || m.corner_jacobian <= 0.0);
-        sums.inverted_cells = measures.iter().filter(|m| inverted(m)).count() as u32;
-        sums.inverted_cell = measures.iter().position(inverted).map(|c| c as u32);
+        let mut broken =
+            measures.iter().enumerate().filter(|(c, m)| inverted(m) && !is_severed(*c)).map(|(c, _)| c as u32);
+        sums.inverted_cell = broken.next();
+        sums.inverted_cells = u32::from(sums.inverted_cell.is_some()) + broken.count() as u32;
         let dissipated = state.points.iter().enumerate().fold((0.0, 0.0), |sum, (cell, p)| {
             let v = model.mesh.cell_volume(cell);
             (sum.0 + v * p.plastic_dissipation, sum.1 + v * p.damage_dissipation)

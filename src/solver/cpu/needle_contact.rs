@@ -152,7 +152,7 @@ fn free_contact(
     let radius = (relative - tip.along * ahead).length();
     // The dimple before the puncture is no opened path.
     let passes = tip.coordinate > 0.0 && ahead <= 0.0 && ahead > -ring && radius < ring;
-    let passed = tip.inside && if memory.passed { ahead <= 0.0 || s > -PASSED_MARGIN } else { passes };
+    let passed = tip.inside && s > -PASSED_MARGIN && (memory.passed || passes);
     if passed != memory.passed {
         *memory = ContactState { passed, rest_radius: if passed { radius } else { 0.0 }, ..ContactState::default() };
     }
