@@ -7,7 +7,7 @@ struct AdhesionParams {
     sliding_distance: f32,
 }
 
-@group(0) @binding(12) var<uniform> adhesion: AdhesionParams;
+@group(0) @binding(14) var<uniform> adhesion: AdhesionParams;
 
 // Stretch and distance slid after a relative motion dx; `p`: the uniform, read outside branches.
 fn advance_adhesion(p: AdhesionParams, stretch: f32, slid: f32, dx: f32) -> vec2<f32> {

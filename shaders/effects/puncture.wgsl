@@ -39,8 +39,8 @@ struct PunctureParams {
     // Exponent of the speed in the tip forces, and the speed up to which they are the written ones [m/s].
     rate_exponent: f32,
     reference_speed: f32,
-    // Length before the exit over which the threshold fades to nothing [m].
-    exit_fade: f32,
+    // Length over which the threshold falls behind the entry of a material, and to nothing before the exit [m].
+    transition_length: f32,
     // Of a free path: of material number i only F_pun and F_cut [N], second and third. Of a planned path: stretches of
     // the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], length over which the
     // threshold falls from one to the other [m].
@@ -127,7 +127,7 @@ fn tip_threshold(a: f32, speed: f32) -> f32 {
     let ratio = max(speed, puncture.reference_speed) / puncture.reference_speed;
     // Without a rate the law is exactly that without this factor.
     let rate = select(pow(ratio, puncture.rate_exponent), 1.0, puncture.rate_exponent == 0.0);
-    let left = clamp((puncture.exit - a) / puncture.exit_fade, 0.0, 1.0);
+    let left = clamp((puncture.exit - a) / puncture.transition_length, 0.0, 1.0);
     return (segment.z + (segment.y - segment.z) * entry) * left * rate;
 }
 

@@ -1,5 +1,5 @@
 // Stage measure_contact: one workgroup sums impulses, torque, work and dissipation over the contact nodes and clears
-// them for the next frame; the host adds the 64 partial sums in f64. The loads on a flexible needle are shared over the
+// them for the next frame; the host adds the 64 partial sums in f64. The loads on a flexible tool are shared over the
 // entries of its centre-line.
 #import shared/params
 #import shared/step_input
@@ -61,7 +61,11 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
     softened[lane] = taken;
     workgroupBarrier();
     if (lane == 0u) {
-        tip_result = TipState(free_tip.coordinate, free_tip.dissipation, free_tip.spring_energy, 0.0);
+        var result = TipState();
+        result.coordinate = free_tip.coordinate;
+        result.dissipation = free_tip.dissipation;
+        result.spring_energy = free_tip.spring_energy;
+        tip_result = result;
         free_tip.dissipation = 0.0;
         for (var other = 0u; other < 64u; other++) {
             tip_result.softening += softened[other];

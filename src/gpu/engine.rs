@@ -985,7 +985,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             membranes,
             rate_exponent: p.rate_exponent as f32,
             reference_speed: p.reference_speed as f32,
-            exit_fade: p.transition_length as f32,
+            transition_length: p.transition_length as f32,
             shift: vec4(plan.profile.shift),
             edge_radius: plan.profile.bore.map_or(0.0, |b| b.edge as f32),
             bore_radius: plan.profile.bore.map_or(0.0, |b| b.radius as f32),

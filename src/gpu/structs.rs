@@ -188,7 +188,7 @@ shared_structs! {
         membranes: u32,
         rate_exponent: f32,
         reference_speed: f32,
-        exit_fade: f32,
+        transition_length: f32,
         segments: [[f32; 4]; 16],
     }
     /// shaders/effects/puncture.wgsl
