@@ -227,7 +227,7 @@ fn free_motions_that_cannot_be() {
         ),
         ("kind = \"turn\"\nrate_deg_s = 10.0", "# this", "add angle_deg"),
         ("kind = \"turn\"\nrate_deg_s = 10.0\nangle_deg = 0.0", "# this", "direction already"),
-        ("kind = \"turn\"\nrate_deg_s = 10.0\nangle_deg = 85.0", "angle_deg", "from 0 to 80"),
+        ("kind = \"turn\"\nrate_deg_s = 10.0\nangle_deg = 85.0", "angle_deg = 85.0", "from 0 to 80"),
         ("kind = \"turn\"\nangle_deg = 10.0", "# this", "add rate_deg_s"),
         ("kind = \"reposition\"\nentry_mm = [3.0, 0.0]", "kind = \"reposition\"", "12 mm deep"),
         ("kind = \"hold\"\nduration_s = 0.5\npivot_mm = [0.0, 0.0, 0.0]", "pivot_mm", "remove this key"),

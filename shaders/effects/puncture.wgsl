@@ -41,8 +41,8 @@ struct PunctureParams {
     reference_speed: f32,
     // Length over which the threshold falls behind the entry of a material, and to nothing before the exit [m].
     transition_length: f32,
-    // Of a free path: of material number i only F_pun and F_cut [N], second and third. Of a planned path: stretches of
-    // the path through one material: coordinate a where it begins [m], forces F_pun and F_cut [N], length over which the
+    // Of a free path: those of material number i, without the first. Of a planned path: stretches of the path through one
+    // material: coordinate a where it begins [m], forces F_pun and F_cut [N], length over which the
     // threshold falls from one to the other [m].
     segments: array<vec4<f32>, 16>,
 }
@@ -117,6 +117,13 @@ const ANCHOR_COUNT: u32 = 19u;
 #endif
 #endif
 
+// Factor of the tip forces at the speed of the needle [m/s].
+fn rate_factor(speed: f32) -> f32 {
+    let ratio = max(speed, puncture.reference_speed) / puncture.reference_speed;
+    // Without a rate the law is exactly that without this factor.
+    return select(pow(ratio, puncture.rate_exponent), 1.0, puncture.rate_exponent == 0.0);
+}
+
 // Threshold of the tip force at material coordinate a of a needle that moves at `speed` [N].
 fn tip_threshold(a: f32, speed: f32) -> f32 {
     var segment = puncture.segments[0];
@@ -124,9 +131,7 @@ fn tip_threshold(a: f32, speed: f32) -> f32 {
         segment = select(segment, puncture.segments[i], puncture.segments[i].x <= a);
     }
     let entry = max(0.0, 1.0 - (a - segment.x) / segment.w);
-    let ratio = max(speed, puncture.reference_speed) / puncture.reference_speed;
-    // Without a rate the law is exactly that without this factor.
-    let rate = select(pow(ratio, puncture.rate_exponent), 1.0, puncture.rate_exponent == 0.0);
+    let rate = rate_factor(speed);
     let left = clamp((puncture.exit - a) / puncture.transition_length, 0.0, 1.0);
     return (segment.z + (segment.y - segment.z) * entry) * left * rate;
 }

@@ -167,12 +167,12 @@ fn move_tip() {
     let material = select(free_tip.material, free_cells[cell].material, known);
     var entry = select(free_tip.entry, free_tip.coordinate, material != free_tip.material);
     let forces = puncture.segments[material];
-    let fading = max(0.0, 1.0 - (free_tip.coordinate - entry) / puncture.transition_length);
-    let threshold = select(forces.z + (forces.y - forces.z) * fading, 0.0, open);
+    let fading = max(0.0, 1.0 - (free_tip.coordinate - entry) / forces.w);
+    let speed = length(step_input.velocity.xyz);
+    let threshold = select((forces.z + (forces.y - forces.z) * fading) * rate_factor(speed), 0.0, open);
 
     let at_surface = free_tip.coordinate == 0.0;
-    let speed = length(step_input.velocity.xyz) + puncture.needle_radius * length(angular_velocity());
-    let travel = speed * params.dt;
+    let travel = (speed + puncture.needle_radius * length(angular_velocity())) * params.dt;
     // A stab travels more than the least cap in one step.
     let cap = min(max(select(13e-6, 5e-6, at_surface), 1.25 * travel), 4.0 * travel);
     let slip_cap = 4.0 * travel + SLIP_CAP;

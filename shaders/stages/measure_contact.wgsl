@@ -1,6 +1,5 @@
 // Stage measure_contact: one workgroup sums impulses, torque, work and dissipation over the contact nodes and clears
-// them for the next frame; the host adds the 64 partial sums in f64. The loads on a flexible tool are shared over the
-// entries of its centre-line.
+// them for the next frame; the host adds the 64 partial sums in f64.
 #import shared/params
 #import shared/step_input
 #import shared/contact_node
@@ -26,6 +25,7 @@ var<workgroup> softened: array<f32, 64>;
 @compute @workgroup_size(64)
 fn measure_contact(@builtin(local_invocation_index) lane: u32) {
 #ifdef FLEXIBLE_NEEDLE
+    // The loads are shared over the entries of the centre-line.
     var load = vec4<f32>(0.0);
     for (var index = 0u; index < arrayLength(&contact_nodes); index++) {
         let place = contact_nodes[index].rest.xyz

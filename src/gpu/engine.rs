@@ -965,7 +965,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             }
             for (out, i) in segments.iter_mut().zip(0..) {
                 let c = free.cuttings.get(i).unwrap_or(&free.cuttings[0]);
-                *out = [0.0, c.puncture_force as f32, c.cutting_force as f32, 0.0];
+                *out = [0.0, c.puncture_force, c.cutting_force, p.transition_length].map(|x| x as f32);
             }
             path_cell_count = free.cell_count();
         }

@@ -152,8 +152,19 @@ impl Check<'_> {
                     "write a straight motion and drop puncture.path = \"free\", or remove \"adhesion\"",
                 );
             }
-            if puncture.rate_exponent != 0.0 {
-                self.notices.push("`puncture.rate_exponent` has no effect on a free path.".into());
+            if let Some(Tool::Needle(NeedleShape { bore: Some(_), .. })) = tool {
+                self.problems.report(
+                    "needle.bore_diameter_mm",
+                    "a hollow needle needs a path that is planned before the run: the grid follows its bore",
+                    "the path of this scene is found while the tip moves",
+                    "write a straight motion and drop puncture.path = \"free\", or remove bore_diameter_mm",
+                );
+            } else if listed("cohesive") {
+                self.notices.push(
+                    "On a free path the needle opens no cohesive faces: it softens what it passes; planes of [cohesive] still \
+                     separate."
+                        .into(),
+                );
             }
         }
         if listed("flexible_needle") && (motion.is_free() || puncture.always_free) {

@@ -149,7 +149,10 @@ impl CpuEngine {
             let fading = (1.0 - (tip.coordinate - tip.entry) / p.transition_length).max(0.0);
             let threshold = match open {
                 true => 0.0,
-                false => cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * fading,
+                false => {
+                    let force = cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * fading;
+                    force * p.rate_factor(pose.velocity.length())
+                }
             };
             let travel = (pose.velocity.length() + radius * pose.angular_velocity.length()) * self.dt;
             let least = if tip.coordinate == 0.0 { 0.005e-3 } else { 0.013e-3 };
