@@ -159,7 +159,8 @@ fn a_needle_without_puncture_runs_with_a_notice() {
         answer.says("note: ").says("effect `puncture` is not listed").says("solver.mass_scaling");
         let summary = place.summary(engine);
         assert_eq!(summary["effects"].as_array().unwrap().len(), 0);
-        assert_eq!(summary["peak_force_n"], 0.0);
+        // The hand feels the inertia of the needle at its start, and nothing else.
+        assert!(summary["peak_force_n"].as_f64().unwrap() < 0.05, "{}", summary["peak_force_n"]);
         assert_eq!(summary["mass_scaling"], 1.0);
     }
 }
