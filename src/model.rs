@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::effects::{EffectSet, cohesive, puncture};
 use crate::material_point::Material;
+use crate::mesh::block::SLIT_HALF_WIDTH;
 use crate::mesh::{BlockMesh, Bore, Mesh};
 use crate::needle::free_path::FreeTip;
 use crate::needle::gap::Profile;
@@ -300,7 +301,8 @@ impl Model {
         let cut = self.planned_path().zip(self.scene.needle()).map(|(path, needle)| Cut {
             path,
             reach: needle.radius + SLIT_MARGIN,
-            driven: 1.05 * needle.radius,
+            // The ends of the slit hold, as far as they can.
+            driven: 0.99 * SLIT_HALF_WIDTH * needle.radius,
             deepest: self.scene.motion.deepest() + 2.0 * h,
             ring: needle.bore.is_some(),
         });

@@ -131,7 +131,9 @@ fn a_full_separation_takes_the_fracture_energy_on_three_meshes() {
                 // The traction that the law gives at the opening that was reached, wherever the bond is not gone.
                 let strength = if shear { law.shear_strength } else { law.strength };
                 let mut worst: f64 = 0.0;
-                for (opening, traction) in &rows {
+                // The start of the motion sends a wave of rho c v (8 % of the strength at this mass scaling) to and fro; after a
+                // tenth of the time it has died.
+                for (opening, traction) in &rows[rows.len() / 10..] {
                     let (n, s) = (opening.z, opening.truncate().length());
                     let (tn, ts) = law.traction(n, s, law.damage(n, s));
                     let found = if shear { traction.x.abs() - ts } else { traction.z - tn };
