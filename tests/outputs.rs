@@ -190,6 +190,7 @@ fn snapshot(scene: &Scene, mesh: &Mesh, depth: f64) -> FieldSnapshot {
         (0..mesh.cell_count()).map(|c| value(mesh.cell_centre(c))).collect()
     };
     FieldSnapshot {
+        cells_in_needle: None,
         frame: 90,
         time: 3.0,
         depth,

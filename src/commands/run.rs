@@ -77,6 +77,7 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     let (mut drawing, mut drawing_cpu) = (0.0, 0.0);
     let mut status = Status::Ok;
     let mut failure = None;
+    let mut cells_in_needle = None;
     loop {
         if interrupted.load(Ordering::Relaxed) {
             status = Status::Interrupted;
@@ -101,9 +102,13 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         progress.update(&record, record.time / wall.max(1e-9));
         for moment in moments.iter().filter(|m| m.frame == record.frame) {
             let (wall, cpu) = (Instant::now(), process::cpu_seconds());
-            if let Err(error) = write_moment(&mut simulation, &record, moment, &output, &mut fields, device.as_ref()) {
-                status = Status::Failed(error.to_string());
-                failure.get_or_insert(error);
+            match write_moment(&mut simulation, &record, moment, &output, &mut fields, device.as_ref()) {
+                // The most of all moments; `None` is less than any number.
+                Ok(inside) => cells_in_needle = cells_in_needle.max(inside.map(|n| n as u64)),
+                Err(error) => {
+                    status = Status::Failed(error.to_string());
+                    failure.get_or_insert(error);
+                }
             }
             drawing += wall.elapsed().as_secs_f64();
             drawing_cpu += difference(process::cpu_seconds(), cpu).unwrap_or(0.0);
@@ -148,6 +153,7 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         device_bytes: Some(info.device_bytes),
         ..Default::default()
     };
+    summary.cells_in_needle = cells_in_needle;
     summary.take_frames(&records);
     summary.take_sample(&driven, &records);
     if !records.is_empty() {
@@ -216,7 +222,7 @@ fn write_moment(
     output: &OutputFolder,
     fields: &mut FieldFiles,
     device: Option<&Gpu>,
-) -> Result<()> {
+) -> Result<Option<usize>> {
     let snapshot = simulation.snapshot(record)?;
     let model = &simulation.model;
     if moment.field {
@@ -227,7 +233,7 @@ fn write_moment(
         let image = render::draw(&model.scene, &model.mesh, &snapshot, device)?;
         image.write_png(&output.picture(at))?;
     }
-    Ok(())
+    Ok(snapshot.cells_in_needle)
 }
 
 /// Short report for the terminal: what the run found.
@@ -273,6 +279,11 @@ pub fn describe(summary: &Summary) -> String {
             rest * 1e3,
             100.0 * summary.core_strain.unwrap_or(0.0),
             mass * 1e6
+        );
+    }
+    if let Some(count) = summary.cells_in_needle {
+        text += &format!(
+            "needle: {count} cells of tissue within its wall at most, over the moments of pictures and fields\n"
         );
     }
     text += &format!(

@@ -1,7 +1,5 @@
 //! The core that a hollow needle holds: what lies in its bore, read off the axis of the core.
 
-use glam::DVec3;
-
 use crate::model::Model;
 use crate::needle::ToolPose;
 use crate::solver::engine::State;
@@ -69,29 +67,4 @@ impl CoreSample {
         core.mass = core.rest_length * column / height * model.scene.material.density;
         Some(core)
     }
-}
-
-/// Rest positions whose tissue lies inside the needle: centres of cells, counted against the outer wall and, for a hollow
-/// needle, the bore.
-pub fn cells_inside(model: &Model, state: &State, pose: &ToolPose) -> usize {
-    let Some(plan) = &model.puncture else { return 0 };
-    let d = -pose.direction;
-    let inside = |centre: DVec3| {
-        let lever = centre - pose.tip;
-        let s = lever.dot(d);
-        let (rc, _) = plan.profile.section(s);
-        let r = (lever - d * s - plan.profile.shift * rc).length();
-        let hollow = plan.profile.bore.map_or(0.0, |b| b.radius);
-        s > 0.0 && r < rc && r > hollow
-    };
-    (0..model.mesh.cell_count())
-        .filter(|cell| !model.mesh.is_gap(*cell))
-        // Softened cells are the opened path itself.
-        .filter(|cell| state.stiffness.get(*cell).is_none_or(|s| *s > 0.5))
-        .filter(|cell| {
-            let nodes = model.mesh.cell_nodes(*cell);
-            let place = |n: &usize| model.mesh.rest_position(*n) + state.displacement[*n];
-            inside(nodes.iter().map(place).sum::<DVec3>() / nodes.len() as f64)
-        })
-        .count()
 }

@@ -202,6 +202,8 @@ pub struct FieldSnapshot {
     pub axial_force: f64,
     /// Tip position of the tool and its direction of insertion (unit), if there is a tool.
     pub tool_pose: Option<(DVec3, DVec3)>,
+    /// Cells whose centre lies in the wall of the needle; `None` without a needle that cuts.
+    pub cells_in_needle: Option<usize>,
     /// Displacement per node [m], node order of the mesh.
     pub displacement: Vec<DVec3>,
     /// Von Mises stress per cell [Pa].
@@ -220,7 +222,9 @@ pub struct FieldSnapshot {
 }
 
 mod core_sample;
+mod needle_volume;
 mod recorder;
 
-pub use core_sample::{CoreSample, cells_inside};
+pub use core_sample::CoreSample;
+pub use needle_volume::cells_in_needle;
 pub use recorder::Recorder;

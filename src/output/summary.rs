@@ -126,6 +126,9 @@ pub struct Summary {
     pub hourglass_to_internal_max: f64,
     /// Nodes whose speed was clamped, summed over all steps.
     pub clamped_nodes: u64,
+    /// Most cells whose centre lay in the wall of the needle, over the moments of pictures and fields.
+    #[serde(default)]
+    pub cells_in_needle: Option<u64>,
     /// Most inverted cells in one frame.
     pub inverted_cells: u64,
     /// Share of all node steps in which selective mass scaling raised the mass of a node.

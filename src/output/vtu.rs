@@ -46,11 +46,14 @@ impl FieldFiles {
 
 /// Text of one VTU file. Empty cell fields are left out.
 pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot) -> String {
-    let (nodes, cells) = (mesh.node_count(), mesh.cell_count());
+    let nodes = mesh.node_count();
+    // Flat cells between the copies of a line are no tissue.
+    let shown: Vec<usize> = (0..mesh.cell_count()).filter(|c| !mesh.is_gap(*c)).collect();
+    let cells = shown.len();
     assert_eq!(snapshot.displacement.len(), nodes, "a snapshot holds one displacement per node");
     let points = (0..nodes).flat_map(|n| mesh.rest_position(n).to_array());
     let displacement = snapshot.displacement.iter().flat_map(|u| u.to_array());
-    let connectivity = (0..cells).flat_map(|c| mesh.cell_nodes(c).to_vec());
+    let connectivity = shown.iter().flat_map(|c| mesh.cell_nodes(*c).to_vec());
     let (corners, kind) = match mesh {
         Mesh::Block(_) => (8, VTK_HEXAHEDRON),
         Mesh::Tets(_) => (4, VTK_TETRAHEDRON),
@@ -81,8 +84,8 @@ pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot) -> String {
         ("material", &snapshot.material),
     ] {
         if !field.is_empty() {
-            assert_eq!(field.len(), cells, "a snapshot holds one {name} per cell");
-            text += &array(name, "Float32", 1, floats(field.iter().copied()));
+            assert_eq!(field.len(), mesh.cell_count(), "a snapshot holds one {name} per cell");
+            text += &array(name, "Float32", 1, floats(shown.iter().map(|c| field[*c])));
         }
     }
     text += "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";

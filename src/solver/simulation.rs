@@ -17,7 +17,7 @@ use crate::material_point::PointState;
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
 use crate::needle::flexible::FlexibleNeedle;
-use crate::observables::{CoreSample, FieldSnapshot, FrameRecord, NeedleRecord, Recorder};
+use crate::observables::{CoreSample, FieldSnapshot, FrameRecord, NeedleRecord, Recorder, cells_in_needle};
 use crate::scene::Scene;
 
 /// Which engine the user wants.
@@ -516,6 +516,9 @@ pub fn snapshot(model: &Model, record: &FrameRecord, state: State) -> FieldSnaps
         }),
         ..Default::default()
     };
+    let pose = model.kinematics.as_ref().map(|k| k.pose(record.time));
+    fields.cells_in_needle =
+        pose.filter(|_| model.puncture.is_some()).map(|pose| cells_in_needle(model, &state, &pose));
     let states = CellStates { points: &state.points, stiffness: &state.stiffness };
     let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
     let fresh = PointState::default();

@@ -1,0 +1,38 @@
+//! Tissue in the volume of the needle: where a contact lets it through, cells come to lie inside.
+
+use glam::DVec3;
+
+use crate::model::Model;
+use crate::needle::ToolPose;
+use crate::needle::gap::Profile;
+use crate::solver::engine::State;
+
+/// Cells whose centre lies within the wall of the needle: inside its outer surface and, of a hollow one, outside its bore.
+/// Cells that the path has softened by more than half are the opened path itself and do not count.
+pub fn cells_in_needle(model: &Model, state: &State, pose: &ToolPose) -> usize {
+    let Some(plan) = &model.puncture else { return 0 };
+    let profile = Profile::new(&plan.needle, pose.direction);
+    let d = -pose.direction;
+    let inside = |centre: DVec3| {
+        let lever = centre - pose.tip;
+        let s = lever.dot(d);
+        match profile.bore {
+            Some(_) => {
+                let wall = |bore: bool| profile.tube_wall(lever, d, bore, (0.0, 0.0)).value;
+                s > 0.0 && wall(false) > 0.0 && wall(true) > 0.0
+            }
+            None => {
+                let (rc, _) = profile.section(s);
+                s > 0.0 && (lever - d * s - profile.shift * rc).length() < rc
+            }
+        }
+    };
+    (0..model.mesh.cell_count())
+        .filter(|cell| !model.mesh.is_gap(*cell) && state.stiffness.get(*cell).is_none_or(|s| *s > 0.5))
+        .filter(|cell| {
+            let nodes = model.mesh.cell_nodes(*cell);
+            let place = |n: &usize| model.mesh.rest_position(*n) + state.displacement[*n];
+            inside(nodes.iter().map(place).sum::<DVec3>() / nodes.len() as f64)
+        })
+        .count()
+}
