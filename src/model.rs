@@ -1,6 +1,6 @@
 //! What is constant during a run: mesh, masses, loads, and what the chosen effects prepare once.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
@@ -10,6 +10,7 @@ use crate::mesh::block::SLIT_HALF_WIDTH;
 use crate::mesh::{BlockMesh, Bore, Mesh};
 use crate::needle::free_path::FreeTip;
 use crate::needle::gap::Profile;
+use crate::needle::slit::{REFERENCE_EDGE, SlitFaces};
 use crate::needle::{Kinematics, PlannedPath, lateral_axes};
 use crate::scene::motion::Placement;
 use crate::scene::{Cutting, Face, FaceCondition, NeedleShape, RegionShape, Scene, TissueMaterial, Tool};
@@ -27,6 +28,33 @@ pub struct ContactNode {
     /// others only carry tip springs.
     pub pushed: bool,
     pub surface: ContactSurface,
+    /// On a slit: the faces around the node, at whose points the needle touches; and a quarter of their areas [m^2].
+    pub faces: Option<SlitFaces>,
+    pub area: f64,
+}
+
+impl ContactNode {
+    /// A node that carries tip springs and no more.
+    fn carrier(node: usize, rest_radius: f64, rest_axial: f64) -> Self {
+        ContactNode {
+            node: node as u32,
+            rest_radius,
+            rest_axial,
+            pushed: false,
+            surface: ContactSurface::OpenedPath,
+            faces: None,
+            area: 0.0,
+        }
+    }
+}
+
+/// A corner of faces of a slit.
+struct SlitNode {
+    node: u32,
+    side: DVec3,
+    /// Nodes around and faces that are there, as in [`SlitFaces`].
+    ring: Vec<u32>,
+    present: u32,
 }
 
 /// Against what part of the needle a node is held.
@@ -82,6 +110,11 @@ pub const LARGEST_MATERIAL_COUNT: usize = 16;
 pub const LARGEST_SEGMENT_COUNT: usize = 16;
 
 impl PuncturePlan {
+    /// Contact stiffness per area at the points of a slit, kappa [Pa/m].
+    pub fn face_stiffness(&self) -> f64 {
+        self.contact_stiffness / REFERENCE_EDGE.powi(2)
+    }
+
     /// Tip force at which the tip advances at the coordinate a [N]: from F_pun of the material that it enters down to
     /// F_cut over the transition length; over the last transition length before the bottom it fades to nothing, since a spring
     /// that ended at once would throw the tissue back.
@@ -114,6 +147,8 @@ pub struct PuncturePlan {
     pub cells: Vec<PathCell>,
     /// Contact stiffness k [N/m].
     pub contact_stiffness: f64,
+    /// Time constant of the damping at the points of a slit: damping over stiffness [s].
+    pub face_damping: f64,
     /// The path is not planned but found while the tip moves.
     pub free: Option<FreePlan>,
 }
@@ -183,9 +218,6 @@ pub struct Model {
     /// Nodes that a tool may touch, ascending in the node index; empty without contact.
     pub contact_nodes: Vec<ContactNode>,
 }
-
-/// Reference length of the contact stiffness [m].
-const CONTACT_LENGTH: f64 = 0.6e-3;
 
 /// Number of tip springs of a solid needle on a path without a slit: one on the axis, 6 at R/2, 12 at R.
 pub const ANCHOR_COUNT: usize = 19;
@@ -285,7 +317,7 @@ impl Model {
     /// 8 %: a finer mesh gets the stiffer contact and penetrates less (measured in the default scene).
     fn contact_stiffness(&self, factor: f64) -> f64 {
         let h = self.scene.tissue.cell_size;
-        factor * self.scene.material.law.p_wave_modulus() * CONTACT_LENGTH * CONTACT_LENGTH / h
+        factor * self.scene.material.law.p_wave_modulus() * REFERENCE_EDGE * REFERENCE_EDGE / h
     }
 
     /// The planned path, if the tool is a needle that cuts.
@@ -339,23 +371,26 @@ impl Model {
                 let (r0, s0) = path.material_coordinates(mesh.rest_position(node));
                 let surface = surfaces.get(&(node as u32)).copied().unwrap_or(ContactSurface::OpenedPath);
                 let in_ring = r0 > params.softened_radius && r0 < params.ring_radius;
-                let pushed = s0 < deepest && if cohesive { surface != ContactSurface::OpenedPath } else { in_ring };
+                let on_slit = matches!(surface, ContactSurface::Slit { .. });
+                let on_face = surface != ContactSurface::OpenedPath;
+                let pushed = on_slit || s0 < deepest && if cohesive { on_face } else { in_ring };
                 let carries = r0 < anchor_reach && s0 < deepest + 2.0 * self.scene.tissue.cell_size;
-                (pushed || carries).then_some(ContactNode {
-                    node: node as u32,
-                    rest_radius: r0,
-                    rest_axial: s0,
-                    pushed,
-                    surface,
-                })
+                let carrier = ContactNode::carrier(node, r0, s0);
+                (pushed || carries).then_some(ContactNode { pushed, surface, ..carrier })
             })
             .collect();
+        self.join_slit_faces();
+        // As the nodes of a face would be damped, each with a half of the masses of its cells.
+        let h = self.scene.tissue.cell_size;
+        let contact_stiffness = self.contact_stiffness(params.contact_stiffness_factor);
+        let face_mass = 0.5 * self.scaled_density() * h.powi(3);
         self.puncture = Some(PuncturePlan {
             segments: path_segments(&self.scene, &params, &path, exit),
             exit,
             anchors: tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
             cells,
-            contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
+            contact_stiffness,
+            face_damping: 2.0 * params.contact_damping * (face_mass / contact_stiffness).sqrt(),
             params,
             profile: Profile::new(&needle, path.direction),
             needle,
@@ -380,13 +415,7 @@ impl Model {
         let reach = params.ring_radius.max(needle.radius + 1.5 * h) + FREE_PATH_ROOM;
         self.contact_nodes = (0..mesh.node_count())
             .filter(|&node| near(mesh.rest_position(node), reach))
-            .map(|node| ContactNode {
-                node: node as u32,
-                rest_radius: 0.0,
-                rest_axial: 0.0,
-                pushed: true,
-                surface: ContactSurface::OpenedPath,
-            })
+            .map(|node| ContactNode { pushed: true, ..ContactNode::carrier(node, 0.0, 0.0) })
             .collect();
         let opened = (0..mesh.cell_count()).filter(|&cell| {
             let size = mesh.cell_size(cell);
@@ -424,6 +453,7 @@ impl Model {
             anchors: Vec::new(),
             cells: Vec::new(),
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
+            face_damping: 0.0,
             profile: Profile::new(&needle, motion.direction),
             params,
             needle,
@@ -433,8 +463,8 @@ impl Model {
 
     /// What part of the needle the copies of the path's surface face.
     fn separated_surfaces(&self, path: &PlannedPath) -> HashMap<u32, ContactSurface> {
-        let driven = self.separation.pairs.iter().filter(|p| p.tip_driven.is_some() || self.on_slit(p));
         let hollow = self.scene.has_bore();
+        let driven = self.separation.pairs.iter().filter(|p| hollow && p.tip_driven.is_some());
         let axis_of = |pair: &FacePair| if pair.axis == 0 { DVec3::X } else { DVec3::Y };
         driven
             .flat_map(|pair| {
@@ -442,15 +472,80 @@ impl Model {
                 // Of a ring pair the copy on the side of the axis belongs to the core.
                 let core = usize::from(rest.dot(axis_of(pair)) < 0.0);
                 [0, 1].map(|n| {
-                    let surface = match (hollow, n == core) {
-                        (true, true) => ContactSurface::Bore,
-                        (true, false) => ContactSurface::OuterWall,
-                        (false, _) => ContactSurface::Slit { side: axis_of(pair) * if n == 0 { -1.0 } else { 1.0 } },
-                    };
-                    (pair.nodes[n], surface)
+                    (pair.nodes[n], if n == core { ContactSurface::Bore } else { ContactSurface::OuterWall })
                 })
             })
+            .chain(self.slit_nodes().into_iter().map(|n| (n.node, ContactSurface::Slit { side: n.side })))
             .collect()
+    }
+
+    /// Corners of the faces on both sides of a slit that may part.
+    fn slit_nodes(&self) -> Vec<SlitNode> {
+        let (Some(axis), Some(mesh)) = (self.scene.slit_axis(), self.mesh.as_block()) else { return Vec::new() };
+        let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
+        let parts: HashSet<u32> =
+            self.separation.pairs.iter().filter(|p| self.on_slit(p)).flat_map(|p| p.nodes).collect();
+        let mut layers: Vec<(usize, f64)> = Vec::new();
+        for pair in self.separation.pairs.iter().filter(|p| self.on_slit(p)) {
+            for (node, sign) in pair.nodes.iter().zip([-1.0, 1.0]) {
+                let layer = (mesh.node_coordinates(*node as usize)[axis], sign);
+                if !layers.contains(&layer) {
+                    layers.push(layer);
+                }
+            }
+        }
+        let counts = mesh.nodes();
+        let mut nodes = Vec::new();
+        for (layer, sign) in layers {
+            let node = |m: usize, n: usize| {
+                let mut at = [layer; 3];
+                (at[b], at[c]) = (m, n);
+                mesh.node_index(at[0], at[1], at[2]) as u32
+            };
+            let mut side = DVec3::ZERO;
+            side[axis] = sign;
+            for (m, n) in (0..counts[c]).flat_map(|n| (0..counts[b]).map(move |m| (m, n))) {
+                let mut present = 0;
+                // Neighbours, the node itself where there is none.
+                let beside = |k: usize, step: usize, count: usize| match step {
+                    0 => k.checked_sub(1),
+                    1 => Some(k),
+                    _ => Some(k + 1).filter(|k| *k < count),
+                };
+                let at = |i: usize, j: usize| Some(node(beside(m, i, counts[b])?, beside(n, j, counts[c])?));
+                for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let corners = [at(1, 1), at(2 * i, 1), at(1, 2 * j), at(2 * i, 2 * j)];
+                    let whole: Option<Vec<u32>> = corners.into_iter().collect();
+                    if whole.is_some_and(|face| face.iter().any(|node| parts.contains(node))) {
+                        present |= 1 << (i + 2 * j);
+                    }
+                }
+                if present != 0 {
+                    let places = (0..9).filter(|p| *p != 4).map(|p| at(p % 3, p / 3).unwrap_or(node(m, n)));
+                    nodes.push(SlitNode { node: node(m, n), side, ring: places.collect(), present });
+                }
+            }
+        }
+        nodes
+    }
+
+    /// Tells the contact nodes of a slit their faces.
+    fn join_slit_faces(&mut self) {
+        let index: HashMap<u32, u32> = (0..).zip(&self.contact_nodes).map(|(i, c)| (c.node, i)).collect();
+        for slit in self.slit_nodes() {
+            let own = index[&slit.node];
+            // Neighbours of faces that are not there may be no contact nodes.
+            let ring = std::array::from_fn(|p| index.get(&slit.ring[p]).copied().unwrap_or(own));
+            let faces = SlitFaces { ring, present: slit.present };
+            let place = |contact: u32| self.mesh.rest_position(self.contact_nodes[contact as usize].node as usize);
+            let areas = (0..4).filter(|q| slit.present & (1 << q) != 0).map(|q| {
+                let [first, second, _] = faces.corners(q & 1, q >> 1).map(place);
+                0.25 * (first - place(own)).cross(second - place(own)).length()
+            });
+            let area = areas.sum();
+            let contact = &mut self.contact_nodes[own as usize];
+            (contact.faces, contact.area) = (Some(faces), area);
+        }
     }
 
     /// True where the mesh follows the bore of a hollow needle.
@@ -465,7 +560,10 @@ impl Model {
 
     /// True for the pairs of the slit, driven or not.
     fn on_slit(&self, pair: &FacePair) -> bool {
-        self.scene.slit_axis() == Some(pair.axis)
+        self.scene.slit_axis() == Some(pair.axis) && {
+            let off = self.mesh.rest_position(pair.nodes[0] as usize) - self.scene.motion.entry;
+            off[pair.axis].abs() < 1e-9
+        }
     }
 
     fn plan_indentation(&mut self) {
@@ -481,13 +579,8 @@ impl Model {
             .filter_map(|node| {
                 let lateral = mesh.rest_position(node) - entry;
                 let r0 = lateral.truncate().length();
-                (r0 < 1.5 * radius).then_some(ContactNode {
-                    node: node as u32,
-                    rest_radius: r0,
-                    rest_axial: 0.0,
-                    pushed: true,
-                    surface: ContactSurface::OpenedPath,
-                })
+                let carrier = ContactNode::carrier(node, r0, 0.0);
+                (r0 < 1.5 * radius).then_some(ContactNode { pushed: true, ..carrier })
             })
             .collect();
     }

@@ -28,7 +28,12 @@ struct PunctureParams {
     edge_radius: f32,
     bore_radius: f32,
     bore_grip: f32,
+    // Contact at the points of a slit: stiffness per area [Pa/m], damping over stiffness [s].
+    face_stiffness: f32,
+    face_damping: f32,
     _pad2: u32,
+    _pad3: u32,
+    _pad4: u32,
     // Of a free path: direction of the needle before the run, to which `shift` belongs; first cell and cells per axis of
     // the box of `free_cells`; w unused.
     reference: vec4<f32>,
@@ -171,7 +176,7 @@ fn opened_path(lever: vec3<f32>, d: vec3<f32>, s: f32, rest_radius: f32, less: v
 }
 
 #ifdef SLIT
-// Overlap of one face of a slit with the section, pushed to its own side, faded over SLIT_FADE = 1/3 of the radius.
+// Overlap of one face of a slit with the section, pushed to its own side; b = R/5.
 fn slit_face(lever: vec3<f32>, d: vec3<f32>, s: f32, side: vec3<f32>, less: vec2<f32>) -> Overlap {
     let on_tip = s < puncture.tip_length;
     let full_slope = puncture.needle_radius / puncture.tip_length;
@@ -182,15 +187,16 @@ fn slit_face(lever: vec3<f32>, d: vec3<f32>, s: f32, side: vec3<f32>, less: vec2
     let p = dot(rho, side);
     let q = rho - side * p;
     let square = rc * rc - dot(q, q);
-    let w = sqrt(max(square, 0.0));
-    let fade = square + puncture.needle_radius * puncture.needle_radius / 9.0;
-    let part = square / fade;
-    // d phi / d w^2.
-    let rate = (1.0 - part) / fade * (w - p) + 0.5 * w / fade;
-    let value = part * (w - p);
-    let lateral = side * -part - q * (2.0 * rate);
-    let along = (2.0 * rc * rate - dot(lateral, shift)) * slope - less.y;
-    return Overlap(select(-1.0, value - less.x, square > 0.0), select(-side, lateral + d * along, square > 0.0));
+    let inside = square > 0.0;
+    let w = sqrt(select(1.0, square, inside));
+    let wide = sqrt(max(square, 0.0) + 0.04 * puncture.needle_radius * puncture.needle_radius);
+    // W, and p dW/dw^2.
+    let reach = select(w, square / wide, p < 0.0);
+    let rate = select(0.5 * min(p / w, 1.0), p * (1.0 - 0.5 * square / (wide * wide)) / wide, p < 0.0);
+    let value = (square - p * reach) / rc;
+    let lateral = (side * -reach - q * (2.0 * (1.0 - rate))) / rc;
+    let along = (2.0 * (1.0 - rate) - value / rc - dot(lateral, shift)) * slope - less.y;
+    return Overlap(select(-1.0, value - less.x, inside), select(-side, lateral + d * along, inside));
 }
 #endif
 #ifdef BORE

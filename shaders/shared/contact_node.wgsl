@@ -20,8 +20,12 @@ struct ContactNode {
     rest_axial: f32,
     // Nodal mass [kg].
     mass: f32,
-    _pad0: u32,
-    _pad1: u32,
+    // On a slit: faces around the node (bits: lower and higher along the first way, those again higher along the second), a quarter
+    // of their areas [m^2], and the contact nodes around, row by row without the node itself.
+    faces: u32,
+    area: f32,
+    ring_low: vec4<u32>,
+    ring_high: vec4<u32>,
 }
 
 // What a contact node remembers.

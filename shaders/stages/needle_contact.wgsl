@@ -11,6 +11,9 @@
 #ifdef FRICTION
 #import effects/friction
 #endif
+#ifdef SLIT
+#import shared/slit_contact
+#endif
 #ifdef FLEXIBLE_NEEDLE
 #import effects/flexible_needle
 #endif
@@ -95,11 +98,7 @@ fn overlap_of(
 #ifdef BORE
     return tube_wall(lever, d, s, surface.w, less);
 #else
-#ifdef SLIT
-    return slit_face(lever, d, s, surface.xyz, less);
-#else
     return opened_path(lever, d, s, rest_radius, less);
-#endif
 #endif
 }
 
@@ -129,7 +128,11 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     let rest_radius = met.rest_radius;
 #else
     let tip = step_input.direction.xyz * tip_share(contact.grid.xyz, contact.rest_axial);
-    let passed = contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0;
+    var passed = contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0;
+#ifdef SLIT
+    // Its faces may touch where the node does not.
+    passed = contact.faces != 0u;
+#endif
     let rest_radius = contact.rest_radius;
 #endif
     var normal = vec3<f32>(0.0);
@@ -137,9 +140,31 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     var stored = 0.0;
     // Stiffness that a separated face adds at its node [N/m]: it has half the mass of the others.
     var bound = 0.0;
+    // Torque about the tip beyond that of forces at the node [N m].
+    var turn = vec3<f32>(0.0);
     // Loops that run once or not at all: software adapters skip them, where they would walk through an `if`.
     for (var once = select(1u, 0u, passed); once == 0u; once++) {
         var memory = contact_memory[index];
+        var v = node_velocity[contact.node].xyz - needle_velocity;
+#ifdef SLIT
+        let points = slit_force(index);
+        normal = points.normal;
+        stored = points.stored;
+        bound = points.bound;
+        turn = points.torque - cross(lever, normal);
+        contact_sums[index].shaft += dot(points.on_shaft, step_input.direction.xyz) * params.dt;
+        contact_sums[index].damping_dissipation += points.damping_power * params.dt;
+#ifdef FLEXIBLE_NEEDLE
+        contact_sums[index].work += (points.bend_power - dot(normal, bend.rate)) * params.dt;
+#endif
+        let pressing = length(normal);
+        let n = normal * select(0.0, 1.0 / pressing, pressing > 0.0);
+        let vn = dot(v, n);
+        let k = puncture.face_stiffness * contact.area;
+        let rubbing = points.rubbing;
+        memory.touching = select(0.0, 1.0, pressing > 0.0);
+        memory.on_shaft = select(0.0, 1.0, dot(points.on_shaft, points.on_shaft) > 0.0 && s >= puncture.tip_length);
+#else
         if (memory.touching == 0.0) {
             memory.touching = 1.0;
             memory.overlap = max(0.0, overlap_of(contact.surface, rest_radius, from_axis, d, s, vec2<f32>(0.0)).value);
@@ -159,7 +184,6 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let depth = overlap.value;
         let steep = length(overlap.gradient);
         let n = overlap.gradient * (-1.0 / steep);
-        var v = node_velocity[contact.node].xyz - needle_velocity;
 #ifdef FREE_PATH
         v -= cross(angular_velocity(), lever);
 #endif
@@ -179,13 +203,16 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         memory.on_shaft = select(0.0, 1.0, depth > 0.0 && s >= puncture.tip_length);
 #endif
 #ifdef FRICTION
+        let rubbing = pressure * clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);
+#endif
+#endif
+#ifdef FRICTION
         let kt = friction.stiffness_ratio * k;
-        let grown = clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);
         var coefficient = friction.coefficient;
 #ifdef BORE
         coefficient = select(puncture.bore_grip, coefficient, contact.surface.w > 0.0);
 #endif
-        let allowed = coefficient * grown * pressure / kt;
+        let allowed = coefficient * rubbing / kt;
         let trial = stick_trial(memory.stick.xyz, (v - n * vn) * params.dt, n);
         let stretch = stick_return(trial, allowed);
         memory.stick = vec4<f32>(stretch, 0.0);
@@ -199,6 +226,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     for (var once = select(1u, 0u, dot(total, total) > 0.0); once == 0u; once++) {
         corner_force[contact.slot] += vec4<f32>(total, bound);
         book_contact(index, tip, normal, tangential, lever);
+        contact_sums[index].angular_impulse += vec4<f32>(turn * params.dt, 0.0);
 #ifdef FLEXIBLE_NEEDLE
         contact_sums[index].work += dot(total, bend.rate) * params.dt;
 #endif

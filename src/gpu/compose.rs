@@ -57,6 +57,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/straight_column", include_str!("../../shaders/shared/straight_column.wgsl")),
     ("shared/symmetric_eigen", include_str!("../../shaders/shared/symmetric_eigen.wgsl")),
     ("shared/tetrahedron", include_str!("../../shaders/shared/tetrahedron.wgsl")),
+    ("shared/slit_contact", include_str!("../../shaders/shared/slit_contact.wgsl")),
     ("shared/tied_nodes", include_str!("../../shaders/shared/tied_nodes.wgsl")),
     ("shared/thread_index", include_str!("../../shaders/shared/thread_index.wgsl")),
     ("stages/advance_free_tip", include_str!("../../shaders/stages/advance_free_tip.wgsl")),

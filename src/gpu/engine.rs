@@ -990,6 +990,8 @@ fn puncture_params(model: &Model) -> PunctureParams {
             edge_radius: plan.profile.bore.map_or(0.0, |b| b.edge as f32),
             bore_radius: plan.profile.bore.map_or(0.0, |b| b.radius as f32),
             bore_grip: plan.needle.bore.map_or(0.0, |b| b.friction as f32),
+            face_stiffness: plan.face_stiffness() as f32,
+            face_damping: plan.face_damping as f32,
             reference: vec4(plan.path.direction),
             free_low,
             free_count,
@@ -1145,6 +1147,10 @@ fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
         .map(|c| {
             let node = c.node as usize;
             let [i, j, k] = model.mesh.block().node_coordinates(node);
+            let [ring_low, ring_high] = match c.faces {
+                Some(faces) => [0, 4].map(|at| std::array::from_fn(|p| faces.ring[at + p])),
+                None => [[0; 4]; 2],
+            };
             ContactNode {
                 rest: vec4(model.mesh.rest_position(node)),
                 grid: [i as u32, j as u32, k as u32, 0],
@@ -1160,8 +1166,10 @@ fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
                 rest_radius: c.rest_radius as f32,
                 rest_axial: c.rest_axial as f32,
                 mass: model.node_mass[node] as f32,
-                _pad0: 0,
-                _pad1: 0,
+                faces: c.faces.map_or(0, |f| f.present),
+                area: c.area as f32,
+                ring_low,
+                ring_high,
             }
         })
         .collect();

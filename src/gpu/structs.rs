@@ -181,7 +181,11 @@ shared_structs! {
         edge_radius: f32,
         bore_radius: f32,
         bore_grip: f32,
+        face_stiffness: f32,
+        face_damping: f32,
         _pad2: u32,
+        _pad3: u32,
+        _pad4: u32,
         reference: [f32; 4],
         free_low: [u32; 4],
         free_count: [u32; 4],
@@ -350,8 +354,10 @@ shared_structs! {
         rest_radius: f32,
         rest_axial: f32,
         mass: f32,
-        _pad0: u32,
-        _pad1: u32,
+        faces: u32,
+        area: f32,
+        ring_low: [u32; 4],
+        ring_high: [u32; 4],
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactMemory {

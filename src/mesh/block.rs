@@ -205,6 +205,9 @@ const FINE_BELOW_PATH: f64 = 4.0e-3;
 /// length to lie around it.
 pub const SLIT_HALF_WIDTH: f64 = 1.2;
 
+/// Fewest cells along half of the slit.
+const SLIT_HALF_CELLS: usize = 2;
+
 /// Fine lines that may be given up at one side to make room for a well-shaped series.
 const LINES_TO_GIVE_UP: usize = 3;
 
@@ -229,7 +232,7 @@ impl BlockMesh {
                 // Before an upright needle the slit ends on lines, at the same place in every mesh: with ends wherever the
                 // lines happen to be, the force at 12 mm is 0.94 N with cells of 0.8 mm and 1.49 N with 0.6 mm.
                 let end = SLIT_HALF_WIDTH * needle.radius;
-                mesh.lines[across] = lines_around(scene.motion.entry[across], end, &tissue, across);
+                mesh.lines[across] = lines_around(scene.motion.entry[across], end, &tissue, across, SLIT_HALF_CELLS);
             }
             mesh.split(slit, scene.motion.entry[slit]);
         }
@@ -244,7 +247,7 @@ impl BlockMesh {
         let h = tissue.cell_size;
         let centre = entry.truncate();
         for axis in 0..2 {
-            self.lines[axis] = lines_around(centre[axis], radius, tissue, axis);
+            self.lines[axis] = lines_around(centre[axis], radius, tissue, axis, 1);
             self.split(axis, centre[axis] - radius);
             self.split(axis, centre[axis] + radius);
         }
@@ -285,9 +288,9 @@ impl BlockMesh {
 }
 
 /// Lines of a whole axis around `centre`, one of them there and two at the distance `radius` from it.
-fn lines_around(centre: f64, radius: f64, tissue: &Tissue, axis: usize) -> Vec<f64> {
+fn lines_around(centre: f64, radius: f64, tissue: &Tissue, axis: usize, least: usize) -> Vec<f64> {
     let half = 0.5 * tissue.size[axis];
-    let side = |face: f64| side_lines(face, radius, tissue.fine_radius, tissue.cell_size, tissue.growth);
+    let side = |face: f64| side_lines(face, radius, tissue, least);
     let mut lines: Vec<f64> = side(half + centre).iter().rev().map(|d| centre - d).collect();
     lines.push(centre);
     lines.extend(side(half - centre).iter().map(|d| centre + d));
@@ -298,8 +301,9 @@ fn lines_around(centre: f64, radius: f64, tissue: &Tissue, axis: usize) -> Vec<f
 
 /// Distances of grid lines from the axis of a bore up to a face: whole cells within the radius, edges `h` to the end of
 /// the fine zone, growing beyond.
-fn side_lines(face: f64, radius: f64, fine_radius: f64, h: f64, growth: f64) -> Vec<f64> {
-    let inner = (radius / h).round().max(1.0) as usize;
+fn side_lines(face: f64, radius: f64, tissue: &Tissue, least: usize) -> Vec<f64> {
+    let (fine_radius, h, growth) = (tissue.fine_radius, tissue.cell_size, tissue.growth);
+    let inner = ((radius / h).round() as usize).max(least);
     let mut lines: Vec<f64> = (1..=inner).map(|k| radius * k as f64 / inner as f64).collect();
     let left = (face - radius) / h;
     let fine = ((fine_radius - radius) / h).round().clamp(1.0, left.floor().max(1.0));

@@ -43,7 +43,7 @@ pub struct BoreProfile {
 }
 
 /// Half width of the section, in shaft radii, below which the push to the own side of a slit fades.
-const SLIT_FADE: f64 = 1.0 / 3.0;
+const SLIT_FADE: f64 = 0.2;
 
 impl Profile {
     /// The profile of a needle that points along `direction`.
@@ -70,11 +70,12 @@ impl Profile {
 
     /// Overlap of one face of a slit with the section, pushed towards its own side `side` (unit, lateral):
     /// ```text
-    /// p = rho.side,  q = rho - side p,  w = sqrt(rc^2 - q^2),  phi = (w - p) w^2/(w^2 + b^2) - less,  b = R/3
+    /// p = rho.side,  q = rho - side p,  w^2 = rc^2 - q^2,  phi = (w^2 - p W)/rc - less
+    /// W = w where p >= 0,  w^2/sqrt(w^2 + b^2) where p < 0,  b = R/5
     /// ```
-    /// with the lateral vector `rho` from the section's centre: the way out to the face's own side, faded where the circle ends
-    /// (q = rc), so that the gradient stays bounded there and at the apex. A radial normal would push both faces to one side;
-    /// without the fading the contact at the ends of the slit creates half of the needle's work.
+    /// with the lateral vector `rho` from the section's centre: the way out to the face's own side times its cosine w/rc. At
+    /// the surface, p = w, the gradient is the normal of the circle. A radial normal everywhere would push both faces to one side.
+    /// Beyond the own side W keeps the gradient bounded where the circle ends.
     pub fn slit_face(&self, lever: DVec3, d: DVec3, side: DVec3, less: (f64, f64)) -> Overlap {
         let s = lever.dot(d);
         let (rc, slope) = self.section(s);
@@ -86,13 +87,17 @@ impl Profile {
             return Overlap { value: -1.0, gradient: -side };
         }
         let w = square.sqrt();
-        let fade = square + (SLIT_FADE * self.radius).powi(2);
-        let part = square / fade;
-        // d phi / d w^2.
-        let rate = (1.0 - part) / fade * (w - p) + 0.5 * w / fade;
-        let lateral = -side * part - q * (2.0 * rate);
-        let along = (2.0 * rc * rate - lateral.dot(self.shift)) * slope - less.1;
-        Overlap { value: part * (w - p) - less.0, gradient: lateral + d * along }
+        // W, and p dW/dw^2; outside of the circle, p > w, the gradient has no meaning but stays finite.
+        let (reach, rate) = if p < 0.0 {
+            let wide = (square + (SLIT_FADE * self.radius).powi(2)).sqrt();
+            (square / wide, p * (1.0 / wide - 0.5 * square / wide.powi(3)))
+        } else {
+            (w, 0.5 * (p / w).min(1.0))
+        };
+        let value = (square - p * reach) / rc;
+        let lateral = (side * -reach - q * (2.0 * (1.0 - rate))) / rc;
+        let along = (2.0 * (1.0 - rate) - value / rc - lateral.dot(self.shift)) * slope - less.1;
+        Overlap { value: value - less.0, gradient: lateral + d * along }
     }
 
     /// Overlap of the tissue around a hollow needle with its outer wall (`inside` false) or of the core with its bore; both

@@ -6,6 +6,7 @@ pub mod centre_line;
 pub mod flexible;
 pub mod free_path;
 pub mod gap;
+pub mod slit;
 
 use glam::DVec3;
 

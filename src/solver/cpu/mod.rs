@@ -4,6 +4,7 @@ mod cohesive_forces;
 mod free_tip;
 mod indenter_contact;
 mod needle_contact;
+mod slit_contact;
 mod tip;
 
 pub use cohesive_forces::TORN_REACH;
@@ -30,8 +31,8 @@ struct ContactSums {
     tip: DVec3,
     normal: DVec3,
     friction: DVec3,
-    /// The normal force acts on the shaft of a needle.
-    on_shaft: bool,
+    /// The part of the normal force on the shaft of a needle [N].
+    on_shaft: DVec3,
     /// Torque about the tip [N m].
     torque: DVec3,
     friction_work: f64,
@@ -308,9 +309,7 @@ impl FrameSums {
         let total = c.tip + c.normal + c.friction;
         self.cutting_impulse += c.tip.dot(pose.direction) * dt;
         self.spreading_impulse += c.normal.dot(pose.direction) * dt;
-        if c.on_shaft {
-            self.shaft_impulse += c.normal.dot(pose.direction) * dt;
-        }
+        self.shaft_impulse += c.on_shaft.dot(pose.direction) * dt;
         self.friction_impulse += c.friction.dot(pose.direction) * dt;
         self.impulse += total * dt;
         self.angular_impulse += c.torque * dt;

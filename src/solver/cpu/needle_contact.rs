@@ -2,13 +2,14 @@
 
 use glam::DVec3;
 
+use super::slit_contact::SlitContact;
 use super::{ContactSums, CpuEngine};
 use crate::model::{ContactSurface, PuncturePlan};
 use crate::needle::centre_line::Bend;
 use crate::needle::free_path::{END_FADE, FreeTip, PASSED_MARGIN, WATCHED, faded_at_end};
 use crate::needle::gap::{Overlap, Profile};
 use crate::needle::{ToolPose, swing};
-use crate::solver::engine::ContactState;
+use crate::solver::engine::{ContactState, State};
 
 impl CpuEngine {
     /// Stage `needle_contact`: nodes of the ring that the tip has passed stay outside the opened path (potential
@@ -30,9 +31,20 @@ impl CpuEngine {
                 *tip_on_node.entry(*n).or_default() += (pose.direction * *force + self.tip_sway) * *w;
             }
         }
-        for (index, (contact, memory)) in model.contact_nodes.iter().zip(&mut self.state.contact).enumerate() {
+        let State { contact: memories, displacement, velocity, .. } = &mut self.state;
+        let slit = SlitContact {
+            model: &model,
+            plan,
+            profile,
+            pose,
+            coordinate: a,
+            line: line.as_ref().map(|l| (l, (step - l.first_step) as f64 * self.dt)),
+            displacement,
+            velocity,
+        };
+        for (index, (contact, memory)) in model.contact_nodes.iter().zip(memories).enumerate() {
             let node = contact.node as usize;
-            let x = model.mesh.rest_position(node) + self.state.displacement[node];
+            let x = model.mesh.rest_position(node) + displacement[node];
             let mut sums = ContactSums::default();
             if let Some(f) = tip_on_node.get(&node) {
                 sums.tip = *f;
@@ -45,13 +57,36 @@ impl CpuEngine {
                 None => (contact.pushed && contact.rest_axial < a && s > 0.0, contact.rest_radius, 0.0),
                 Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, from_axis, s, d),
             };
-            if !touches {
+            let mut bend_power = sums.tip.dot(bend.rate);
+            // Where it rubs: normal, velocity past the needle [m/s], largest friction [N] and stiffness [N/m].
+            let mut grip = None;
+            let coefficient = match (contact.surface, plan.needle.bore, model.effects.friction) {
+                (ContactSurface::Bore, Some(bore), Some(_)) => bore.friction,
+                (_, _, Some(friction)) => friction.coefficient,
+                _ => 0.0,
+            };
+            if let ContactSurface::Slit { side } = contact.surface {
+                let force = slit.at(contact, side);
+                sums.normal = force.normal;
+                sums.on_shaft = force.on_shaft;
+                sums.stored = force.stored;
+                sums.damping_power = force.damping_power;
+                sums.torque = force.torque;
+                bend_power += force.bend_power;
+                self.added_bound[node] += force.bound;
+                memory.touching = force.normal != DVec3::ZERO;
+                memory.on_shaft = force.on_shaft != DVec3::ZERO && s >= cone;
+                let n = force.normal.normalize_or_zero();
+                let v = velocity[node] - pose.velocity - bend.rate;
+                grip = Some((n, v, coefficient * force.rubbing, plan.face_stiffness() * contact.area));
+            } else if !touches {
                 *memory =
                     ContactState { rest_radius: memory.rest_radius, passed: memory.passed, ..ContactState::default() };
             } else {
                 let overlap = |less: (f64, f64)| match contact.surface {
-                    ContactSurface::OpenedPath => profile.opened_path(from_axis, d, rest_radius, less),
-                    ContactSurface::Slit { side } => profile.slit_face(from_axis, d, side, less),
+                    ContactSurface::OpenedPath | ContactSurface::Slit { .. } => {
+                        profile.opened_path(from_axis, d, rest_radius, less)
+                    }
                     ContactSurface::OuterWall => profile.tube_wall(from_axis, d, false, less),
                     ContactSurface::Bore => profile.tube_wall(from_axis, d, true, less),
                 };
@@ -72,14 +107,16 @@ impl CpuEngine {
                 let gradient = gradient - d * gradient.dot(bend.slope);
                 let steep = gradient.length();
                 let n = -gradient / steep;
-                let v = self.state.velocity[node] - pose.velocity - pose.angular_velocity.cross(relative) - bend.rate;
+                let v = velocity[node] - pose.velocity - pose.angular_velocity.cross(relative) - bend.rate;
                 let vn = v.dot(n);
                 let mass = model.node_mass[node];
                 let damping = 2.0 * plan.params.contact_damping * (k * mass).sqrt();
                 let elastic = k * depth * steep;
                 let normal = if depth > 0.0 { (elastic - damping * vn).max(0.0) } else { 0.0 };
                 sums.normal = n * normal;
-                sums.on_shaft = s >= cone;
+                if s >= cone {
+                    sums.on_shaft = sums.normal;
+                }
                 if depth > 0.0 {
                     sums.stored = 0.5 * k * depth * depth;
                     sums.damping_power = (elastic - normal) * vn;
@@ -89,35 +126,32 @@ impl CpuEngine {
                     self.added_bound[node] += 2.0 * k * steep * steep;
                 }
                 memory.on_shaft = depth > 0.0 && s >= cone;
-                memory.stick = match model.effects.friction {
-                    Some(friction) if normal > 0.0 => {
-                        let kt = friction.stiffness_ratio * k;
-                        let coefficient = match (contact.surface, plan.needle.bore) {
-                            (ContactSurface::Bore, Some(bore)) => bore.friction,
-                            _ => friction.coefficient,
-                        };
-                        let mu = coefficient * ((s - cone) / friction.fade_length).clamp(0.0, 1.0);
-                        let trial = memory.stick + (v - n * vn) * self.dt;
-                        let trial = trial - n * trial.dot(n);
-                        let length = trial.length();
-                        let allowed = mu * normal / kt;
-                        let stretch = if length > allowed { trial * (allowed / length) } else { trial };
-                        sums.friction = stretch * -kt;
-                        // Friction force times slip.
-                        sums.friction_work = kt * stretch.dot(trial - stretch);
-                        sums.stored += 0.5 * kt * stretch.length_squared();
-                        stretch
-                    }
-                    _ => DVec3::ZERO,
-                };
+                let fade = model.effects.friction.map_or(1.0, |f| f.fade_length);
+                let rubs = ((s - cone) / fade).clamp(0.0, 1.0);
+                sums.torque = relative.cross(sums.normal);
+                bend_power += sums.normal.dot(bend.rate);
+                grip = Some((n, v, coefficient * rubs * normal, k));
+            }
+            if let (Some((n, v, limit, k)), Some(friction)) = (grip, model.effects.friction) {
+                let kt = friction.stiffness_ratio * k;
+                let trial = memory.stick + (v - n * v.dot(n)) * self.dt;
+                let trial = trial - n * trial.dot(n);
+                let length = trial.length();
+                let allowed = limit / kt;
+                memory.stick = if length > allowed { trial * (allowed / length) } else { trial };
+                sums.friction = memory.stick * -kt;
+                // Friction force times slip.
+                sums.friction_work = kt * memory.stick.dot(trial - memory.stick);
+                sums.stored += 0.5 * kt * memory.stick.length_squared();
             }
             let total = sums.tip + sums.normal + sums.friction;
-            sums.torque = relative.cross(total);
+            sums.torque += relative.cross(sums.tip + sums.friction);
+            bend_power += sums.friction.dot(bend.rate);
             self.external[node] += total;
             stored += sums.stored;
             self.sums.book(&sums, pose, self.dt);
             if line.is_some() {
-                self.sums.tool_work += total.dot(bend.rate) * self.dt;
+                self.sums.tool_work += bend_power * self.dt;
                 self.node_impulse[index] += total * self.dt;
             }
         }
