@@ -471,9 +471,8 @@ impl Model {
                 let rest = self.mesh.rest_position(pair.nodes[0] as usize) - path.entry;
                 // Of a ring pair the copy on the side of the axis belongs to the core.
                 let core = usize::from(rest.dot(axis_of(pair)) < 0.0);
-                [0, 1].map(|n| {
-                    (pair.nodes[n], if n == core { ContactSurface::Bore } else { ContactSurface::OuterWall })
-                })
+                [0, 1]
+                    .map(|n| (pair.nodes[n], if n == core { ContactSurface::Bore } else { ContactSurface::OuterWall }))
             })
             .chain(self.slit_nodes().into_iter().map(|n| (n.node, ContactSurface::Slit { side: n.side })))
             .collect()

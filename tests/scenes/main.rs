@@ -16,6 +16,7 @@ mod effects;
 mod free_hand;
 mod muscle_biopsy;
 mod samples;
+mod slit;
 mod tip;
 mod validation;
 
