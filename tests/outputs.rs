@@ -155,6 +155,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
             duration: None,
         },
         outputs: Outputs { picture_width: 900, ..Default::default() },
+        targets: Vec::new(),
         notices: Vec::new(),
     }
 }
@@ -191,6 +192,7 @@ fn snapshot(scene: &Scene, mesh: &Mesh, depth: f64) -> FieldSnapshot {
     };
     FieldSnapshot {
         cells_in_needle: None,
+        targets: Vec::new(),
         frame: 90,
         time: 3.0,
         depth,
@@ -306,7 +308,7 @@ fn pictures_are_named_by_their_moment() {
 fn tables_grow_row_by_row_and_survive_without_being_closed() {
     let base = tempfile::tempdir().unwrap();
     let folder = OutputFolder::create(Some(base.path()), "scene", false).unwrap();
-    let mut tables = Tables::create(&folder, &[], false).unwrap();
+    let mut tables = Tables::create(&folder, &[], false, &[]).unwrap();
     assert!(!folder.file(SAMPLE_TABLE).exists());
     let records = records();
     for (rows, record) in records.iter().take(5).enumerate() {
@@ -550,7 +552,7 @@ fn charts_are_well_formed() {
     let base = kept("charts");
     fs::create_dir_all(&base).unwrap();
     let all = records();
-    let still: Vec<FrameRecord> = all.iter().map(|r| FrameRecord { depth: 0.0, ..*r }).collect();
+    let still: Vec<FrameRecord> = all.iter().map(|r| FrameRecord { depth: 0.0, ..r.clone() }).collect();
     let mut broken = all.clone();
     broken[50].force.axial = f64::NAN;
     for (name, title, records) in [
@@ -639,7 +641,7 @@ fn a_sample_is_written_per_driven_face() {
     // 16 mm between the faces, 20 x 20 mm: pulled to a stretch of 1.5, 40 N are 100 kPa.
     let faces = DrivenFace::of_scene(&driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &mesh);
     let records = pulled(Face::ZMax, DVec3::Z, 40.0);
-    let mut tables = Tables::create(&folder, &faces, false).unwrap();
+    let mut tables = Tables::create(&folder, &faces, false, &[]).unwrap();
     for (rows, record) in records.iter().enumerate() {
         tables.append(record).unwrap();
         let text = fs::read_to_string(folder.file(SAMPLE_TABLE)).unwrap();
