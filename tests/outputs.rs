@@ -21,8 +21,8 @@ use stylet::output::{
 };
 use stylet::render::{self, Image, Picture, offscreen, raster};
 use stylet::scene::{
-    Face, FaceCondition, FaceDrive, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial,
-    Tool,
+    Face, FaceCondition, FaceDrive, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Target, Tissue,
+    TissueMaterial, Tool,
 };
 use stylet::{Error, Result};
 
@@ -236,6 +236,7 @@ fn a_named_folder_is_made_and_not_reused() {
         "force.svg",
         "force_parts.svg",
         "core.csv",
+        "targets.csv",
         "sample.csv",
         "sample.svg",
         "frames.pvd",
@@ -911,4 +912,37 @@ fn a_picture_larger_than_the_device_draws_is_refused() {
     let mut picture = Picture::compose(&scene, &mesh, &snapshot);
     picture.height = device.limits().max_texture_dimension_2d + 1;
     is_input_error(offscreen::render_on_device(&device, &queue, &picture), "larger");
+}
+
+#[test]
+fn targets_are_drawn_where_they_are() {
+    let mesh = mesh(1.2e-3);
+    let mut scene = scene(needle(), DVec3::NEG_Z);
+    let mut fields = snapshot(&scene, &mesh, 5e-3);
+    let mut drawn = |place: DVec3| {
+        scene.targets = vec![Target { name: "lesion".into(), position: DVec3::ZERO, radius: 1e-3 }];
+        fields.targets = vec![place];
+        let image = render::draw(&scene, &mesh, &fields, None).unwrap();
+        let marked = |&(x, y): &(u32, u32)| {
+            let [r, g, b, _] = image.pixel(x, y);
+            r < 20 && g > 200 && b > 160
+        };
+        let all = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y)));
+        all.filter(marked).collect::<Vec<_>>()
+    };
+    let middle = |pixels: &[(u32, u32)]| {
+        let sum = pixels.iter().fold(DVec2::ZERO, |sum, (x, y)| sum + DVec2::new(f64::from(*x), f64::from(*y)));
+        sum / pixels.len() as f64
+    };
+    let (here, right, beside) = (
+        drawn(DVec3::new(3e-3, 0.0, -8e-3)),
+        drawn(DVec3::new(5e-3, 0.0, -8e-3)),
+        drawn(DVec3::new(3e-3, 2e-3, -8e-3)),
+    );
+    // 2 mm to the right of 20 mm across the plot; out of the plane the cross is left.
+    let moved = middle(&right) - middle(&here);
+    assert!((55.0..80.0).contains(&moved.x) && moved.y.abs() < 1.0, "{moved}");
+    assert!(!beside.is_empty() && 3 * beside.len() < here.len(), "{} {}", beside.len(), here.len());
+    assert!((middle(&beside) - middle(&here)).length() < 1.5);
+    assert_eq!(drawn(DVec3::NAN), []);
 }

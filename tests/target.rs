@@ -166,7 +166,7 @@ fn the_tissue_carries_a_target_ahead_and_the_engines_agree() {
     let [cpu, gpu] = &runs[..] else { return };
     let moved =
         |run: &[FrameRecord]| -> Vec<DVec3> { run.iter().flat_map(|r| &r.targets).map(|t| t.displacement).collect() };
-    at_most("GPU against CPU, part of the largest displacement", relative_difference(&moved(gpu), &moved(cpu)), 2e-3);
+    at_most("GPU against CPU, part of the largest displacement", relative_difference(&moved(gpu), &moved(cpu)), 1e-4);
 }
 
 /// Free path, slit and hollow needle: grids and paths of every kind.
@@ -189,6 +189,24 @@ fn every_kind_of_needle_moves_the_targets() {
         assert!(pushed > 0.02e-3, "{what}: {pushed}");
         let beside = run.last().unwrap().targets[1];
         assert!(beside.displacement.is_finite() && beside.displacement.length() > 1e-6, "{what}: {beside:?}");
+    }
+}
+
+/// Distances are those from the tip of the bent needle.
+#[test]
+fn a_flexible_needle_has_its_tip_where_it_bends_to() {
+    let shallow = "motion.phase=[{kind = \"insert\", speed_mm_s = 10, depth_mm = 3}]";
+    let scene = short("effects/flexible_needle.toml", &[shallow]);
+    let targets = scene.targets.clone();
+    let run = records(scene, *choices().last().unwrap());
+    let last = run.last().unwrap();
+    let bent = last.needle.tip_offset;
+    println!("tip {:.1} um beside and {:.1} um behind", bent.length() * 1e6, last.needle.retreat * 1e6);
+    assert!(bent.length() > 1e-6);
+    for (target, found) in targets.iter().zip(&last.targets) {
+        let tip = target.position + found.displacement - found.from_tip.unwrap();
+        let straight = DVec3::NEG_Z * (10e-3 * last.time).min(3e-3);
+        assert!((tip - straight - bent - DVec3::Z * last.needle.retreat).length() < 1e-9, "{tip} {straight}");
     }
 }
 

@@ -8,7 +8,8 @@ use super::tables::number;
 use crate::observables::{FrameRecord, TargetRecord};
 use crate::scene::Target;
 
-/// Columns of `targets.csv`. Time and depth are those of `force.csv`; the last two are empty without a tool.
+/// Columns of `targets.csv`. Time and depth are those of `force.csv`, the rest belongs to the end of the frame; the last two
+/// are empty without a tool.
 pub const TARGET_COLUMNS: [&str; 9] = [
     "time_s",
     "depth_m",

@@ -368,7 +368,7 @@ impl Engine for CpuEngine {
             self.share_needle_loads(&pose);
         }
         self.measure();
-        self.finished.push_back(self.sums.clone());
+        self.finished.push_back(std::mem::take(&mut self.sums));
         Ok(())
     }
 
