@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::effects::{EffectSet, cohesive, puncture};
 use crate::material_point::Material;
 use crate::mesh::block::SLIT_HALF_WIDTH;
-use crate::mesh::{BlockMesh, Bore, Mesh};
+use crate::mesh::{BlockMesh, Bore, Mesh, TissuePoint};
 use crate::needle::free_path::FreeTip;
 use crate::needle::gap::Profile;
 use crate::needle::slit::{REFERENCE_EDGE, SlitFaces};
@@ -217,6 +217,8 @@ pub struct Model {
     pub cohesion: Option<cohesive::Law>,
     /// Nodes that a tool may touch, ascending in the node index; empty without contact.
     pub contact_nodes: Vec<ContactNode>,
+    /// Where the targets of the scene lie in the block.
+    pub targets: Vec<TissuePoint>,
 }
 
 /// Number of tip springs of a solid needle on a path without a slit: one on the axis, 6 at R/2, 12 at R.
@@ -243,6 +245,9 @@ impl Model {
         let cell_material = if scene.regions.is_empty() { Vec::new() } else { assign_materials(&scene, &mesh) };
         let node_mass = nodal_masses(&mesh, &materials, &cell_material, scaling);
         let (node_load, load_ramp) = nodal_loads(&scene, &mesh);
+        let targets = mesh.as_block().map_or(Vec::new(), |block| {
+            scene.targets.iter().map(|target| TissuePoint::new(block, target.position)).collect()
+        });
         let kinematics = (!scene.motion.phases.is_empty()).then(|| Kinematics::new(&scene.motion));
         let mut model = Model {
             effects: scene.effects.clone(),
@@ -257,6 +262,7 @@ impl Model {
             separation: Separation::default(),
             cohesion: None,
             contact_nodes: Vec::new(),
+            targets,
             scene,
             mesh,
         };

@@ -21,8 +21,8 @@ use stylet::output::{
 };
 use stylet::render::{self, Image, Picture, offscreen, raster};
 use stylet::scene::{
-    Face, FaceCondition, FaceDrive, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial,
-    Tool,
+    Face, FaceCondition, FaceDrive, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Target, Tissue,
+    TissueMaterial, Tool,
 };
 use stylet::{Error, Result};
 
@@ -155,6 +155,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
             duration: None,
         },
         outputs: Outputs { picture_width: 900, ..Default::default() },
+        targets: Vec::new(),
         notices: Vec::new(),
     }
 }
@@ -191,6 +192,7 @@ fn snapshot(scene: &Scene, mesh: &Mesh, depth: f64) -> FieldSnapshot {
     };
     FieldSnapshot {
         cells_in_needle: None,
+        targets: Vec::new(),
         frame: 90,
         time: 3.0,
         depth,
@@ -234,6 +236,7 @@ fn a_named_folder_is_made_and_not_reused() {
         "force.svg",
         "force_parts.svg",
         "core.csv",
+        "targets.csv",
         "sample.csv",
         "sample.svg",
         "frames.pvd",
@@ -306,7 +309,7 @@ fn pictures_are_named_by_their_moment() {
 fn tables_grow_row_by_row_and_survive_without_being_closed() {
     let base = tempfile::tempdir().unwrap();
     let folder = OutputFolder::create(Some(base.path()), "scene", false).unwrap();
-    let mut tables = Tables::create(&folder, &[], false).unwrap();
+    let mut tables = Tables::create(&folder, &[], false, &[]).unwrap();
     assert!(!folder.file(SAMPLE_TABLE).exists());
     let records = records();
     for (rows, record) in records.iter().take(5).enumerate() {
@@ -550,7 +553,7 @@ fn charts_are_well_formed() {
     let base = kept("charts");
     fs::create_dir_all(&base).unwrap();
     let all = records();
-    let still: Vec<FrameRecord> = all.iter().map(|r| FrameRecord { depth: 0.0, ..*r }).collect();
+    let still: Vec<FrameRecord> = all.iter().map(|r| FrameRecord { depth: 0.0, ..r.clone() }).collect();
     let mut broken = all.clone();
     broken[50].force.axial = f64::NAN;
     for (name, title, records) in [
@@ -639,7 +642,7 @@ fn a_sample_is_written_per_driven_face() {
     // 16 mm between the faces, 20 x 20 mm: pulled to a stretch of 1.5, 40 N are 100 kPa.
     let faces = DrivenFace::of_scene(&driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &mesh);
     let records = pulled(Face::ZMax, DVec3::Z, 40.0);
-    let mut tables = Tables::create(&folder, &faces, false).unwrap();
+    let mut tables = Tables::create(&folder, &faces, false, &[]).unwrap();
     for (rows, record) in records.iter().enumerate() {
         tables.append(record).unwrap();
         let text = fs::read_to_string(folder.file(SAMPLE_TABLE)).unwrap();
@@ -909,4 +912,37 @@ fn a_picture_larger_than_the_device_draws_is_refused() {
     let mut picture = Picture::compose(&scene, &mesh, &snapshot);
     picture.height = device.limits().max_texture_dimension_2d + 1;
     is_input_error(offscreen::render_on_device(&device, &queue, &picture), "larger");
+}
+
+#[test]
+fn targets_are_drawn_where_they_are() {
+    let mesh = mesh(1.2e-3);
+    let mut scene = scene(needle(), DVec3::NEG_Z);
+    let mut fields = snapshot(&scene, &mesh, 5e-3);
+    let mut drawn = |place: DVec3| {
+        scene.targets = vec![Target { name: "lesion".into(), position: DVec3::ZERO, radius: 1e-3 }];
+        fields.targets = vec![place];
+        let image = render::draw(&scene, &mesh, &fields, None).unwrap();
+        let marked = |&(x, y): &(u32, u32)| {
+            let [r, g, b, _] = image.pixel(x, y);
+            r < 20 && g > 200 && b > 160
+        };
+        let all = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y)));
+        all.filter(marked).collect::<Vec<_>>()
+    };
+    let middle = |pixels: &[(u32, u32)]| {
+        let sum = pixels.iter().fold(DVec2::ZERO, |sum, (x, y)| sum + DVec2::new(f64::from(*x), f64::from(*y)));
+        sum / pixels.len() as f64
+    };
+    let (here, right, beside) = (
+        drawn(DVec3::new(3e-3, 0.0, -8e-3)),
+        drawn(DVec3::new(5e-3, 0.0, -8e-3)),
+        drawn(DVec3::new(3e-3, 2e-3, -8e-3)),
+    );
+    // 2 mm to the right of 20 mm across the plot; out of the plane the cross is left.
+    let moved = middle(&right) - middle(&here);
+    assert!((55.0..80.0).contains(&moved.x) && moved.y.abs() < 1.0, "{moved}");
+    assert!(!beside.is_empty() && 3 * beside.len() < here.len(), "{} {}", beside.len(), here.len());
+    assert!((middle(&beside) - middle(&here)).length() < 1.5);
+    assert_eq!(drawn(DVec3::NAN), []);
 }

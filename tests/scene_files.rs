@@ -392,6 +392,7 @@ fn the_schema_describes_every_table() {
         "support",
         "accept_size",
         "speed_mm_min",
+        "position_mm",
     ] {
         assert!(text.contains(key), "no {key}");
     }
@@ -861,6 +862,54 @@ fn wrong_regions() {
     );
 }
 
+#[test]
+fn targets_are_read_in_si() {
+    let text = "[[target]]\nname = \"lesion 1\"\nposition_mm = [1, -2, -3]\nradius_mm = 0.5\n\
+                [[target]]\nposition_mm = [5, -5, 0]\n";
+    let scene = load_block("", &format!("{MATERIAL}{text}")).unwrap_or_else(|m| panic!("{m}"));
+    let [first, second] = &scene.targets[..] else { panic!("{:?}", scene.targets) };
+    assert_eq!((first.name.as_str(), second.name.as_str()), ("lesion 1", "target 2"));
+    assert!(first.position.distance(glam::DVec3::new(1e-3, -2e-3, -3e-3)) < 1e-15);
+    assert!((first.radius - 0.5e-3).abs() < 1e-15 && (second.radius - 1e-3).abs() < 1e-15);
+    assert!(scene.notices.is_empty(), "{:?}", scene.notices);
+}
+
+#[test]
+fn wrong_targets() {
+    let target = |text: &str| format!("{MATERIAL}[[target]]\n{text}\n");
+    for (text, marker, expected) in [
+        ("position_mm = [0, 6, -3]", "position_mm", "outside the tissue"),
+        ("position_mm = [0, 0, 1]", "position_mm", "z points up and is 0 at the top"),
+        ("position_mm = [0, 0, -10.1]", "position_mm", "the tissue spans (-5.000, -5.000, -10.000)"),
+        ("position_mm = [0, nan, -3]", "position_mm", "not a finite number"),
+        ("position_mm = [0, 0, -inf]", "position_mm", "not a finite number"),
+        ("position_mm = [0, 0]", "position_mm", "invalid length"),
+        ("radius_mm = 1", "[[target]]", "missing field `position_mm`"),
+        ("position_mm = [0, 0, -3]\nradius_mm = -1", "radius_mm", "greater than 0"),
+        ("position_mm = [0, 0, -3]\nradius_mm = 0", "radius_mm", "greater than 0"),
+        ("position_mm = [0, 0, -3]\nradius = 1", "radius = 1", "did you mean `radius_mm`?"),
+        ("position_mm = [0, 0, -3]\nname = \" \"", "name = ", "empty or taken"),
+        ("position_mm = [0, 0, -3]\nname = \"a, b\"", "name = ", "a comma, a quote or a control character"),
+        ("position_mm = [0, 0, -3]\nname = \"a\\tb\"", "name = ", "a comma, a quote or a control character"),
+        ("position_mm = [0, 0, -3]\nname = \"the \\\"one\\\"\"", "name = ", "a comma, a quote or a control character"),
+        (
+            "position_mm = [0, 0, -3]\n[[target]]\nposition_mm = [0, 0, -4]\nname = \"target 1\"",
+            "name = \"target 1\"",
+            "empty or taken",
+        ),
+    ] {
+        assert_block_refused("", &target(text), marker, &[expected, "= way out: "]);
+    }
+    let many: String = (0..65).map(|i| format!("[[target]]\nposition_mm = [0, 0, -{}]\n", i + 1)).collect();
+    let many = many.replacen("[0, 0, -65]", "[0, 0, -1] # the last", 1);
+    let message = load_block("", &format!("{MATERIAL}{many}")).unwrap_err();
+    for expected in ["the scene has 65 targets", "keep at most 64 targets"] {
+        assert!(message.contains(expected), "no `{expected}` in\n{message}");
+    }
+    let line = BLOCK.lines().count() + 1 + MATERIAL.lines().count() + 2 * 64 + 1;
+    assert!(message.contains(&format!("scene.toml:{line}:")), "no line {line} in\n{message}");
+}
+
 /// The main scene with `text` at its end and `change` made.
 fn needle_scene(change: (&str, &str), text: &str) -> Scene {
     let whole = std::fs::read_to_string(main_scene()).unwrap();
@@ -990,6 +1039,12 @@ fn a_mesh_with_tags_and_supports() {
 #[test]
 fn wrong_meshes() {
     for (from, to, marker, expected) in [
+        (
+            "[[support]]",
+            "[[target]]\nposition_mm = [1, 1, 1]\n\n[[support]]",
+            "[[target]]",
+            &["a target acts on the block only"][..],
+        ),
         ("unit = \"mm\"", "", "mesh =", &["does not say its unit", "add unit = \"mm\""][..]),
         ("\"mm\"", "\"miles\"", "unit =", &["no unit of length called \"miles\"", "m, cm, mm, um"]),
         ("\"mm\"", "\"um\"", "mesh =", &["way out"]),

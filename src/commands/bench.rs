@@ -133,6 +133,7 @@ pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
             duration: Some(1.0),
         },
         outputs: Outputs::default(),
+        targets: Vec::new(),
         notices: Vec::new(),
     }
 }

@@ -87,6 +87,11 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         let fixed: String = names.filter(|(_, on)| *on).map(|(name, _)| name).collect();
         line(format!("support      {}: {fixed} held", support.set));
     }
+    for target in &scene.targets {
+        let [x, y, z] = (target.position * 1e3).to_array().map(four_digits);
+        let radius = four_digits(target.radius * 1e3);
+        line(format!("target       {} at ({x}, {y}, {z}) mm, hit within {radius} mm", target.name));
+    }
     if let Some(tool) = &scene.tool {
         line(format!("tool         {}", describe_tool(tool)));
     }

@@ -8,8 +8,8 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::{
-    CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables, folder,
-    write_force_chart, write_parts_chart, write_sample_chart,
+    CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables,
+    TargetFigures, folder, write_force_chart, write_parts_chart, write_sample_chart,
 };
 use crate::process;
 use crate::render;
@@ -65,7 +65,7 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         simulation.stop_after(moment.frame);
     }
     let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
-    let mut tables = Tables::create(&output, &driven, simulation.model.has_bore())?;
+    let mut tables = Tables::create(&output, &driven, simulation.model.has_bore(), &scene.targets)?;
     let mut fields = FieldFiles::new(&output);
     let progress = Progress::new(simulation.duration());
     let device = simulation.device().cloned();
@@ -156,6 +156,7 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     summary.cells_in_needle = cells_in_needle;
     summary.take_frames(&records);
     summary.take_sample(&driven, &records);
+    summary.targets = TargetFigures::of_run(&scene.targets, &records);
     if !records.is_empty() {
         let figures = CurveFigures::from_records(&records);
         write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, &records, &figures)?;
@@ -280,6 +281,29 @@ pub fn describe(summary: &Summary) -> String {
             100.0 * summary.core_strain.unwrap_or(0.0),
             mass * 1e6
         );
+    }
+    for target in &summary.targets {
+        text += &format!(
+            "target {}: moves by {:.3} mm at most on the way in, at {:.2} mm",
+            target.name,
+            target.largest_displacement_m * 1e3,
+            target.largest_displacement_depth_m * 1e3
+        );
+        if let (Some(smallest), Some(depth), Some(end), Some(hit)) = (
+            target.smallest_tip_distance_m,
+            target.smallest_tip_distance_depth_m,
+            target.tip_distance_at_end_m,
+            target.hit,
+        ) {
+            text += &format!(
+                "; the tip comes to {:.3} mm at {:.2} mm, {:.3} mm at the end: {}",
+                smallest * 1e3,
+                depth * 1e3,
+                end * 1e3,
+                if hit { "hit" } else { "missed" }
+            );
+        }
+        text.push('\n');
     }
     if let Some(count) = summary.cells_in_needle {
         text += &format!(

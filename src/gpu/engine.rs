@@ -160,10 +160,12 @@ struct InFlight {
     mapped: Arc<AtomicU8>,
 }
 
-/// Where the results of each measuring stage lie in a staging buffer.
+/// A part of a buffer that is read back after every frame, and where it lies in a staging buffer.
 #[derive(Debug, Clone, Copy)]
 struct ResultRange {
     name: &'static str,
+    /// Where it begins in its own buffer.
+    from: u64,
     offset: u64,
     size: u64,
 }
@@ -228,15 +230,22 @@ impl GpuEngine {
             })
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
-        let results: Vec<ResultRange> =
+        let sums =
             ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "needle_loads", "tip_result"]
                 .into_iter()
-                .filter_map(|name| buffers.get(name).map(|b| (name, b.size())))
-                .map(|(name, size)| {
-                    offset += size;
-                    ResultRange { name, offset: offset - size, size }
-                })
-                .collect();
+                .filter_map(|name| buffers.get(name).map(|b| (name, 0, b.size())));
+        // Of the displacements only those around the targets.
+        let corners = model.targets.iter().flat_map(|target| target.nodes).map(|node| {
+            let size = size_of::<[i32; 4]>() as u64;
+            ("node_displacement", u64::from(node) * size, size)
+        });
+        let results: Vec<ResultRange> = sums
+            .chain(corners)
+            .map(|(name, from, size)| {
+                offset += size;
+                ResultRange { name, from, offset: offset - size, size }
+            })
+            .collect();
         let staging: Vec<wgpu::Buffer> = (0..RING)
             .map(|_| {
                 gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -355,6 +364,7 @@ impl GpuEngine {
             ..Default::default()
         };
         let mut moment = DVec3::ZERO;
+        let mut corners = Vec::new();
         for range in &self.results {
             let bytes = &view[range.offset as usize..(range.offset + range.size) as usize];
             match range.name {
@@ -395,6 +405,7 @@ impl GpuEngine {
                         sums.reactions[index / FACE_PARTS] += force;
                     }
                 }
+                "node_displacement" => corners.extend(read_all(bytes).map(displacement)),
                 "needle_loads" => {
                     for (load, s) in sums.needle_loads.iter_mut().zip(read_all::<[f32; 4]>(bytes)) {
                         *load = DVec3::new(s[0].into(), s[1].into(), s[2].into());
@@ -437,6 +448,8 @@ impl GpuEngine {
                 }
             }
         }
+        let around = corners.chunks_exact(8).map(|c| std::array::from_fn(|n| c[n]));
+        sums.targets = self.model.targets.iter().zip(around).map(|(target, u)| target.interpolated(u)).collect();
         if let Some(gravity) = self.model.effects.gravity {
             let total = moment.dot(gravity.acceleration) / self.model.mass_scaling();
             sums.load_work += total - self.gravity_work;
@@ -511,6 +524,11 @@ fn await_mapping(gpu: &Gpu, mapped: &AtomicU8) -> Result<()> {
 /// Values of a byte slice that need not be aligned.
 fn read_all<T: bytemuck::Pod>(bytes: &[u8]) -> impl Iterator<Item = T> + '_ {
     bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned)
+}
+
+/// A displacement in fixed point [m].
+fn displacement(u: [i32; 4]) -> DVec3 {
+    DVec3::new(u[0].into(), u[1].into(), u[2].into()) * DISPLACEMENT_UNIT
 }
 
 /// Threads of the measuring stages: enough to fill a device, few enough that the sums are a short read-back.
@@ -1263,7 +1281,8 @@ impl Engine for GpuEngine {
         }
         let slot = (0..RING).find(|s| self.in_flight.iter().all(|f| f.slot != *s)).unwrap_or(0);
         for range in &self.results {
-            encoder.copy_buffer_to_buffer(&self.buffers[range.name], 0, &self.staging[slot], range.offset, range.size);
+            let source = &self.buffers[range.name];
+            encoder.copy_buffer_to_buffer(source, range.from, &self.staging[slot], range.offset, range.size);
         }
         let submission = self.gpu.queue.submit([encoder.finish()]);
         let mapped = map_for_reading(&self.staging[slot]);
@@ -1309,9 +1328,7 @@ impl Engine for GpuEngine {
         for (name, bytes) in names.iter().zip(&bytes) {
             match *name {
                 "node_displacement" => {
-                    state.displacement = read_all::<[i32; 4]>(bytes)
-                        .map(|u| DVec3::new(u[0].into(), u[1].into(), u[2].into()) * DISPLACEMENT_UNIT)
-                        .collect();
+                    state.displacement = read_all(bytes).map(displacement).collect();
                 }
                 "node_velocity" => state.velocity = read_all::<[f32; 4]>(bytes).map(vector).collect(),
                 "cell_stiffness" => state.stiffness = read_all::<f32>(bytes).map(f64::from).collect(),

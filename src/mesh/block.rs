@@ -161,21 +161,53 @@ impl BlockMesh {
         }
         let square = bore.centre + ray * (0.5 * (low + high));
         let ((i, xi), (j, eta)) = (along(0, square.x), along(1, square.y));
-        // The cell is bilinear between its corners, the map is not: Newton's iteration within the cell.
+        // The cell is bilinear between its corners, the map is not.
+        let local = self.place_in_column([i, j], x.truncate(), DVec2::new(xi, eta));
+        let local = local.clamp(DVec2::ZERO, DVec2::ONE);
+        ([i, j, k], local.extend(zeta))
+    }
+
+    /// As [`BlockMesh::locate`], but where the grid is bent the cell whose straight sides hold the point: between a circle and
+    /// its chord that is the neighbour.
+    pub fn locate_exactly(&self, x: DVec3) -> ([usize; 3], DVec3) {
+        let ([i, j, k], local) = self.locate(x);
+        if self.bore.is_none() {
+            return ([i, j, k], local);
+        }
+        let flat = x.truncate();
+        // Two columns to either side: one of them may be a gap.
+        let near = |a: usize, at: usize| at.saturating_sub(2)..(at + 3).min(self.cells()[a]);
+        let columns = near(1, j).flat_map(|j| near(0, i).map(move |i| [i, j]));
+        let neighbours = columns.filter(|[i, j]| !self.is_gap(self.cell_index(*i, *j, k))).map(|column| {
+            let place = self.place_in_column(column, flat, DVec2::splat(0.5));
+            (column, place.clamp(DVec2::ZERO, DVec2::ONE))
+        });
+        let miss = |column: [usize; 2], place: DVec2| bilinear(self.column_corners(column), place).distance(flat);
+        let places = std::iter::once(([i, j], local.truncate())).chain(neighbours);
+        let best =
+            places.map(|(column, place)| (miss(column, place), column, place)).min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map_or(([i, j, k], local), |(_, [i, j], place)| ([i, j, k], place.extend(local.z)))
+    }
+
+    /// Corners of a column of cells, counter-clockwise [m].
+    fn column_corners(&self, [i, j]: [usize; 2]) -> [DVec2; 4] {
         let corner = |di: usize, dj: usize| self.rest_position(self.node_index(i + di, j + dj, 0)).truncate();
-        let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
-        let mut local = DVec2::new(xi, eta);
+        [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)]
+    }
+
+    /// Where a point lies between the corners of a column of cells, 0..1 per axis inside it: Newton's iteration from `start`.
+    fn place_in_column(&self, column: [usize; 2], x: DVec2, start: DVec2) -> DVec2 {
+        let [a, b, c, d] = self.column_corners(column);
+        let mut local = start;
         for _ in 0..20 {
             let (u, v) = (local.x, local.y);
-            let at = a * ((1.0 - u) * (1.0 - v)) + b * (u * (1.0 - v)) + c * (u * v) + d * ((1.0 - u) * v);
             let along_u = (b - a) * (1.0 - v) + (c - d) * v;
             let along_v = (d - a) * (1.0 - u) + (c - b) * u;
-            let miss = x.truncate() - at;
+            let miss = x - bilinear([a, b, c, d], local);
             let det = along_u.perp_dot(along_v);
             local += DVec2::new(miss.perp_dot(along_v), along_u.perp_dot(miss)) / det;
         }
-        let local = local.clamp(DVec2::ZERO, DVec2::ONE);
-        ([i, j, k], local.extend(zeta))
+        local
     }
 
     /// Tributary volume of a node, an eighth of every cell around it, where all lines are straight [m^3].
@@ -190,6 +222,12 @@ impl BlockMesh {
             })
             .product()
     }
+}
+
+/// The point at the place `local`, 0..1 per axis, between four corners.
+fn bilinear([a, b, c, d]: [DVec2; 4], local: DVec2) -> DVec2 {
+    let (u, v) = (local.x, local.y);
+    a * ((1.0 - u) * (1.0 - v)) + b * (u * (1.0 - v)) + c * (u * v) + d * ((1.0 - u) * v)
 }
 
 /// Largest fitted ratio over the wanted one. A ratio fitted upwards saves one layer of cells per side.

@@ -3,6 +3,7 @@
 pub mod block;
 pub mod import;
 pub mod tets;
+pub mod tissue_point;
 
 use std::sync::Arc;
 
@@ -10,6 +11,7 @@ use glam::DVec3;
 
 pub use block::{BlockMesh, Bore};
 pub use tets::TetMesh;
+pub use tissue_point::TissuePoint;
 
 /// The mesh of a model.
 #[derive(Debug, Clone, PartialEq)]

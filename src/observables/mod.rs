@@ -165,7 +165,7 @@ pub struct NeedleRecord {
 }
 
 /// One display frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameRecord {
     /// Frame number, from 0; the record describes the state at its end.
     pub frame: u64,
@@ -188,6 +188,8 @@ pub struct FrameRecord {
     pub health: Health,
     /// What the bore of a hollow needle holds.
     pub core: Option<CoreSample>,
+    /// The targets of the scene, in its order.
+    pub targets: Vec<TargetRecord>,
 }
 
 /// Fields of one moment, for VTU files and pictures.
@@ -204,6 +206,8 @@ pub struct FieldSnapshot {
     pub tool_pose: Option<(DVec3, DVec3)>,
     /// Cells whose centre lies in the wall of the needle; `None` without a needle that cuts.
     pub cells_in_needle: Option<usize>,
+    /// Where the targets of the scene are now [m].
+    pub targets: Vec<DVec3>,
     /// Displacement per node [m], node order of the mesh.
     pub displacement: Vec<DVec3>,
     /// Von Mises stress per cell [Pa].
@@ -224,7 +228,9 @@ pub struct FieldSnapshot {
 mod core_sample;
 mod needle_volume;
 mod recorder;
+mod target;
 
 pub use core_sample::CoreSample;
 pub use needle_volume::cells_in_needle;
 pub use recorder::Recorder;
+pub use target::TargetRecord;

@@ -70,6 +70,7 @@ impl Recorder {
             energy: *e,
             needle: Default::default(),
             core: None,
+            targets: Vec::new(),
             health: Health {
                 min_j: sums.min_j,
                 min_corner_j: sums.min_corner_j,

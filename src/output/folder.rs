@@ -18,12 +18,14 @@ pub const FORCE_PARTS_CHART: &str = "force_parts.svg";
 pub const SAMPLE_TABLE: &str = "sample.csv";
 /// What the bore of a hollow needle holds, per frame.
 pub const CORE_TABLE: &str = "core.csv";
+/// Where the targets are, per frame and target; written where the scene has any.
+pub const TARGET_TABLE: &str = "targets.csv";
 pub const SAMPLE_CHART: &str = "sample.svg";
 pub const FIELD_COLLECTION: &str = "frames.pvd";
 /// Folder of the VTU files `frame_00012.vtu`.
 pub const FIELD_FOLDER: &str = "frames";
 
-const SINGLE_FILES: [&str; 9] = [
+const SINGLE_FILES: [&str; 10] = [
     FORCE_TABLE,
     ENERGY_TABLE,
     SUMMARY,
@@ -31,6 +33,7 @@ const SINGLE_FILES: [&str; 9] = [
     FORCE_PARTS_CHART,
     SAMPLE_TABLE,
     CORE_TABLE,
+    TARGET_TABLE,
     SAMPLE_CHART,
     FIELD_COLLECTION,
 ];
@@ -256,6 +259,7 @@ mod tests {
             "force.svg",
             "force_parts.svg",
             "core.csv",
+            "targets.csv",
             "sample.csv",
             "sample.svg",
             "frames.pvd",

@@ -18,6 +18,7 @@ pub mod sample;
 pub mod sample_chart;
 pub mod summary;
 pub mod tables;
+pub mod target;
 pub mod vtu;
 pub mod whole_file;
 
@@ -30,4 +31,5 @@ pub use sample::DrivenFace;
 pub use sample_chart::write_sample_chart;
 pub use summary::{Status, Summary};
 pub use tables::Tables;
+pub use target::TargetFigures;
 pub use vtu::FieldFiles;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::curve::{CurveFigures, MajorDrop, frames_on_the_way_in, major_drops};
 use super::sample::{DrivenFace, SamplePoint};
 use super::tables::{hourglass_to_internal, kinetic_to_internal};
+use super::target::TargetFigures;
 use super::whole_file;
 use crate::observables::FrameRecord;
 use crate::{Error, Result};
@@ -111,6 +112,10 @@ pub struct Summary {
     pub core_mass_kg: Option<f64>,
     pub core_strain: Option<f64>,
     pub core_yield: Option<f64>,
+
+    /// Targets of the scene on the way in; absent where it has none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<TargetFigures>,
 
     /// Largest |external work - accounted energy| of a frame over the largest external work of the run; not a number
     /// (`null`) if any frame had none.

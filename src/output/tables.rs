@@ -1,14 +1,16 @@
-//! `force.csv` and `energy.csv`: one row per display frame, `sample.csv`: one per frame and driven face; units in the
-//! column names.
+//! `force.csv` and `energy.csv`: one row per display frame, `sample.csv`: one per frame and driven face, `targets.csv`: one
+//! per frame and target; units in the column names.
 //!
 //! All are flushed after every row: whatever stops the program, the rows of all finished frames are on the disk.
 
 use std::fs::File;
 use std::path::PathBuf;
 
-use super::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE};
+use super::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE, TARGET_TABLE};
 use super::sample::{DrivenFace, SAMPLE_COLUMNS, SamplePoint};
+use super::target::{TARGET_COLUMNS, target_row};
 use crate::observables::{EnergyAccount, ForceParts, FrameRecord};
+use crate::scene::Target;
 use crate::{Error, Result};
 
 /// Columns of `force.csv`; the meaning is that of the fields of [`FrameRecord`].
@@ -89,6 +91,8 @@ pub struct Tables {
     core: Option<Table>,
     /// Where faces are driven.
     sample: Option<(Vec<DrivenFace>, Table)>,
+    /// Names of the targets, where there are any.
+    targets: Option<(Vec<String>, Table)>,
 }
 
 #[derive(Debug)]
@@ -116,22 +120,31 @@ impl Table {
 
 impl Tables {
     /// Creates the files with their header rows; that of the sample only where faces are driven, that of the core only with a
-    /// hollow needle.
-    pub fn create(folder: &OutputFolder, driven: &[DrivenFace], hollow: bool) -> Result<Self> {
+    /// hollow needle, that of the targets only where there are any.
+    pub fn create(folder: &OutputFolder, driven: &[DrivenFace], hollow: bool, targets: &[Target]) -> Result<Self> {
         let sample = match driven {
             [] => None,
             driven => Some((driven.to_vec(), Table::create(folder.file(SAMPLE_TABLE), &SAMPLE_COLUMNS)?)),
         };
         let core = hollow.then(|| Table::create(folder.file(CORE_TABLE), &CORE_COLUMNS)).transpose()?;
+        let targets = match targets {
+            [] => None,
+            targets => {
+                let names = targets.iter().map(|target| target.name.clone()).collect();
+                Some((names, Table::create(folder.file(TARGET_TABLE), &TARGET_COLUMNS)?))
+            }
+        };
         Ok(Self {
             core,
             sample,
+            targets,
             force: Table::create(folder.file(FORCE_TABLE), &force_columns())?,
             energy: Table::create(folder.file(ENERGY_TABLE), &ENERGY_COLUMNS)?,
         })
     }
 
-    /// Appends one row to each file, to that of the sample one per driven face, and flushes them.
+    /// Appends one row to each file, to that of the sample one per driven face, to that of the targets one per
+    /// target, and flushes them.
     pub fn append(&mut self, record: &FrameRecord) -> Result<()> {
         self.force.write_row(&force_row(record))?;
         self.energy.write_row(&energy_row(record))?;
@@ -150,6 +163,11 @@ impl Tables {
         if let Some((faces, table)) = &mut self.sample {
             for face in faces {
                 table.write_row(&sample_row(face, &face.point(record)))?;
+            }
+        }
+        if let Some((names, table)) = &mut self.targets {
+            for (name, target) in names.iter().zip(&record.targets) {
+                table.write_row(&target_row(name, record, target))?;
             }
         }
         Ok(())

@@ -79,6 +79,9 @@ impl Picture {
         if let Some(tool) = &tool {
             tool.draw(&mut canvas, &layout);
         }
+        for (target, place) in scene.targets.iter().zip(&snapshot.targets) {
+            draw_target(&mut canvas, &layout, &plane, *place, target.radius);
+        }
         draw_frame(&mut canvas, &layout);
         draw_texts(&mut canvas, &layout, scene, snapshot, &slice);
         draw_colour_bar(&mut canvas, &layout, &scale);
@@ -116,6 +119,8 @@ const AIR: Colour = Colour(222, 230, 237);
 const INK: Colour = Colour(28, 30, 36);
 const WHITE: Colour = Colour(255, 255, 255);
 const WARNING: Colour = Colour(170, 20, 20);
+/// Neither in the colour table nor in steel.
+const TARGET: Colour = Colour(0, 225, 190);
 /// Where the colour table starts in the map `inferno`: its black would swallow outlines and look like a hole.
 const DARKEST: f64 = 0.1;
 /// Mixed into the field where the tip has opened the tissue.
@@ -532,6 +537,28 @@ fn draw_ball(canvas: &mut Canvas, centre: DVec2, radius: f64, unit: f64) {
         }
         let rim = [point(RINGS, sector), point(RINGS, sector + 1)];
         canvas.round_line(rim.map(|p| centre + radius * p), 1.6 * unit, INK);
+    }
+}
+
+/// A cross where a target is now [m], seen from the front, and a circle where the plane cuts the sphere of its radius [m].
+fn draw_target(canvas: &mut Canvas, layout: &Layout, plane: &Plane, place: DVec3, radius: f64) {
+    const SECTORS: usize = 48;
+    if !place.is_finite() {
+        return;
+    }
+    let centre = layout.place(plane.project(place));
+    let arm = 5.0 * layout.unit;
+    let mut lines: Vec<[DVec2; 2]> = [DVec2::X, DVec2::Y].map(|a| [centre - arm * a, centre + arm * a]).to_vec();
+    let beside = (place - plane.origin).dot(plane.normal);
+    if beside.abs() < radius {
+        let cut = (radius * radius - beside * beside).sqrt() * layout.pixels_per_metre;
+        let rim = |i: usize| centre + cut * DVec2::from_angle(std::f64::consts::TAU * i as f64 / SECTORS as f64);
+        lines.extend((0..SECTORS).map(|i| [rim(i), rim(i + 1)]));
+    }
+    for (width, colour) in [(4.0, INK), (2.0, TARGET)] {
+        for ends in &lines {
+            canvas.round_line(*ends, width * layout.unit, colour);
+        }
     }
 }
 

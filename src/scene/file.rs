@@ -50,6 +50,9 @@ pub struct SceneFile {
     pub solver: SolverTable,
     #[serde(default)]
     pub outputs: OutputsTable,
+    /// Points of the tissue that the insertion wants to reach, at most 64; their motion is written to targets.csv.
+    #[serde(default)]
+    pub target: Vec<TargetTable>,
 }
 
 /// The tissue: a block (`size_mm`, `cell_size_mm`) or a mesh of tetrahedra (`mesh`, `unit`). The block spans
@@ -705,6 +708,18 @@ pub struct OutputsTable {
     pub picture_width_px: Option<u32>,
     /// Upper end of the colour bar [kPa]; default: the largest stress in the picture.
     pub stress_scale_kpa: Option<f64>,
+}
+
+/// A material point of the tissue that the insertion wants to reach; it moves with the tissue.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TargetTable {
+    /// Name in the outputs, e.g. "lesion"; default "target 1", "target 2", ...
+    pub name: Option<String>,
+    /// Where it lies at rest, in the coordinates of the block [mm].
+    pub position_mm: [f64; 3],
+    /// The tip hits it when it comes no farther away than this [mm]; default 1.
+    pub radius_mm: Option<f64>,
 }
 
 /// Reads a text as one kind of entry and a table as another. `#[serde(untagged)]` would lose the line and say only

@@ -47,6 +47,8 @@ pub struct Scene {
     pub effects: EffectSet,
     pub solver: SolverSettings,
     pub outputs: Outputs,
+    /// Points of the tissue that the insertion wants to reach.
+    pub targets: Vec<Target>,
     /// Things that the user should know and that are no errors, one sentence each.
     pub notices: Vec<String>,
 }
@@ -201,6 +203,17 @@ impl RegionShape {
             RegionShape::MeshTag(_) => false,
         }
     }
+}
+
+/// A material point of the tissue that the insertion wants to reach; it moves with the tissue.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// Name for outputs, e.g. `lesion`; no other target has it.
+    pub name: String,
+    /// Where it lies at rest, inside the tissue [m].
+    pub position: DVec3,
+    /// The tip hits it when it comes no farther away than this [m].
+    pub radius: f64,
 }
 
 /// A named node set that is held.

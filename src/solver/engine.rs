@@ -75,7 +75,7 @@ impl StepInput {
 
 /// Sums over one frame as an engine delivers them. "Total" fields are values at the end of the frame, the others
 /// sums over the steps of the frame. SI.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameSums {
     pub frame: u64,
     pub steps: u32,
@@ -142,6 +142,8 @@ pub struct FrameSums {
     pub raised_mass: u32,
     pub max_speed: f64,
     pub not_finite: bool,
+    /// Total: displacement of every target [m].
+    pub targets: Vec<DVec3>,
 }
 
 /// The state that both engines can give and take, in f64 and SI, node order of the mesh.

@@ -17,7 +17,9 @@ use crate::material_point::PointState;
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
 use crate::needle::flexible::FlexibleNeedle;
-use crate::observables::{CoreSample, FieldSnapshot, FrameRecord, NeedleRecord, Recorder, cells_in_needle};
+use crate::observables::{
+    CoreSample, FieldSnapshot, FrameRecord, NeedleRecord, Recorder, TargetRecord, cells_in_needle,
+};
 use crate::scene::Scene;
 
 /// Which engine the user wants.
@@ -283,6 +285,7 @@ impl Simulation {
         let bent = self.answer_of_the_needle(&mut sums);
         let mut record = self.recorder.record(&self.model, self.dt, &sums);
         record.needle = bent;
+        record.targets = TargetRecord::of(&self.model, &record, &sums.targets);
         self.tell_of_the_needle(&record);
         if record.health.not_finite {
             return Err(self.diverged(&record));
@@ -519,6 +522,8 @@ pub fn snapshot(model: &Model, record: &FrameRecord, state: State) -> FieldSnaps
     let pose = model.kinematics.as_ref().map(|k| k.pose(record.time));
     fields.cells_in_needle =
         pose.filter(|_| model.puncture.is_some()).map(|pose| cells_in_needle(model, &state, &pose));
+    let targets = model.scene.targets.iter().zip(&model.targets);
+    fields.targets = targets.map(|(target, point)| target.position + point.value(&state.displacement)).collect();
     let states = CellStates { points: &state.points, stiffness: &state.stiffness };
     let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
     let fresh = PointState::default();

@@ -91,6 +91,7 @@ pub fn block(size_mm: [f64; 3], cell_mm: f64) -> Scene {
             duration: Some(1.0),
         },
         outputs: Outputs::default(),
+        targets: Vec::new(),
         notices: Vec::new(),
     }
 }

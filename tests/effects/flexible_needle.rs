@@ -122,7 +122,7 @@ fn the_kernel_matches_the_f64_engine() {
                 sums.push((name, engine.collect(true).unwrap().unwrap()));
             }
         }
-        let bent = sums[1].1;
+        let bent = &sums[1].1;
         assert!(bent.needle_loads.iter().map(|l| l.length()).sum::<f64>() > 0.0);
         // The loads are the whole impulse, and they do the lateral part of the work.
         let total: DVec3 = bent.needle_loads.iter().sum();
@@ -130,7 +130,7 @@ fn the_kernel_matches_the_f64_engine() {
         if sums.len() < 4 {
             continue;
         }
-        let (cpu, gpu) = (bent, sums[3].1);
+        let (cpu, gpu) = (bent, &sums[3].1);
         let difference = |a: DVec3, b: DVec3, scale: f64| (a - b).length() / scale;
         let scale = cpu.impulse.length();
         at_most("impulse", difference(cpu.impulse, gpu.impulse, scale), 2e-3);

@@ -54,7 +54,7 @@ fn uniaxial_stretch() {
 fn patch() {
     let mut run = run("validation/patch.toml", &[], best_engine());
     run.assert_sound();
-    let last = *run.last();
+    let last = run.last().clone();
     let fields = run.simulation.snapshot(&last).unwrap();
     let worst = fields.jacobian.iter().map(|j| (j - 0.95).abs()).fold(0.0, f64::max);
     let state = run.state();

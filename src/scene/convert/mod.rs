@@ -9,6 +9,7 @@ mod material;
 mod mesh;
 pub(super) mod parameters;
 mod regions;
+mod targets;
 mod tool;
 
 use std::path::Path;
@@ -144,6 +145,7 @@ impl Check<'_> {
         self.cuttings(file, &tool, &effects, (&mut material, preset), (&mut regions, region_presets));
         let solver = self.solver(&file.solver, tool.is_some(), effects.puncture.is_some());
         let outputs = self.outputs(&file.outputs, &motion, tool.is_some(), solver.duration);
+        let targets = self.targets(file);
         self.problems.check()?;
         for (index, material) in parameters::all_materials(&material, &regions) {
             self.snap_back(file, index, material, tissue.cell_size, &effects);
@@ -153,6 +155,7 @@ impl Check<'_> {
             self.geometry(&tissue, tool.as_ref(), &motion, open_bottom);
         }
         self.overlaps(&regions, &tissue, mesh.as_deref());
+        self.inside(&targets, &tissue);
         self.problems.check()?;
         if mesh.is_none() {
             self.memory(&tissue, tool.as_ref(), &motion);
@@ -192,6 +195,7 @@ impl Check<'_> {
             effects,
             solver,
             outputs,
+            targets,
             notices: std::mem::take(&mut self.notices),
         })
     }

@@ -301,6 +301,7 @@ impl CpuEngine {
         sums.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
         sums.contact_energy = self.contact_energy;
         sums.tip_coordinate = state.tip_coordinate;
+        sums.targets = model.targets.iter().map(|target| target.value(&state.displacement)).collect();
     }
 }
 
@@ -366,7 +367,7 @@ impl Engine for CpuEngine {
             self.share_needle_loads(&pose);
         }
         self.measure();
-        self.finished.push_back(self.sums);
+        self.finished.push_back(std::mem::take(&mut self.sums));
         Ok(())
     }
 
