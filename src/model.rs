@@ -343,9 +343,9 @@ impl Model {
             driven: 0.99 * SLIT_HALF_WIDTH * needle.radius,
             deepest: self.scene.motion.deepest() + 2.0 * h,
             ring: needle.bore.is_some(),
+            wall: [needle.bore.map_or(0.0, |b| b.edge), needle.radius],
         });
-        let planes: Vec<(usize, f64)> = params.planes.iter().map(|p| (p.axis, p.at)).collect();
-        self.separation = Separation::new(mesh, &planes, cut.as_ref());
+        self.separation = Separation::new(mesh, &params.planes, cut.as_ref());
         self.cohesion = Some(cohesive::Law::new(params, self.scene.material.law.youngs_modulus(), h));
     }
 
@@ -470,7 +470,7 @@ impl Model {
     /// What part of the needle the copies of the path's surface face.
     fn separated_surfaces(&self, path: &PlannedPath) -> HashMap<u32, ContactSurface> {
         let hollow = self.scene.has_bore();
-        let driven = self.separation.pairs.iter().filter(|p| hollow && p.tip_driven.is_some());
+        let driven = self.separation.pairs.iter().filter(|p| hollow && !p.on_plane && p.tip_driven.is_some());
         let axis_of = |pair: &FacePair| if pair.axis == 0 { DVec3::X } else { DVec3::Y };
         driven
             .flat_map(|pair| {

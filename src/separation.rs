@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 
+use crate::effects::cohesive::Plane;
 use crate::mesh::BlockMesh;
 use crate::needle::PlannedPath;
 
@@ -21,6 +22,8 @@ pub struct FacePair {
     /// Neighbours of `a` on the surface, along the next and the next but one axis: before and after; the normal is the cross
     /// product of the two ways, pointing from a to b.
     pub ring: [[u32; 2]; 2],
+    /// It lies on a chosen plane.
+    pub on_plane: bool,
     /// Where the tip drives it: rest coordinate s0 along the path [m].
     pub tip_driven: Option<f64>,
 }
@@ -47,11 +50,13 @@ pub struct Cut {
     pub deepest: f64,
     /// The needle is hollow: the ring of the bore parts, not a slit.
     pub ring: bool,
+    /// Distances from the path between which the needle opens planes that it passes [m].
+    pub wall: [f64; 2],
 }
 
 impl Separation {
-    /// Pairs and ties of a mesh. `planes`: axis and coordinate of planes that may separate everywhere; `cut`: the path.
-    pub fn new(mesh: &BlockMesh, planes: &[(usize, f64)], cut: Option<&Cut>) -> Self {
+    /// Pairs and ties of a mesh. `planes` may separate everywhere; `cut`: the path.
+    pub fn new(mesh: &BlockMesh, planes: &[Plane], cut: Option<&Cut>) -> Self {
         let gaps: Vec<Vec<usize>> = (0..3)
             .map(|a| (1..mesh.lines[a].len()).filter(|i| mesh.lines[a][*i] == mesh.lines[a][i - 1]).collect())
             .collect();
@@ -72,13 +77,18 @@ impl Separation {
                     };
                     let ends = [node(upper - 1, m, n), node(*upper, m, n)];
                     let place = mesh.rest_position(ends[0] as usize);
-                    let on_plane = planes.iter().any(|(a, at)| *a == axis && mesh.lines[axis][*upper] == *at);
+                    let plane = planes.iter().find(|p| p.axis == axis && mesh.lines[axis][*upper] == p.at);
                     let cut_here = cut.filter(|cut| cut.reaches(mesh, axis, ends, place));
                     let tip_driven = cut_here.and_then(|cut| {
                         let (r0, s0) = cut.path.material_coordinates(place);
                         (cut.ring || r0 < cut.driven).then_some(s0)
                     });
-                    if !on_plane && cut_here.is_none() {
+                    let passed = cut.filter(|_| plane.is_some_and(|p| p.tip_driven)).and_then(|cut| {
+                        let (r0, s0) = cut.path.material_coordinates(place);
+                        (cut.wall[0]..cut.wall[1]).contains(&r0).then_some(s0)
+                    });
+                    let tip_driven = tip_driven.or(passed);
+                    if plane.is_none() && cut_here.is_none() {
                         join(&mut root, ends);
                         continue;
                     }
@@ -103,6 +113,7 @@ impl Separation {
                         axis,
                         area: tributary_area(mesh, axis, *upper, m, n),
                         ring: [[node(i, m0, n), node(i, m1, n)], [node(i, m, n0), node(i, m, n1)]],
+                        on_plane: plane.is_some(),
                         tip_driven,
                     });
                 }

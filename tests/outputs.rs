@@ -191,6 +191,7 @@ fn snapshot(scene: &Scene, mesh: &Mesh, depth: f64) -> FieldSnapshot {
         (0..mesh.cell_count()).map(|c| value(mesh.cell_centre(c))).collect()
     };
     FieldSnapshot {
+        centre_line: None,
         cells_in_needle: None,
         targets: Vec::new(),
         frame: 90,

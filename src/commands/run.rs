@@ -310,6 +310,9 @@ pub fn describe(summary: &Summary) -> String {
             "needle: {count} cells of tissue within its wall at most, over the moments of pictures and fields\n"
         );
     }
+    if let Some(area) = summary.torn_area_m2 {
+        text += &format!("torn: {:.1} mm2 of the faces that may part\n", area * 1e6);
+    }
     text += &format!(
         "energy: imbalance {:.2} % of the external work, kinetic/internal {:.3} %, hourglass/internal {:.1} % (largest \
          {:.1} %); {} clamped nodes, {} inverted cells",

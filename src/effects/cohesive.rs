@@ -53,6 +53,8 @@ pub struct Params {
 pub struct Plane {
     pub axis: usize,
     pub at: f64,
+    /// Where the needle passes it, the tip opens it: pairs within the radius of the needle lose their bond with it.
+    pub tip_driven: bool,
 }
 
 impl Default for Params {

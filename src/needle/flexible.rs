@@ -54,6 +54,8 @@ pub struct FlexibleNeedle {
     taken: Taken,
     buckled: bool,
     converged: bool,
+    /// Offsets at the end of the frame that was answered last [m].
+    answered: [DVec3; ENTRY_COUNT],
     /// Stored since t = 0 and damped since t = 0 [J].
     energy: f64,
 }
@@ -86,6 +88,7 @@ impl FlexibleNeedle {
             taken: Taken::default(),
             buckled: false,
             converged: true,
+            answered: [DVec3::ZERO; ENTRY_COUNT],
             energy: 0.0,
             beam,
             kinematics,
@@ -212,8 +215,14 @@ impl FlexibleNeedle {
         record
     }
 
+    /// The centre-line at the end of the frame that was answered last, at rest.
+    pub fn centre_line(&self) -> CentreLine {
+        CentreLine { spacing: self.spacing, first_step: 0, offset: self.answered, rate: [DVec3::ZERO; ENTRY_COUNT] }
+    }
+
     /// The needle at the end of the frame that was bent last.
     fn record(&mut self) -> NeedleRecord {
+        self.answered = self.end.offset;
         let compression = self.beam.axial_forces().into_iter().fold(0.0, |most: f64, n| most.max(-n));
         let p = self.params.beam;
         let critical = std::f64::consts::PI.powi(2) * p.bending_stiffness() / (4.0 * p.length * p.length);

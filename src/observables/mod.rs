@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::needle::centre_line::CentreLine;
+
 /// Force that moves the tool, in parts [N]; positive along the insertion direction. Means over the frame. All parts but the
 /// inertia act on the tissue.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -135,6 +137,8 @@ pub struct Health {
     pub largest_damage: f64,
     pub deleted_cells: u32,
     pub return_failures: u32,
+    /// Area of the cohesive faces that have parted: damage times area [m^2].
+    pub torn_area: f64,
     /// Nodes whose speed was clamped, summed over the steps of the frame.
     pub clamped_nodes: u32,
     /// Largest nodal speed [m/s].
@@ -204,6 +208,8 @@ pub struct FieldSnapshot {
     pub axial_force: f64,
     /// Tip position of the tool and its direction of insertion (unit), if there is a tool.
     pub tool_pose: Option<(DVec3, DVec3)>,
+    /// Centre-line of a needle that bends, from that tip on.
+    pub centre_line: Option<CentreLine>,
     /// Cells whose centre lies in the wall of the needle; `None` without a needle that cuts.
     pub cells_in_needle: Option<usize>,
     /// Where the targets of the scene are now [m].

@@ -4,18 +4,20 @@ use glam::DVec3;
 
 use crate::model::Model;
 use crate::needle::ToolPose;
+use crate::needle::centre_line::CentreLine;
 use crate::needle::gap::Profile;
 use crate::solver::engine::State;
 
 /// Cells whose centre lies within the wall of the needle: inside its outer surface and, of a hollow one, outside its bore.
-/// Cells that the path has softened by more than half are the opened path itself and do not count.
-pub fn cells_in_needle(model: &Model, state: &State, pose: &ToolPose) -> usize {
+/// Cells that the path has softened by more than half are the opened path itself and do not count. `line`: the centre-line of a
+/// bent needle.
+pub fn cells_in_needle(model: &Model, state: &State, pose: &ToolPose, line: Option<&CentreLine>) -> usize {
     let Some(plan) = &model.puncture else { return 0 };
     let profile = Profile::new(&plan.needle, pose.direction);
     let d = -pose.direction;
     let inside = |centre: DVec3| {
-        let lever = centre - pose.tip;
-        let s = lever.dot(d);
+        let s = (centre - pose.tip).dot(d);
+        let lever = centre - pose.tip - line.map_or(DVec3::ZERO, |l| l.at(s, 0.0).offset);
         match profile.bore {
             Some(_) => {
                 let wall = |bore: bool| profile.tube_wall(lever, d, bore, (0.0, 0.0)).value;

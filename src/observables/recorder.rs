@@ -79,6 +79,7 @@ impl Recorder {
                 largest_damage: sums.largest_damage,
                 deleted_cells: sums.deleted_cells,
                 return_failures: sums.return_failures,
+                torn_area: sums.torn_area,
                 clamped_nodes: sums.clamped_nodes,
                 max_speed: sums.max_speed,
                 raised_mass: sums.raised_mass,

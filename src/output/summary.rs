@@ -134,6 +134,9 @@ pub struct Summary {
     /// Most cells whose centre lay in the wall of the needle, over the moments of pictures and fields.
     #[serde(default)]
     pub cells_in_needle: Option<u64>,
+    /// Area of the cohesive faces that parted [m^2]; only where some did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torn_area_m2: Option<f64>,
     /// Most inverted cells in one frame.
     pub inverted_cells: u64,
     /// Share of all node steps in which selective mass scaling raised the mass of a node.
@@ -191,6 +194,7 @@ impl Summary {
         let node_steps = self.nodes * records.last().map_or(0, |r| r.step);
         self.raised_mass_share = if node_steps > 0 { raised as f64 / node_steps as f64 } else { 0.0 };
         self.return_failures = records.iter().map(|r| u64::from(r.health.return_failures)).sum();
+        self.torn_area_m2 = records.last().map(|r| r.health.torn_area).filter(|area| *area > 0.0);
         self.inverted_cells = records.iter().map(|r| u64::from(r.health.inverted_cells)).max().unwrap_or(0);
     }
 

@@ -30,7 +30,7 @@ pub fn force_columns() -> Vec<&'static str> {
 }
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 28] = [
+pub const ENERGY_COLUMNS: [&str; 29] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -59,6 +59,7 @@ pub const ENERGY_COLUMNS: [&str; 28] = [
     "largest_damage",
     "deleted_cells",
     "return_failures",
+    "torn_area_m2",
 ];
 
 /// Columns of `core.csv`.
@@ -215,6 +216,7 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(h.largest_damage),
         h.deleted_cells.to_string(),
         h.return_failures.to_string(),
+        number(h.torn_area),
     ]
 }
 

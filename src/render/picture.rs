@@ -17,6 +17,7 @@ use glam::{DVec2, DVec3};
 use super::slice::{self, EdgeKind, Plane, Slice};
 use super::stroke_font;
 use crate::mesh::Mesh;
+use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
 use crate::needle::gap::Profile;
 use crate::observables::FieldSnapshot;
 use crate::scene::{NeedleShape, Scene, Tool};
@@ -380,6 +381,9 @@ struct ToolDrawing {
     tip: DVec2,
     /// Unit vector from the tip back along the axis.
     back: DVec2,
+    /// Centre-line of a bent needle, and the direction in space in which `back.perp()` lies.
+    line: Option<CentreLine>,
+    sideways: DVec3,
     shape: ToolShape,
 }
 
@@ -412,13 +416,27 @@ impl ToolDrawing {
             Tool::Sphere { radius } => ToolShape::Sphere { radius: *radius },
         };
         let tip = plane.project(tip);
-        tip.is_finite().then_some(Self { tip, back, shape })
+        let sideways = plane.right * back.perp().x + plane.up * back.perp().y;
+        tip.is_finite().then_some(Self { tip, back, line: snapshot.centre_line, sideways, shape })
+    }
+
+    /// How far the axis lies beside its straight line at `along` behind the tip [m].
+    fn bend(&self, along: f64) -> f64 {
+        self.line.map_or(0.0, |line| line.at(along, 0.0).offset.dot(self.sideways))
+    }
+
+    /// Where the outline needs corners, from `start` to `end` behind the tip [m].
+    fn stations(&self, start: f64, end: f64) -> Vec<f64> {
+        let between = self.line.iter().flat_map(|line| (1..ENTRY_COUNT).map(|i| line.spacing * i as f64));
+        let inner = between.filter(|s| *s > start && *s < end);
+        std::iter::once(start).chain(inner).chain([end]).collect()
     }
 
     /// True where the tool covers a point of the plane [m].
     fn covers(&self, point: DVec2) -> bool {
         let p = point - self.tip;
-        let (along, across) = (p.dot(self.back), p.dot(self.back.perp()));
+        let along = p.dot(self.back);
+        let across = p.dot(self.back.perp()) - self.bend(along);
         match self.shape {
             ToolShape::Rod { radius, cone, beside } => {
                 let grown = if along < cone { along / cone } else { 1.0 };
@@ -441,18 +459,25 @@ impl ToolDrawing {
             ToolShape::Tube { outer, inner, edge, ground } => {
                 for side in [-1.0, 1.0] {
                     let at = |along: f64, across: f64| {
-                        layout.place(self.tip + along * self.back + side * across * self.back.perp())
+                        let across = side * across + self.bend(along);
+                        layout.place(self.tip + along * self.back + across * self.back.perp())
                     };
                     let [light, dark] = [steel(-0.2), steel(0.6)];
                     let tip = at(0.0, edge);
                     canvas.patch([tip, tip, at(ground, inner), at(ground, outer)], [light, light, dark, light]);
-                    canvas.patch(
-                        [at(ground, outer), at(ground, inner), at(length, inner), at(length, outer)],
-                        [light, dark, dark, light],
-                    );
+                    let stations = self.stations(ground, length);
+                    for ends in stations.windows(2) {
+                        let [low, high] = [ends[0], ends[1]];
+                        canvas.patch(
+                            [at(low, outer), at(low, inner), at(high, inner), at(high, outer)],
+                            [light, dark, dark, light],
+                        );
+                    }
                     for wall in [inner, outer] {
                         canvas.round_line([tip, at(ground, wall)], 1.6 * layout.unit, INK);
-                        canvas.round_line([at(ground, wall), at(length, wall)], 1.6 * layout.unit, INK);
+                        for ends in stations.windows(2) {
+                            canvas.round_line([at(ends[0], wall), at(ends[1], wall)], 1.6 * layout.unit, INK);
+                        }
                     }
                 }
             }
@@ -472,17 +497,21 @@ impl ToolDrawing {
         let side = self.back.perp();
         let at = |t: f64, along: f64, width: f64| {
             let across = if along < cone || (along == 0.0 && width == 0.0) { 0.0 } else { beside };
-            layout.place(self.tip + along * self.back + (across + t * width) * side)
+            layout.place(self.tip + along * self.back + (self.bend(along) + across + t * width) * side)
         };
+        let stations = self.stations(cone, length);
         // Shading runs from the left side of the rod in the picture to its right one.
         let left_is = if side.x > 0.0 { -1.0 } else { 1.0 };
         for strip in 0..STRIPS {
             let t = [strip, strip + 1].map(|i| 2.0 * i as f64 / STRIPS as f64 - 1.0);
             let [a, b] = t.map(|t| steel(-left_is * t));
-            canvas.patch(
-                [at(t[0], cone, radius), at(t[1], cone, radius), at(t[1], length, radius), at(t[0], length, radius)],
-                [a, b, b, a],
-            );
+            for ends in stations.windows(2) {
+                let [low, high] = [ends[0], ends[1]];
+                canvas.patch(
+                    [at(t[0], low, radius), at(t[1], low, radius), at(t[1], high, radius), at(t[0], high, radius)],
+                    [a, b, b, a],
+                );
+            }
             if cone > 0.0 {
                 canvas.patch(
                     [at(0.0, 0.0, radius), at(0.0, 0.0, radius), at(t[1], cone, radius), at(t[0], cone, radius)],
@@ -490,13 +519,9 @@ impl ToolDrawing {
                 );
             }
         }
-        let outline = [
-            at(-1.0, length, radius),
-            at(-1.0, cone, radius),
-            at(0.0, 0.0, radius),
-            at(1.0, cone, radius),
-            at(1.0, length, radius),
-        ];
+        let left = stations.iter().rev().map(|s| at(-1.0, *s, radius));
+        let right = stations.iter().map(|s| at(1.0, *s, radius));
+        let outline: Vec<DVec2> = left.chain([at(0.0, 0.0, radius)]).chain(right).collect();
         for ends in outline.windows(2) {
             canvas.round_line([ends[0], ends[1]], 1.6 * layout.unit, INK);
         }

@@ -578,6 +578,9 @@ pub struct CohesivePlaneTable {
     pub axis: String,
     /// Coordinate [mm]; z is negative below the top face.
     pub at_mm: f64,
+    /// True: where the needle passes the plane, its tip opens it; default false (tissue stress alone does).
+    #[serde(default)]
+    pub tip_driven: bool,
 }
 
 /// Parameters of the effect `indentation`.

@@ -16,6 +16,8 @@ use crate::material::{Verdict, von_mises};
 use crate::material_point::PointState;
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
+use crate::needle::ToolPose;
+use crate::needle::centre_line::CentreLine;
 use crate::needle::flexible::FlexibleNeedle;
 use crate::observables::{
     CoreSample, FieldSnapshot, FrameRecord, NeedleRecord, Recorder, TargetRecord, cells_in_needle,
@@ -469,7 +471,8 @@ impl Simulation {
     /// Fields of the present state; call it right after a frame registered with [`Simulation::stop_after`].
     pub fn snapshot(&mut self, record: &FrameRecord) -> Result<FieldSnapshot> {
         let state = self.engine.read_state()?;
-        Ok(snapshot(&self.model, record, state))
+        let line = self.needle.as_ref().map(|needle| needle.centre_line());
+        Ok(snapshot(&self.model, record, state, line))
     }
 }
 
@@ -504,8 +507,8 @@ fn principal_stretch_range(f: glam::DMat3) -> (f64, f64) {
     (smallest.max(0.0).sqrt(), largest.max(0.0).sqrt())
 }
 
-/// Stresses and Jacobians of a state, in f64.
-pub fn snapshot(model: &Model, record: &FrameRecord, state: State) -> FieldSnapshot {
+/// Stresses and Jacobians of a state, in f64; `line`: the centre-line of a bent needle then.
+pub fn snapshot(model: &Model, record: &FrameRecord, state: State, line: Option<CentreLine>) -> FieldSnapshot {
     let elements = Elements::new(model);
     let gradients = displacement_gradients(&model.mesh, &state);
     let mut fields = FieldSnapshot {
@@ -513,15 +516,17 @@ pub fn snapshot(model: &Model, record: &FrameRecord, state: State) -> FieldSnaps
         time: record.time,
         depth: record.depth,
         axial_force: record.force.axial,
-        tool_pose: model.kinematics.as_ref().map(|k| {
-            let pose = k.pose(record.time);
-            (pose.tip, pose.direction)
-        }),
+        centre_line: line,
         ..Default::default()
     };
-    let pose = model.kinematics.as_ref().map(|k| k.pose(record.time));
-    fields.cells_in_needle =
-        pose.filter(|_| model.puncture.is_some()).map(|pose| cells_in_needle(model, &state, &pose));
+    let pose = model.kinematics.as_ref().map(|k| {
+        let pose = k.pose(record.time);
+        // The tip of a bent needle stays behind.
+        ToolPose { tip: pose.tip - pose.direction * record.needle.retreat, ..pose }
+    });
+    fields.tool_pose = pose.map(|pose| (pose.tip, pose.direction));
+    let cuts = pose.filter(|_| model.puncture.is_some());
+    fields.cells_in_needle = cuts.map(|pose| cells_in_needle(model, &state, &pose, line.as_ref()));
     let targets = model.scene.targets.iter().zip(&model.targets);
     fields.targets = targets.map(|(target, point)| target.position + point.value(&state.displacement)).collect();
     let states = CellStates { points: &state.points, stiffness: &state.stiffness };

@@ -81,7 +81,7 @@ fn column(cell: f64) -> Arc<Model> {
         shear_energy: 26.0,
         exponent: 1.45,
         penalty: Some(5e8),
-        planes: vec![Plane { axis: 2, at: -0.25e-3 }],
+        planes: vec![Plane { axis: 2, at: -0.25e-3, tip_driven: false }],
         ..Params::default()
     });
     scene.effects.mass_scaling = Some(mass_scaling::Params { factor: 1200.0 });

@@ -47,10 +47,10 @@ fn no_tissue_is_left_in_the_needle() {
     let state = run.state();
     let model = run.simulation.model.clone();
     let pose = model.kinematics.as_ref().unwrap().pose(3.0);
-    assert_eq!(cells_in_needle(&model, &state, &pose), 0);
+    assert_eq!(cells_in_needle(&model, &state, &pose, None), 0);
     // The count can see: a needle that stood beside its slit would hold tissue.
     let aside = stylet::needle::ToolPose { tip: pose.tip + DVec3::new(2e-3, 0.0, 0.0), ..pose };
-    assert!(cells_in_needle(&model, &state, &aside) > 3);
+    assert!(cells_in_needle(&model, &state, &aside, None) > 3);
     // Every pair that the shaft has passed is open by about the needle.
     let open: Vec<f64> = model
         .separation
@@ -101,4 +101,31 @@ fn both_engines_open_the_slit_alike() {
     let apart = apart.map(|(g, c)| (g.force.axial - c.force.axial).abs()).fold(0.0, f64::max) / largest;
     println!("engines apart by {apart:.2e} of the largest force");
     assert!(apart < 2e-3, "{apart}");
+}
+
+#[test]
+fn the_tip_cuts_an_interface_that_it_passes() {
+    let end = "motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 9.0}]";
+    let mut run = run("interface.toml", &[&cell(0.8), NO_PICTURES, end], best_engine());
+    assert!(run.summary.energy_imbalance <= 0.003, "{}", run.summary.energy_imbalance);
+    let state = run.state();
+    let model = &run.simulation.model;
+    let radius = model.scene.needle().unwrap().radius;
+    let (mut cut, mut held) = (0, 0);
+    for (pair, damage) in model.separation.pairs.iter().zip(&state.pairs).filter(|(p, _)| p.axis == 2) {
+        assert!(pair.on_plane && (model.mesh.rest_position(pair.nodes[0] as usize).z + 6e-3).abs() < 1e-12);
+        let r0 = model.mesh.rest_position(pair.nodes[0] as usize).truncate().length();
+        if r0 < radius {
+            assert!(pair.tip_driven.is_some() && *damage == 1.0, "{r0}: damage {damage}");
+            cut += 1;
+        } else {
+            assert!(pair.tip_driven.is_none());
+            held += usize::from(*damage < 0.5);
+        }
+    }
+    println!("{cut} pairs cut, {held} hold; {:.2} mm2 torn", run.last().health.torn_area * 1e6);
+    assert!(cut >= 3 && held > 100, "{cut} cut, {held} hold");
+    // The slit alone: its width times the way of the tip.
+    let slit = 2.0 * 1.2 * radius * run.last().tip_coordinate;
+    assert!((0.5..2.0).contains(&(run.last().health.torn_area / slit)), "{} m2", run.last().health.torn_area);
 }

@@ -131,7 +131,8 @@ impl Check<'_> {
         let puncture = self.puncture(&file.puncture.clone().unwrap_or_default());
         let cohesive = self.cohesive(&file.cohesive.clone().unwrap_or_default(), &file.tissue);
         if listed("cohesive") {
-            self.check_cohesive(&place("cohesive"), tool, motion, &cohesive, listed("puncture"));
+            let planned = listed("puncture") && !motion.is_free() && !puncture.always_free;
+            self.check_cohesive(&place("cohesive"), tool, motion, &cohesive, [listed("puncture"), planned]);
         } else if let Some(Tool::Needle(NeedleShape { bore: Some(_), .. })) = tool {
             self.problems.report(
                 "needle.bore_diameter_mm",
@@ -418,7 +419,7 @@ impl Check<'_> {
                 let (low, high) = if axis == 2 { (-size[2], 0.0) } else { (-half, half) };
                 let margin = 1e-3 * (high - low);
                 let value = self.number(&format!("{path}.at_mm"), plane.at_mm, Between(low + margin, high - margin));
-                Some(effects::cohesive::Plane { axis, at: value * MM })
+                Some(effects::cohesive::Plane { axis, at: value * MM, tip_driven: plane.tip_driven })
             })
             .collect();
         effects::cohesive::Params {
@@ -452,7 +453,7 @@ impl Check<'_> {
         tool: &Option<Tool>,
         motion: &Motion,
         params: &effects::cohesive::Params,
-        cuts: bool,
+        [cuts, planned]: [bool; 2],
     ) {
         let needle = match tool {
             Some(Tool::Needle(needle)) if cuts => Some(needle),
@@ -464,6 +465,15 @@ impl Check<'_> {
                 "effect `cohesive` has no face to separate",
                 "no needle that cuts and no plane",
                 "add [needle] with the effect `puncture`, or [[cohesive.plane]] with axis = \"z\" and at_mm = -5",
+            );
+        }
+        let driven = params.planes.iter().position(|p| p.tip_driven);
+        if let Some(index) = driven.filter(|_| needle.is_none() || !planned) {
+            self.problems.report(
+                &format!("cohesive.plane.{index}.tip_driven"),
+                "no tip passes the plane",
+                "no needle that cuts along a planned path",
+                "add [needle] with the effect `puncture` and a straight motion, or remove tip_driven",
             );
         }
         let Some(needle) = needle else { return };
