@@ -170,6 +170,17 @@ fn wrong_keys_kinds_and_text() {
 }
 
 #[test]
+fn an_interface_needs_a_tip_that_passes_it() {
+    let planned = "[puncture]\npath = \"free\"";
+    let plane = "[[cohesive.plane]]\naxis = \"z\"\nat_mm = -6.0\ntip_driven = true\n\n[needle]";
+    assert_refused(
+        &[("\"friction\"", "\"friction\", \"cohesive\""), ("[puncture]", planned), ("[needle]", plane)],
+        "tip_driven",
+        &["no tip passes the plane", "a straight motion"],
+    );
+}
+
+#[test]
 fn wrong_boundaries() {
     for (text, expected) in [
         ("{fixed = [\"z\"], displacement_mm = [0, 0, 1]}", "duration_s = 0.5"),
