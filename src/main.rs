@@ -12,6 +12,8 @@ use stylet::commands::fit::{FitOptions, Volumetric};
 use stylet::commands::report::{ReportOptions, ReportOutcome};
 use stylet::commands::{self, bench::BenchOptions, run::RunOptions};
 use stylet::error::{Error, Result};
+use stylet::output::checkpoint::RunCheckpoint;
+use stylet::output::folder::CHECKPOINT;
 use stylet::scene::Scene;
 use stylet::solver::simulation::EngineChoice;
 
@@ -77,6 +79,12 @@ struct RunArgs {
     /// Replace the results that the folder holds
     #[arg(long)]
     force: bool,
+    /// Seconds of wall time between two checkpoints; 0: none
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
+    checkpoint: f64,
+    /// Go on with the run in this folder, which was stopped; scene and overrides are those of the run
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "force", "overrides"])]
+    resume: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -205,8 +213,45 @@ fn report(args: ReportArgs) -> Result<u8> {
 }
 
 fn run(args: &RunArgs, start: Instant) -> Result<u8> {
-    let scene = Scene::load(&args.scene.scene, &args.scene.overrides)?;
-    let options = RunOptions { engine: args.scene.engine, out: args.out.clone(), force: args.force };
+    if !(args.checkpoint >= 0.0 && args.checkpoint.is_finite()) {
+        return Err(Error::input(
+            format!("--checkpoint {} is no time", args.checkpoint),
+            "write the seconds between two checkpoints, e.g. 30, or 0 for none",
+        ));
+    }
+    let every = (args.checkpoint > 0.0).then_some(args.checkpoint);
+    let (scene, options) = match &args.resume {
+        Some(folder) => {
+            let checkpoint = RunCheckpoint::read(&folder.join(CHECKPOINT))?;
+            let scene = checkpoint.load_scene()?;
+            let engine = match (args.scene.engine, checkpoint.simulation.engine.engine()) {
+                (EngineChoice::Auto, "cpu") => EngineChoice::Cpu,
+                (EngineChoice::Auto, _) => EngineChoice::Gpu,
+                (chosen, _) => chosen,
+            };
+            let options = RunOptions {
+                engine,
+                out: Some(folder.clone()),
+                force: false,
+                checkpoint_every: every,
+                overrides: checkpoint.overrides.clone(),
+                resume: Some(Box::new(checkpoint)),
+            };
+            (scene, options)
+        }
+        None => {
+            let scene = Scene::load(&args.scene.scene, &args.scene.overrides)?;
+            let options = RunOptions {
+                engine: args.scene.engine,
+                out: args.out.clone(),
+                force: args.force,
+                checkpoint_every: every,
+                overrides: args.scene.overrides.clone(),
+                resume: None,
+            };
+            (scene, options)
+        }
+    };
     let interrupted = until_interrupted();
     let outcome = commands::run::run(scene, &options, start, &interrupted);
     let code = commands::run::exit_code(&outcome);

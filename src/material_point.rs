@@ -10,6 +10,7 @@
 //! The path of the effect `puncture` multiplies the result once more, in the element stage.
 
 use glam::DMat3;
+use serde::{Deserialize, Serialize};
 
 use crate::effects::{damage, fibres, plasticity, viscoelastic};
 use crate::material::ElasticLaw;
@@ -28,7 +29,7 @@ pub struct Material {
 }
 
 /// History of one material point. Energies are per rest volume and since t = 0 [J/m^3].
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PointState {
     pub plastic: plasticity::State,
     /// q_i [Pa], one symmetric tensor per Prony term; empty: all zero.

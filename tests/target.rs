@@ -268,7 +268,7 @@ fn figures_count_the_way_in() {
 
 /// A run of the command into a folder.
 fn run_into(scene: Scene, choice: EngineChoice, out: &Path) -> RunOutcome {
-    let options = RunOptions { engine: choice, out: Some(out.to_path_buf()), force: false };
+    let options = RunOptions { engine: choice, out: Some(out.to_path_buf()), force: false, ..RunOptions::default() };
     run(scene, &options, Instant::now(), &AtomicBool::new(false)).unwrap()
 }
 

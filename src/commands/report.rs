@@ -240,7 +240,7 @@ fn compute(
 ) -> Result<Option<(CaseResults, Finished)>> {
     let folder = out.join(plan.case.name);
     // What lies there is of a report: `open_ledger` has seen to it.
-    let run_options = RunOptions { engine, out: Some(folder.clone()), force: true };
+    let run_options = RunOptions { engine, out: Some(folder.clone()), force: true, ..RunOptions::default() };
     match run::run(plan.scene.clone(), &run_options, Instant::now(), interrupted) {
         Ok(outcome) if outcome.summary.status == Status::Interrupted => return Ok(None),
         Ok(outcome) => eprintln!("{}", run::describe(&outcome.summary)),

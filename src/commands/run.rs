@@ -7,6 +7,7 @@ use std::time::Instant;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
+use crate::output::checkpoint::{RunCheckpoint, fingerprint};
 use crate::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables,
     TargetFigures, folder, write_force_chart, write_parts_chart, write_sample_chart,
@@ -24,6 +25,12 @@ pub struct RunOptions {
     pub out: Option<PathBuf>,
     /// Replace the results that a named folder holds.
     pub force: bool,
+    /// Seconds of wall time between two checkpoints; `None`: none are written.
+    pub checkpoint_every: Option<f64>,
+    /// Overrides that the scene was loaded with: a checkpoint names them.
+    pub overrides: Vec<String>,
+    /// The run that goes on, in the folder `out`.
+    pub resume: Option<Box<RunCheckpoint>>,
 }
 
 /// What a run left behind.
@@ -53,7 +60,13 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     }
     let mut simulation = Simulation::new(scene, options.engine)?;
     let scene = simulation.model.scene.clone();
-    let output = OutputFolder::create(options.out.as_deref(), &scene.name, options.force)?;
+    let output = match (&options.resume, &options.out) {
+        (Some(checkpoint), Some(out)) => {
+            simulation.resume(&checkpoint.simulation)?;
+            OutputFolder::reopen(out)?
+        }
+        _ => OutputFolder::create(options.out.as_deref(), &scene.name, options.force)?,
+    };
     let info = simulation.engine().info().clone();
     eprintln!("{}: {} on {} ({})", scene.name, info.engine, info.adapter, info.driver);
     for notice in &simulation.notices {
@@ -67,9 +80,27 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
     let mut tables = Tables::create(&output, &driven, simulation.model.has_bore(), &scene.targets)?;
     let mut fields = FieldFiles::new(&output);
+    let mut records: Vec<FrameRecord> = Vec::new();
+    let mut cells_in_needle = None;
+    let (mut earlier_wall, mut earlier_cpu) = (0.0, Some(0.0));
+    if let Some(checkpoint) = &options.resume {
+        eprintln!("going on at {:.3} s", checkpoint.records.last().map_or(0.0, |r| r.time));
+        if checkpoint.adapter != info.adapter {
+            eprintln!(
+                "note: the run began on {}; on another adapter the numbers go on alike, not bit for bit",
+                checkpoint.adapter
+            );
+        }
+        fields = FieldFiles::resumed(&output, checkpoint.fields.clone());
+        records.clone_from(&checkpoint.records);
+        cells_in_needle = checkpoint.cells_in_needle;
+        (earlier_wall, earlier_cpu) = (checkpoint.wall, checkpoint.cpu);
+        for record in &records {
+            tables.append(record)?;
+        }
+    }
     let progress = Progress::new(simulation.duration());
     let device = simulation.device().cloned();
-    let mut records: Vec<FrameRecord> = Vec::new();
     let mut first_step_ms = None;
     let begin = Instant::now();
     let cpu_begin = process::cpu_seconds();
@@ -77,11 +108,16 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     let (mut drawing, mut drawing_cpu) = (0.0, 0.0);
     let mut status = Status::Ok;
     let mut failure = None;
-    let mut cells_in_needle = None;
+    // Frame after which a checkpoint is written, when the last one was, and whether the run ends with it.
+    let (mut due, mut written, mut ending) = (None, Instant::now(), false);
     loop {
-        if interrupted.load(Ordering::Relaxed) {
+        if interrupted.load(Ordering::Relaxed) && !ending {
             status = Status::Interrupted;
-            break;
+            if options.checkpoint_every.is_none() {
+                break;
+            }
+            ending = true;
+            due = Some(simulation.stop_soon());
         }
         let record = match simulation.next_frame() {
             Ok(Some(record)) => record,
@@ -113,13 +149,50 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
             drawing += wall.elapsed().as_secs_f64();
             drawing_cpu += difference(process::cpu_seconds(), cpu).unwrap_or(0.0);
         }
+        let frame = record.frame;
         records.push(record);
         if failure.is_some() {
             break;
         }
+        if due == Some(frame) {
+            let now = Instant::now();
+            let checkpoint = RunCheckpoint {
+                version: env!("CARGO_PKG_VERSION").into(),
+                scene: std::path::absolute(&scene.path).unwrap_or_else(|_| scene.path.clone()),
+                overrides: options.overrides.clone(),
+                fingerprint: fingerprint(&scene),
+                adapter: info.adapter.clone(),
+                records: records.clone(),
+                cells_in_needle,
+                fields: fields.written().to_vec(),
+                wall: earlier_wall + begin.elapsed().as_secs_f64() - drawing,
+                cpu: sum(earlier_cpu, difference(process::cpu_seconds(), cpu_begin).map(|c| c - drawing_cpu)),
+                simulation: match simulation.checkpoint() {
+                    Ok(checkpoint) => checkpoint,
+                    Err(error) => {
+                        failure = Some(error);
+                        break;
+                    }
+                },
+            };
+            if let Err(error) = checkpoint.write(&output.file(folder::CHECKPOINT)) {
+                failure = Some(error);
+                break;
+            }
+            drawing += now.elapsed().as_secs_f64();
+            (due, written) = (None, Instant::now());
+            if ending {
+                break;
+            }
+        } else if due.is_none() && options.checkpoint_every.is_some_and(|s| written.elapsed().as_secs_f64() >= s) {
+            due = Some(simulation.stop_soon());
+        }
     }
-    let wall = begin.elapsed().as_secs_f64() - drawing;
-    let cpu = difference(process::cpu_seconds(), cpu_begin).map(|c| c - drawing_cpu);
+    if let Some(error) = &failure {
+        status = Status::Failed(error.to_string());
+    }
+    let wall = earlier_wall + begin.elapsed().as_secs_f64() - drawing;
+    let cpu = sum(earlier_cpu, difference(process::cpu_seconds(), cpu_begin).map(|c| c - drawing_cpu));
     progress.finish();
     for notice in &simulation.notices[told..] {
         eprintln!("note: {notice}");
@@ -168,6 +241,10 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         }
     }
     summary.write(&output.file(folder::SUMMARY))?;
+    let checkpoint = output.file(folder::CHECKPOINT);
+    if summary.status == Status::Ok && checkpoint.exists() {
+        std::fs::remove_file(&checkpoint).map_err(|source| Error::file(&checkpoint, source))?;
+    }
     if summary.raised_mass_share > 0.2 {
         eprintln!(
             "note: {:.0} % of all node steps had their mass raised to keep the step stable: inertia is not what \
@@ -190,6 +267,10 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         }
         None => Ok(RunOutcome { folder: output.path().to_path_buf(), summary }),
     }
+}
+
+fn sum(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    Some(a? + b?)
 }
 
 fn difference(after: Option<f64>, before: Option<f64>) -> Option<f64> {

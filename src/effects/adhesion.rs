@@ -17,6 +17,8 @@
 //! `D > (F_s - F_k) (1/k + 1/k_t)`. The force acts on the anchors of the tip springs, from the puncture (a > 0) to the exit; a tip
 //! drawn back by more than D lets go of the tissue. Not in the source: every number. Stick-slip as such: [Wriggers2006], ch. 5.
 
+use serde::{Deserialize, Serialize};
+
 use super::Effect;
 
 pub const EFFECT: Effect = Effect {
@@ -47,7 +49,7 @@ impl Default for Params {
 }
 
 /// What the bond remembers.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Bond {
     /// Stretch w of its spring [m], positive where the tip drags tissue forward.
     pub stretch: f64,

@@ -14,6 +14,7 @@
 //! stage. Source: multiplicative split Lee 1969, [Lv2022] Eq. 8; return mapping Simo & Ortiz 1985.
 
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 
 use super::Effect;
 use crate::material::kinematics::{double_dot, symmetric_eigen};
@@ -45,7 +46,7 @@ impl Default for Params {
 }
 
 /// State of one material point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// G - I with G = Fp^-1.
     pub inverse_flow: DMat3,

@@ -23,6 +23,7 @@ use crate::model::{
 };
 use crate::needle::free_path as needle;
 use crate::scene::Tool;
+use crate::solver::checkpoint::{EngineImage, foreign_image};
 use crate::solver::cpu::TORN_REACH;
 use crate::solver::elements::{HOURGLASS_MODULUS, PrismBase};
 use crate::solver::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State};
@@ -183,6 +184,8 @@ pub struct GpuEngine {
     staging: Vec<wgpu::Buffer>,
     in_flight: VecDeque<InFlight>,
     finished: VecDeque<FrameSums>,
+    /// Buffers that a checkpoint holds.
+    kept: Vec<&'static str>,
     max_steps: usize,
     gravity_work: f64,
 }
@@ -222,6 +225,12 @@ impl GpuEngine {
             bytes += buffer.size();
             buffers.insert(*name, buffer);
         }
+        // What a shader writes and a later step may read; sums of a frame are written whole.
+        let kept: Vec<&'static str> = BUFFERS
+            .into_iter()
+            .filter(|name| !FRAME_RESULTS.contains(name))
+            .filter(|name| reflected.iter().flat_map(|r| &r.bindings).any(|b| b.writable && b.name == *name))
+            .collect();
         let kernels = reflected
             .into_par_iter()
             .map(|r| {
@@ -230,10 +239,7 @@ impl GpuEngine {
             })
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
-        let sums =
-            ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "needle_loads", "tip_result"]
-                .into_iter()
-                .filter_map(|name| buffers.get(name).map(|b| (name, 0, b.size())));
+        let sums = FRAME_RESULTS.into_iter().filter_map(|name| buffers.get(name).map(|b| (name, 0, b.size())));
         // Of the displacements only those around the targets.
         let corners = model.targets.iter().flat_map(|target| target.nodes).map(|node| {
             let size = size_of::<[i32; 4]>() as u64;
@@ -281,6 +287,7 @@ impl GpuEngine {
             staging,
             in_flight: VecDeque::new(),
             finished: VecDeque::new(),
+            kept,
             max_steps,
             gravity_work: 0.0,
         })
@@ -554,6 +561,10 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
         Stage::MeasureFaces => 6 * FACE_PARTS as u32,
     }
 }
+
+/// Buffers that hold what a frame tells, and nothing that the next one needs.
+const FRAME_RESULTS: [&str; 7] =
+    ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "needle_loads", "tip_result"];
 
 /// All buffers by the name of their shader variable.
 const BUFFERS: [&str; 55] = [
@@ -1470,6 +1481,30 @@ impl Engine for GpuEngine {
             let moment: DVec3 = state.displacement.iter().zip(&self.model.node_mass).map(|(u, m)| *u * *m).sum();
             self.gravity_work = moment.dot(gravity.acceleration) / self.model.mass_scaling();
         }
+        Ok(())
+    }
+
+    fn save(&mut self) -> Result<EngineImage> {
+        let names = self.kept.clone();
+        let bytes = self.read_buffers(&names)?;
+        let buffers = names.iter().map(|name| name.to_string()).zip(bytes).collect();
+        Ok(EngineImage::Gpu { buffers, gravity_work: self.gravity_work })
+    }
+
+    fn restore(&mut self, image: &EngineImage) -> Result<()> {
+        while self.collect_oldest(true)? {}
+        self.finished.clear();
+        let EngineImage::Gpu { buffers, gravity_work } = image else { return Err(foreign_image("gpu", image)) };
+        let fits = |(name, bytes): &(String, Vec<u8>)| {
+            self.buffers.get(name.as_str()).is_some_and(|buffer| buffer.size() == bytes.len() as u64)
+        };
+        if buffers.len() != self.kept.len() || !buffers.iter().all(fits) {
+            return Err(foreign_image("gpu", image));
+        }
+        for (name, bytes) in buffers {
+            self.gpu.queue.write_buffer(&self.buffers[name.as_str()], 0, bytes);
+        }
+        self.gravity_work = *gravity_work;
         Ok(())
     }
 

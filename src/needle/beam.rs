@@ -23,6 +23,7 @@
 //! Range of validity: small strain (slopes within an element below 0.3 rad), large rotation.
 
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 
 use super::banded::{BandFactor, SymmetricBand};
 use super::lateral_axes;
@@ -37,7 +38,7 @@ const ITERATIONS: usize = 400;
 const LARGEST_TURN: f64 = 0.3;
 
 /// Cross section of a round needle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Section {
     /// Outer diameter [m].
     pub outer_diameter: f64,
@@ -58,7 +59,7 @@ impl Section {
 }
 
 /// What a needle is made of and how finely it is divided.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BeamParams {
     /// Free length from hub to tip [m].
     pub length: f64,
@@ -89,7 +90,7 @@ impl BeamParams {
 }
 
 /// Where the clamped end is held.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HubPose {
     /// Position of the clamped end [m].
     pub position: DVec3,
@@ -190,7 +191,7 @@ pub struct BeamStep {
 }
 
 /// State of a flexible needle.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Beam {
     pub params: BeamParams,
     hub: HubPose,

@@ -1,6 +1,7 @@
 //! The flexible needle of a run: the beam between the frames. Scheme: src/effects/flexible_needle.rs.
 
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 
 use super::beam::{Beam, HubPose, Loads, NodeSpring, TimeRule};
 use super::centre_line::{CentreLine, ENTRY_COUNT};
@@ -19,7 +20,7 @@ const BUCKLING_LOAD_PART: f64 = 0.9;
 const BUCKLING_OFFSET_PART: f64 = 0.01;
 
 /// The needle at one moment.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct Shape {
     /// Lateral offsets of the centre-line [m] and the arc positions from the hub [m] that have them.
     offset: [DVec3; ENTRY_COUNT],
@@ -30,7 +31,7 @@ struct Shape {
 }
 
 /// What a step of the beam took from the loads that it was given.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Taken {
     /// Work of the loads, with what the Robin springs foresee at the end, on the motion relative to the hub [J].
     relative_work: f64,
@@ -60,7 +61,41 @@ pub struct FlexibleNeedle {
     energy: f64,
 }
 
+/// The beam between two frames.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct NeedleImage {
+    beam: Beam,
+    start: Shape,
+    end: Shape,
+    taken: Taken,
+    buckled: bool,
+    converged: bool,
+    answered: [DVec3; ENTRY_COUNT],
+    energy: f64,
+}
+
 impl FlexibleNeedle {
+    /// Everything that changes during a run.
+    pub fn save(&self) -> NeedleImage {
+        NeedleImage {
+            beam: self.beam.clone(),
+            start: self.start.clone(),
+            end: self.end.clone(),
+            taken: self.taken,
+            buckled: self.buckled,
+            converged: self.converged,
+            answered: self.answered,
+            energy: self.energy,
+        }
+    }
+
+    /// Goes back to an image of the same needle.
+    pub fn restore(&mut self, image: &NeedleImage) {
+        let NeedleImage { beam, start, end, taken, buckled, converged, answered, energy } = image.clone();
+        (self.beam, self.start, self.end, self.taken) = (beam, start, end, taken);
+        (self.buckled, self.converged, self.answered, self.energy) = (buckled, converged, answered, energy);
+    }
+
     /// The needle of a scene, bent by its weight; `first_frame`: length of the first frame [s]. `None` without the effect.
     pub fn new(model: &Model, first_frame: f64) -> Option<Self> {
         let (params, kinematics) = (model.effects.flexible_needle?, model.kinematics.clone()?);

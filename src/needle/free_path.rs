@@ -32,6 +32,7 @@
 //! work of a turning needle is force . v + torque . omega. Source: this project.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::gap::Overlap;
 
@@ -76,7 +77,7 @@ pub fn faded_at_end(overlap: Overlap, d: DVec3, s: f64, end: f64, length: f64) -
 }
 
 /// Where the tip is in the material.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct FreeTip {
     /// Material point X of the tip, a rest position [m].
     pub place: DVec3,

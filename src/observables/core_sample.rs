@@ -1,11 +1,13 @@
 //! The core that a hollow needle holds: what lies in its bore, read off the axis of the core.
 
+use serde::{Deserialize, Serialize};
+
 use crate::model::Model;
 use crate::needle::ToolPose;
 use crate::solver::engine::State;
 
 /// Core in the bore at one moment.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CoreSample {
     /// Length along the needle as it lies in the bore [m].
     pub length: f64,

@@ -1,12 +1,13 @@
 //! What a run tells about itself: one record per display frame, fields on request.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::needle::centre_line::CentreLine;
 
 /// Force that moves the tool, in parts [N]; positive along the insertion direction. Means over the frame. All parts but the
 /// inertia act on the tissue.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ForceParts {
     /// What the hand feels along the insertion: sum of the parts [N].
     pub axial: f64,
@@ -68,7 +69,7 @@ impl ForceParts {
 }
 
 /// Energies [J] at the end of a frame. Work and dissipation are totals since t = 0.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct EnergyAccount {
     /// Work of tool, moved faces, tractions and gravity.
     pub external: f64,
@@ -124,7 +125,7 @@ impl EnergyAccount {
 }
 
 /// Signs of trouble within one frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Health {
     /// Smallest J at cell centres, and at cell corners.
     pub min_j: f64,
@@ -150,7 +151,7 @@ pub struct Health {
 }
 
 /// A flexible needle at the end of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct NeedleRecord {
     /// Where the tip is off the straight axis [m].
     pub tip_offset: DVec3,
@@ -169,7 +170,7 @@ pub struct NeedleRecord {
 }
 
 /// One display frame.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FrameRecord {
     /// Frame number, from 0; the record describes the state at its end.
     pub frame: u64,

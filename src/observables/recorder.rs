@@ -1,6 +1,7 @@
 //! Turns the sums of a frame into a record: totals since t = 0, means over the frame.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::{EnergyAccount, ForceParts, FrameRecord, Health};
 use crate::model::Model;
@@ -8,7 +9,7 @@ use crate::scene::Tool;
 use crate::solver::engine::FrameSums;
 
 /// Adds up what the frames deliver, in f64.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Recorder {
     totals: EnergyAccount,
     contact_dissipation: f64,

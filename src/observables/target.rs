@@ -1,12 +1,13 @@
 //! Where the targets of an insertion are: the motion of the tissue takes them along.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::FrameRecord;
 use crate::model::Model;
 
 /// A target at the end of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct TargetRecord {
     /// How far it is from where it lay at rest [m].
     pub displacement: DVec3,

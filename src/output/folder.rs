@@ -20,12 +20,15 @@ pub const SAMPLE_TABLE: &str = "sample.csv";
 pub const CORE_TABLE: &str = "core.csv";
 /// Where the targets are, per frame and target; written where the scene has any.
 pub const TARGET_TABLE: &str = "targets.csv";
+/// What a stopped run goes on from.
+pub const CHECKPOINT: &str = "checkpoint.stylet";
 pub const SAMPLE_CHART: &str = "sample.svg";
 pub const FIELD_COLLECTION: &str = "frames.pvd";
 /// Folder of the VTU files `frame_00012.vtu`.
 pub const FIELD_FOLDER: &str = "frames";
 
-const SINGLE_FILES: [&str; 10] = [
+const SINGLE_FILES: [&str; 11] = [
+    CHECKPOINT,
     FORCE_TABLE,
     ENERGY_TABLE,
     SUMMARY,
@@ -76,6 +79,15 @@ impl OutputFolder {
             Some(path) => Self::create_named(path, force),
             None => Self::create_numbered(Path::new(DEFAULT_BASE), scene_name),
         }
+    }
+
+    /// The folder of a run that goes on.
+    ///
+    /// # Errors
+    /// `Error::Input` where it cannot be written to.
+    pub fn reopen(path: &Path) -> Result<Self> {
+        probe_writable(path)?;
+        Ok(Self { path: path.to_path_buf() })
     }
 
     fn create_named(path: &Path, force: bool) -> Result<Self> {

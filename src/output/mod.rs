@@ -5,6 +5,7 @@
 //! ([`whole_file`]). [`curve`] reads figures off the force curve, [`summary`] writes them down.
 
 pub mod chart;
+pub mod checkpoint;
 pub mod curve;
 pub mod fit_chart;
 pub mod folder;

@@ -30,6 +30,16 @@ impl FieldFiles {
         Self { folder: folder.clone(), written: Vec::new() }
     }
 
+    /// Goes on after the files of a run that was stopped: time [s] and relative path of each.
+    pub fn resumed(folder: &OutputFolder, written: Vec<(f64, String)>) -> Self {
+        Self { folder: folder.clone(), written }
+    }
+
+    /// Time [s] and relative path of every file so far.
+    pub fn written(&self) -> &[(f64, String)] {
+        &self.written
+    }
+
     /// Writes one frame, then the collection with it; returns the path of the frame.
     pub fn write(&mut self, mesh: &Mesh, snapshot: &FieldSnapshot) -> Result<PathBuf> {
         let fields = self.folder.file(FIELD_FOLDER);

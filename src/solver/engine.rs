@@ -1,7 +1,9 @@
 //! What both engines offer, and what passes between them and the run.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
+use super::checkpoint::EngineImage;
 use crate::effects::adhesion::Bond;
 use crate::error::Result;
 use crate::material_point::PointState;
@@ -147,7 +149,7 @@ pub struct FrameSums {
 }
 
 /// The state that both engines can give and take, in f64 and SI, node order of the mesh.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct State {
     /// Displacement u [m].
     pub displacement: Vec<DVec3>,
@@ -172,8 +174,26 @@ pub struct State {
     pub points: Vec<PointState>,
 }
 
+impl State {
+    /// True where both are states of one model.
+    pub fn fits(&self, other: &State) -> bool {
+        let sizes = |s: &State| {
+            [
+                s.displacement.len(),
+                s.velocity.len(),
+                s.stiffness.len(),
+                s.cut_samples.len(),
+                s.contact.len(),
+                s.pairs.len(),
+                s.points.len(),
+            ]
+        };
+        sizes(self) == sizes(other)
+    }
+}
+
 /// Memory of one contact node.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ContactState {
     pub stick: DVec3,
     pub overlap: f64,
@@ -212,6 +232,13 @@ pub trait Engine {
     fn read_state(&mut self) -> Result<State>;
     /// Replaces the state, for tests, resumed runs and bisecting.
     fn write_state(&mut self, state: &State) -> Result<()>;
+    /// Everything between two frames, exactly (waits for all frames under way).
+    fn save(&mut self) -> Result<EngineImage>;
+    /// Goes back to an image of the same model and time step.
+    ///
+    /// # Errors
+    /// `Error::Input` where the image is that of another engine or model.
+    fn restore(&mut self, image: &EngineImage) -> Result<()>;
     /// Internal nodal forces of the present displacement, `f_int` [N] (the tissue pushes the node with -f_int).
     fn internal_forces(&mut self) -> Result<Vec<DVec3>>;
 }

@@ -1,5 +1,6 @@
 //! The step: one list of stages, two engines.
 
+pub mod checkpoint;
 pub mod cpu;
 pub mod elements;
 pub mod engine;

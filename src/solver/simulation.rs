@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::checkpoint::{Checkpoint, foreign_image};
 use super::cpu::CpuEngine;
 use super::elements::{CellShape, CellStates, Elements};
 use super::engine::{Engine, FramePlan, FrameSums, State, StepInput};
@@ -245,6 +246,55 @@ impl Simulation {
         self.stops.insert(frame);
     }
 
+    /// Asks for the state as soon as the frames under way are collected; returns the last of them.
+    pub fn stop_soon(&mut self) -> u64 {
+        let frame = self.started.max(1) - 1;
+        self.stops.insert(frame.max(self.collected));
+        frame.max(self.collected)
+    }
+
+    /// Everything between two frames, exactly; call it right after a frame registered with [`Simulation::stop_after`].
+    pub fn checkpoint(&mut self) -> Result<Checkpoint> {
+        if self.started != self.collected {
+            return Err(Error::Device("a checkpoint between frames that are under way".into()));
+        }
+        Ok(Checkpoint {
+            frames: self.collected,
+            steps: self.first_step(self.collected),
+            dt: self.dt,
+            engine: self.engine.save()?,
+            recorder: self.recorder.clone(),
+            needle: self.needle.as_ref().map(|needle| needle.save()),
+            return_failures: self.return_failures,
+            unbalanced_frames: self.unbalanced_frames,
+            buckling_told: self.buckling_told,
+        })
+    }
+
+    /// Goes on from a checkpoint of the same scene on the same kind of engine.
+    ///
+    /// # Errors
+    /// `Error::Input` where it belongs to another engine, scene or time step.
+    pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<()> {
+        let same = checkpoint.dt == self.dt
+            && checkpoint.frames <= self.frames
+            && checkpoint.steps == self.first_step(checkpoint.frames)
+            && checkpoint.needle.is_some() == self.needle.is_some();
+        if checkpoint.engine.engine() == self.engine.info().engine && !same {
+            return Err(foreign_image(checkpoint.engine.engine(), &checkpoint.engine));
+        }
+        self.engine.restore(&checkpoint.engine)?;
+        if let (Some(needle), Some(image)) = (&mut self.needle, &checkpoint.needle) {
+            needle.restore(image);
+        }
+        (self.started, self.collected) = (checkpoint.frames, checkpoint.frames);
+        self.recorder = checkpoint.recorder.clone();
+        self.return_failures = checkpoint.return_failures;
+        self.unbalanced_frames = checkpoint.unbalanced_frames;
+        self.buckling_told = checkpoint.buckling_told;
+        Ok(())
+    }
+
     fn plan(&self, frame: u64) -> FramePlan {
         let first_step = self.first_step(frame);
         let last = self.first_step(frame + 1).min(self.total_steps.max(1));
@@ -333,7 +383,7 @@ impl Simulation {
         if bent.buckled && !self.buckling_told {
             self.buckling_told = true;
             self.notices.push(format!(
-                "the needle buckles at a depth of {:.2} mm: {:.3} N of compression, {:.2} mm from its axis, its tip {:.2} mm                  behind; take a thicker or stiffer needle or a shorter flexible_needle.free_length_mm",
+                "the needle buckles at a depth of {:.2} mm: {:.3} N of compression, {:.2} mm from its axis, its tip {:.2} mm behind; take a thicker or stiffer needle or a shorter flexible_needle.free_length_mm",
                 record.depth * 1e3,
                 bent.compression,
                 bent.largest_offset * 1e3,

@@ -14,6 +14,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::checkpoint::{EngineImage, foreign_image};
 use super::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
 use crate::effects::adhesion::Bond;
@@ -385,6 +386,22 @@ impl Engine for CpuEngine {
         }
         self.state = state.clone();
         Ok(())
+    }
+
+    fn save(&mut self) -> Result<EngineImage> {
+        Ok(EngineImage::Cpu { state: self.state.clone(), booked: self.booked })
+    }
+
+    fn restore(&mut self, image: &EngineImage) -> Result<()> {
+        match image {
+            EngineImage::Cpu { state, booked } if state.fits(&self.state) => {
+                self.state = state.clone();
+                self.booked = *booked;
+                self.finished.clear();
+                Ok(())
+            }
+            _ => Err(foreign_image("cpu", image)),
+        }
     }
 
     fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
