@@ -181,7 +181,8 @@ mod tests {
                 let mut seen = 0;
                 for i in 0..100 {
                     let t = f64::from(i);
-                    let lever = d * (0.25e-3 + 0.04e-3 * t) + side * 0.2e-3 * t.sin() + other * 0.2e-3 * (1.3 * t).cos();
+                    let lever =
+                        d * (0.25e-3 + 0.04e-3 * t) + side * 0.2e-3 * t.sin() + other * 0.2e-3 * (1.3 * t).cos();
                     // Outside of the section the gradient of a slit has no meaning.
                     if law == 0 && phi(lever).value + less(lever).0 <= 0.0 {
                         continue;

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::engine::State;
+use super::guard::Guard;
 use crate::error::Error;
 use crate::needle::flexible::NeedleImage;
 use crate::observables::Recorder;
@@ -28,6 +29,7 @@ pub struct Checkpoint {
     pub engine: EngineImage,
     pub(super) recorder: Recorder,
     pub(super) needle: Option<NeedleImage>,
+    pub(super) guard: Guard,
     pub(super) return_failures: u64,
     pub(super) unbalanced_frames: u64,
     pub(super) buckling_told: bool,

@@ -4,12 +4,11 @@ use std::collections::BTreeSet;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::checkpoint::{Checkpoint, foreign_image};
 use super::cpu::CpuEngine;
 use super::elements::{CellShape, CellStates, Elements};
 use super::engine::{Engine, FramePlan, FrameSums, State, StepInput};
+use super::guard::Guard;
 use super::stable_dt::{power_iteration, wave_speed_bound};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuEngine};
@@ -62,14 +61,9 @@ impl FromStr for EngineChoice {
 /// Frames that may be under way before the oldest result is awaited.
 const AHEAD: u64 = 2;
 
-/// Part of the node steps of a frame whose speed may be clamped before the run counts as diverged. A single clamp is
-/// counted and reported; an unstable step clamps nearly all of them and would go on for ever without a number being
-/// out of range.
-const RUNAWAY_PART: f64 = 0.05;
-
 /// Part of all cell steps so far whose return mapping may fail before the run counts as broken: a few points that are
 /// turned inside out for a step are counted and reported, more make the stress and the dissipation meaningless.
-const RETURN_FAILURE_PART: f64 = 1e-3;
+pub(super) const RETURN_FAILURE_PART: f64 = 1e-3;
 
 /// A simulation that is advanced frame by frame.
 pub struct Simulation {
@@ -78,21 +72,22 @@ pub struct Simulation {
     pub stable_dt: f64,
     /// Time step [s].
     pub dt: f64,
-    engine: Box<dyn Engine>,
+    pub(super) engine: Box<dyn Engine>,
     device: Option<Gpu>,
-    recorder: Recorder,
+    pub(super) recorder: Recorder,
     steps_per_frame: u64,
     total_steps: u64,
     frames: u64,
-    started: u64,
-    collected: u64,
+    pub(super) started: u64,
+    pub(super) collected: u64,
+    guard: Guard,
     /// Cell steps whose return mapping failed, since t = 0.
     return_failures: u64,
     /// Frames after which the state is read, so that no later frame may have been started.
     stops: BTreeSet<u64>,
     watch_stretch: bool,
     /// The beam of a flexible needle; every frame waits for the one before.
-    needle: Option<FlexibleNeedle>,
+    pub(super) needle: Option<FlexibleNeedle>,
     /// Frames in which the beam did not find its balance.
     unbalanced_frames: u64,
     buckling_told: bool,
@@ -195,6 +190,12 @@ impl Simulation {
             frames,
             started: 0,
             collected: 0,
+            guard: Guard::new(
+                model.mesh.node_count(),
+                model.mesh.cell_count(),
+                model.scene.material.law.shear_modulus(),
+                (0..model.mesh.cell_count()).map(|cell| model.mesh.cell_volume(cell)).sum(),
+            ),
             return_failures: 0,
             stops: BTreeSet::new(),
             watch_stretch,
@@ -265,6 +266,7 @@ impl Simulation {
             engine: self.engine.save()?,
             recorder: self.recorder.clone(),
             needle: self.needle.as_ref().map(|needle| needle.save()),
+            guard: self.guard.clone(),
             return_failures: self.return_failures,
             unbalanced_frames: self.unbalanced_frames,
             buckling_told: self.buckling_told,
@@ -289,13 +291,14 @@ impl Simulation {
         }
         (self.started, self.collected) = (checkpoint.frames, checkpoint.frames);
         self.recorder = checkpoint.recorder.clone();
+        self.guard = checkpoint.guard.clone();
         self.return_failures = checkpoint.return_failures;
         self.unbalanced_frames = checkpoint.unbalanced_frames;
         self.buckling_told = checkpoint.buckling_told;
         Ok(())
     }
 
-    fn plan(&self, frame: u64) -> FramePlan {
+    pub(super) fn plan(&self, frame: u64) -> FramePlan {
         let first_step = self.first_step(frame);
         let last = self.first_step(frame + 1).min(self.total_steps.max(1));
         let mut plan = FramePlan {
@@ -339,12 +342,8 @@ impl Simulation {
         record.needle = bent;
         record.targets = TargetRecord::of(&self.model, &record, &sums.targets);
         self.tell_of_the_needle(&record);
-        if record.health.not_finite {
-            return Err(self.diverged(&record));
-        }
-        let node_steps = f64::from(sums.steps) * self.model.mesh.node_count() as f64;
-        if f64::from(sums.clamped_nodes) > RUNAWAY_PART * node_steps {
-            return Err(self.runaway(&record, f64::from(sums.clamped_nodes) / node_steps));
+        if let Some(trouble) = self.guard.check(&record, sums.steps) {
+            return Err(self.stopped(&record, trouble));
         }
         self.return_failures += u64::from(record.health.return_failures);
         // Against a whole frame at least: the first one is a single step.
@@ -364,7 +363,7 @@ impl Simulation {
     }
 
     /// The beam's answer to the loads of the frame that was collected last.
-    fn answer_of_the_needle(&mut self, sums: &mut FrameSums) -> NeedleRecord {
+    pub(super) fn answer_of_the_needle(&mut self, sums: &mut FrameSums) -> NeedleRecord {
         let (dt, last) = (self.dt, self.total_steps.max(1));
         let end = |frame: u64| self.first_step(frame + 1).min(last) as f64 * dt;
         let next = (self.collected < self.frames)
@@ -398,95 +397,6 @@ impl Simulation {
                     record.time
                 ));
             }
-        }
-    }
-
-    /// Where and how the state broke.
-    fn diverged(&mut self, record: &FrameRecord) -> Error {
-        let place = match self.engine.read_state() {
-            Ok(state) => {
-                let broken = |v: &DVec3| !v.is_finite() || v.abs().max_element() > 0.03;
-                let velocity = state.velocity.iter().position(|v| !v.is_finite());
-                match state.displacement.iter().position(broken).or(velocity) {
-                    Some(n) => {
-                        let x = self.model.mesh.rest_position(n) * 1e3;
-                        format!(
-                            "stage integrate_nodes: displacement or velocity of node {n} (rest position {:.2}, {:.2}, \
-                             {:.2} mm) is out of range (u = {:?} m)",
-                            x.x, x.y, x.z, state.displacement[n]
-                        )
-                    }
-                    None => "a displacement, a velocity or the stretch of a cell (corners moved apart by more than 7.8 mm, in \
-                             tetrahedra 15.6 mm) was out of range"
-                        .into(),
-                }
-            }
-            Err(error) => error.to_string(),
-        };
-        Error::Diverged { frame: record.frame, step: record.step, time_s: record.time, message: place }
-    }
-
-    /// Where the tissue moves fastest in a run whose speeds are clamped all over.
-    fn runaway(&mut self, record: &FrameRecord, part: f64) -> Error {
-        let limit = self.model.speed_limit(self.dt);
-        let place = match self.engine.read_state() {
-            Ok(state) => {
-                let speeds = state.velocity.iter().map(|v| v.length()).enumerate();
-                let (n, speed) = speeds.fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
-                let x = self.model.mesh.rest_position(n) * 1e3;
-                format!(
-                    "the fastest is node {n} (rest position {:.2}, {:.2}, {:.2} mm) with {speed:.4} m/s",
-                    x.x, x.y, x.z
-                )
-            }
-            Err(error) => error.to_string(),
-        };
-        let way_out = if self.dt > self.stable_dt {
-            format!(
-                "the time step {:.3} us is above the stable step {:.3} us: drop time_step_us",
-                self.dt * 1e6,
-                self.stable_dt * 1e6
-            )
-        } else {
-            "lower solver.safety or the speed of the tool".into()
-        };
-        Error::Diverged {
-            frame: record.frame,
-            step: record.step,
-            time_s: record.time,
-            message: format!(
-                "stage integrate_nodes: {:.0} % of the nodes would move faster than the limit of {limit:.4} m/s (a \
-                 twentieth of a cell edge per step); {place}\n  way out: {way_out}",
-                100.0 * part
-            ),
-        }
-    }
-
-    /// Where the plastic flow is largest in a run whose return mapping fails.
-    fn flow_lost(&mut self, record: &FrameRecord, part: f64) -> Error {
-        let place = match self.engine.read_state() {
-            Ok(state) => {
-                let strains = state.points.iter().map(|p| p.plastic.alpha).enumerate();
-                let (cell, alpha) = strains.fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
-                let x = self.model.mesh.cell_centre(cell) * 1e3;
-                format!(
-                    "the largest plastic strain is {alpha:.3} in cell {cell} at ({:.2}, {:.2}, {:.2}) mm",
-                    x.x, x.y, x.z
-                )
-            }
-            Err(error) => error.to_string(),
-        };
-        Error::Diverged {
-            frame: record.frame,
-            step: record.step,
-            time_s: record.time,
-            message: format!(
-                "stage element_forces: the return mapping of the effect plasticity missed the yield condition in {:.2} % of \
-                 all cell steps (at most {:.1} %); {place}\n  way out: lower solver.safety or the speed of what moves, raise \
-                 yield_stress_kpa or hardening_kpa, or raise solver.hourglass_stiffness where cells fold",
-                100.0 * part,
-                100.0 * RETURN_FAILURE_PART
-            ),
         }
     }
 
