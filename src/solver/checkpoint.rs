@@ -15,7 +15,7 @@ pub enum EngineImage {
     /// Every device buffer that a shader writes and that later steps read, by name; work of gravity since t = 0 [J].
     Gpu { buffers: Vec<(String, Vec<u8>)>, gravity_work: f64 },
     /// The state, and the plastic and damage dissipation that earlier frames have told [J].
-    Cpu { state: State, booked: (f64, f64) },
+    Cpu { state: Box<State>, booked: (f64, f64) },
 }
 
 /// What a simulation holds between two frames.

@@ -389,13 +389,13 @@ impl Engine for CpuEngine {
     }
 
     fn save(&mut self) -> Result<EngineImage> {
-        Ok(EngineImage::Cpu { state: self.state.clone(), booked: self.booked })
+        Ok(EngineImage::Cpu { state: Box::new(self.state.clone()), booked: self.booked })
     }
 
     fn restore(&mut self, image: &EngineImage) -> Result<()> {
         match image {
             EngineImage::Cpu { state, booked } if state.fits(&self.state) => {
-                self.state = state.clone();
+                self.state = State::clone(state);
                 self.booked = *booked;
                 self.finished.clear();
                 Ok(())
