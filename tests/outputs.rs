@@ -146,6 +146,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
         },
         effects: EffectSet::default(),
         solver: SolverSettings {
+            on_trouble: Default::default(),
             safety: 0.8,
             time_step: None,
             mass_damping: 10.0,

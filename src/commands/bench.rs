@@ -124,6 +124,7 @@ pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
             ..Default::default()
         },
         solver: SolverSettings {
+            on_trouble: Default::default(),
             safety: 0.8,
             time_step: None,
             mass_damping: 10.0,

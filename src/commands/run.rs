@@ -1,5 +1,6 @@
 //! `stylet run`: from a scene to a folder of results.
 
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -8,13 +9,16 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::checkpoint::{RunCheckpoint, fingerprint};
+use crate::output::forensics::{FORENSICS, write_forensics};
 use crate::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables,
     TargetFigures, folder, write_force_chart, write_parts_chart, write_sample_chart,
 };
 use crate::process;
 use crate::render;
-use crate::scene::Scene;
+use crate::scene::{OnTrouble, Scene};
+use crate::solver::checkpoint::Checkpoint;
+use crate::solver::engine::EngineInfo;
 use crate::solver::simulation::{EngineChoice, Simulation};
 
 /// What the command line adds to the scene.
@@ -48,6 +52,73 @@ struct Moment {
     field: bool,
 }
 
+/// Frames between two images that a run keeps in memory, to go back to when something goes wrong.
+const IMAGE_FRAMES: u64 = 10;
+/// Images that are kept, and frames before a failure from which on one is taken: the guard waits for a few frames.
+const IMAGES: usize = 3;
+const BEFORE_FAILURE: u64 = 5;
+
+/// How often a run may halve its time step.
+const MOST_HALVINGS: u32 = 4;
+
+/// Wall and CPU time of the steps [s]; pictures, field files and checkpoints are no part of them.
+struct Clock {
+    begin: Instant,
+    cpu_begin: Option<f64>,
+    /// Spent on something else.
+    aside: (f64, f64),
+    /// Of the run before it was resumed.
+    earlier: (f64, Option<f64>),
+}
+
+impl Clock {
+    fn start(earlier: (f64, Option<f64>)) -> Self {
+        Clock { begin: Instant::now(), cpu_begin: process::cpu_seconds(), aside: (0.0, 0.0), earlier }
+    }
+
+    /// Runs something that is no part of the steps.
+    fn aside<T>(&mut self, work: impl FnOnce() -> T) -> T {
+        let (wall, cpu) = (Instant::now(), process::cpu_seconds());
+        let done = work();
+        self.aside.0 += wall.elapsed().as_secs_f64();
+        self.aside.1 += difference(process::cpu_seconds(), cpu).unwrap_or(0.0);
+        done
+    }
+
+    /// Since the program began.
+    fn here(&self) -> f64 {
+        self.begin.elapsed().as_secs_f64() - self.aside.0
+    }
+
+    fn wall(&self) -> f64 {
+        self.earlier.0 + self.here()
+    }
+
+    fn cpu(&self) -> Option<f64> {
+        Some(self.earlier.1? + difference(process::cpu_seconds(), self.cpu_begin)? - self.aside.1)
+    }
+}
+
+/// A run under way: the simulation and what it has written.
+struct Run<'a> {
+    options: &'a RunOptions,
+    scene: Scene,
+    simulation: Simulation,
+    info: EngineInfo,
+    device: Option<Gpu>,
+    output: OutputFolder,
+    driven: Vec<DrivenFace>,
+    tables: Tables,
+    fields: FieldFiles,
+    moments: Vec<Moment>,
+    records: Vec<FrameRecord>,
+    cells_in_needle: Option<u64>,
+    clock: Clock,
+    /// The simulation a little ago, oldest first.
+    images: VecDeque<Checkpoint>,
+    halvings: u32,
+}
+
 /// Simulates the scene and writes everything that it asks for. `program_start` is when the process began,
 /// `interrupted` ends the run cleanly with what is there.
 ///
@@ -58,219 +129,305 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     for notice in &scene.notices {
         eprintln!("note: {notice}");
     }
-    let mut simulation = Simulation::new(scene, options.engine)?;
-    let scene = simulation.model.scene.clone();
-    let output = match (&options.resume, &options.out) {
-        (Some(checkpoint), Some(out)) => {
-            simulation.resume(&checkpoint.simulation)?;
-            OutputFolder::reopen(out)?
-        }
-        _ => OutputFolder::create(options.out.as_deref(), &scene.name, options.force)?,
-    };
-    let info = simulation.engine().info().clone();
-    eprintln!("{}: {} on {} ({})", scene.name, info.engine, info.adapter, info.driver);
-    for notice in &simulation.notices {
-        eprintln!("note: {notice}");
-    }
-    let told = simulation.notices.len();
-    let moments = moments(&simulation);
-    for moment in &moments {
-        simulation.stop_after(moment.frame);
-    }
-    let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
-    let mut tables = Tables::create(&output, &driven, simulation.model.has_bore(), &scene.targets)?;
-    let mut fields = FieldFiles::new(&output);
-    let mut records: Vec<FrameRecord> = Vec::new();
-    let mut cells_in_needle = None;
-    let (mut earlier_wall, mut earlier_cpu) = (0.0, Some(0.0));
-    if let Some(checkpoint) = &options.resume {
-        eprintln!("going on at {:.3} s", checkpoint.records.last().map_or(0.0, |r| r.time));
-        if checkpoint.adapter != info.adapter {
-            eprintln!(
-                "note: the run began on {}; on another adapter the numbers go on alike, not bit for bit",
-                checkpoint.adapter
-            );
-        }
-        fields = FieldFiles::resumed(&output, checkpoint.fields.clone());
-        records.clone_from(&checkpoint.records);
-        cells_in_needle = checkpoint.cells_in_needle;
-        (earlier_wall, earlier_cpu) = (checkpoint.wall, checkpoint.cpu);
-        for record in &records {
-            tables.append(record)?;
-        }
-    }
-    let progress = Progress::new(simulation.duration());
-    let device = simulation.device().cloned();
+    let mut run = Run::new(scene, options)?;
+    let mut told = 0;
+    let progress = Progress::new(run.simulation.duration());
     let mut first_step_ms = None;
-    let begin = Instant::now();
-    let cpu_begin = process::cpu_seconds();
-    // Pictures and field files are no part of the step: their time is told apart.
-    let (mut drawing, mut drawing_cpu) = (0.0, 0.0);
     let mut status = Status::Ok;
     let mut failure = None;
     // Frame after which a checkpoint is written, when the last one was, and whether the run ends with it.
     let (mut due, mut written, mut ending) = (None, Instant::now(), false);
     loop {
         if interrupted.load(Ordering::Relaxed) && !ending {
-            status = Status::Interrupted;
             if options.checkpoint_every.is_none() {
+                status = Status::Interrupted;
                 break;
             }
             ending = true;
-            due = Some(simulation.stop_soon());
+            due = Some(run.simulation.stop_soon());
         }
-        let record = match simulation.next_frame() {
-            Ok(Some(record)) => record,
+        for notice in &run.simulation.notices[told..] {
+            eprintln!("note: {notice}");
+        }
+        told = run.simulation.notices.len();
+        let frame = match run.advance(&progress) {
+            Ok(Some(frame)) => frame,
             Ok(None) => break,
-            Err(error) => {
-                status = Status::Failed(error.to_string());
-                failure = Some(error);
-                break;
-            }
+            Err(error) => match run.recover(error) {
+                Ok(()) => {
+                    (due, told) = (None, 0);
+                    continue;
+                }
+                Err(error) => {
+                    failure = Some(error);
+                    break;
+                }
+            },
         };
         first_step_ms.get_or_insert_with(|| program_start.elapsed().as_secs_f64() * 1e3);
-        if let Err(error) = tables.append(&record) {
-            status = Status::Failed(error.to_string());
-            failure = Some(error);
-            break;
-        }
-        let wall = begin.elapsed().as_secs_f64() - drawing;
-        progress.update(&record, record.time / wall.max(1e-9));
-        for moment in moments.iter().filter(|m| m.frame == record.frame) {
-            let (wall, cpu) = (Instant::now(), process::cpu_seconds());
-            match write_moment(&mut simulation, &record, moment, &output, &mut fields, device.as_ref()) {
-                // The most of all moments; `None` is less than any number.
-                Ok(inside) => cells_in_needle = cells_in_needle.max(inside.map(|n| n as u64)),
-                Err(error) => {
-                    status = Status::Failed(error.to_string());
-                    failure.get_or_insert(error);
-                }
-            }
-            drawing += wall.elapsed().as_secs_f64();
-            drawing_cpu += difference(process::cpu_seconds(), cpu).unwrap_or(0.0);
-        }
-        let frame = record.frame;
-        records.push(record);
-        if failure.is_some() {
-            break;
-        }
         if due == Some(frame) {
-            let now = Instant::now();
-            let checkpoint = RunCheckpoint {
-                version: env!("CARGO_PKG_VERSION").into(),
-                scene: std::path::absolute(&scene.path).unwrap_or_else(|_| scene.path.clone()),
-                overrides: options.overrides.clone(),
-                fingerprint: fingerprint(&scene),
-                adapter: info.adapter.clone(),
-                records: records.clone(),
-                cells_in_needle,
-                fields: fields.written().to_vec(),
-                wall: earlier_wall + begin.elapsed().as_secs_f64() - drawing,
-                cpu: sum(earlier_cpu, difference(process::cpu_seconds(), cpu_begin).map(|c| c - drawing_cpu)),
-                simulation: match simulation.checkpoint() {
-                    Ok(checkpoint) => checkpoint,
-                    Err(error) => {
-                        failure = Some(error);
-                        break;
-                    }
-                },
-            };
-            if let Err(error) = checkpoint.write(&output.file(folder::CHECKPOINT)) {
+            if let Err(error) = run.write_checkpoint() {
                 failure = Some(error);
                 break;
             }
-            drawing += now.elapsed().as_secs_f64();
             (due, written) = (None, Instant::now());
             if ending {
+                status = Status::Interrupted;
                 break;
             }
         } else if due.is_none() && options.checkpoint_every.is_some_and(|s| written.elapsed().as_secs_f64() >= s) {
-            due = Some(simulation.stop_soon());
+            due = Some(run.simulation.stop_soon());
         }
     }
     if let Some(error) = &failure {
         status = Status::Failed(error.to_string());
     }
-    let wall = earlier_wall + begin.elapsed().as_secs_f64() - drawing;
-    let cpu = sum(earlier_cpu, difference(process::cpu_seconds(), cpu_begin).map(|c| c - drawing_cpu));
     progress.finish();
-    for notice in &simulation.notices[told..] {
+    for notice in &run.simulation.notices[told..] {
         eprintln!("note: {notice}");
     }
-
-    let mesh = &simulation.model.mesh;
-    let steps = records.last().map_or(0, |r| r.step);
-    let simulated = records.last().map_or(0.0, |r| r.time);
-    let cell_steps = (mesh.cell_count() as u64 * steps) as f64;
-    let mut summary = Summary {
-        status,
-        scene: scene.name.clone(),
-        version: env!("CARGO_PKG_VERSION").into(),
-        engine: info.engine,
-        adapter: info.adapter,
-        driver: info.driver,
-        effects: scene.effects.keys().iter().map(|k| k.to_string()).collect(),
-        cells: mesh.cell_count() as u64,
-        nodes: mesh.node_count() as u64,
-        dt_s: simulation.dt,
-        stable_dt_s: simulation.stable_dt,
-        mass_scaling: simulation.model.mass_scaling(),
-        steps,
-        simulated_s: simulated,
-        wall_s: wall,
-        real_time_factor: simulated / wall.max(1e-9),
-        cell_steps_per_s: cell_steps / wall.max(1e-9),
-        cpu_ns_per_cell_step: cpu.filter(|_| steps > 0).map(|c| c * 1e9 / cell_steps),
-        first_step_ms,
-        host_peak_bytes: process::peak_bytes(),
-        device_bytes: Some(info.device_bytes),
-        ..Default::default()
-    };
-    summary.cells_in_needle = cells_in_needle;
-    summary.take_frames(&records);
-    summary.take_sample(&driven, &records);
-    summary.targets = TargetFigures::of_run(&scene.targets, &records);
-    if !records.is_empty() {
-        let figures = CurveFigures::from_records(&records);
-        write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, &records, &figures)?;
-        if scene.tool.is_some() {
-            write_parts_chart(&output.file(folder::FORCE_PARTS_CHART), &scene.title, &records)?;
-        }
-        if !driven.is_empty() {
-            write_sample_chart(&output.file(folder::SAMPLE_CHART), &scene.title, &driven, &records)?;
-        }
+    let folder = run.output.path().to_path_buf();
+    if status == Status::Interrupted && run.output.file(folder::CHECKPOINT).exists() {
+        eprintln!("go on with: stylet run --resume {}", folder.display());
     }
-    summary.write(&output.file(folder::SUMMARY))?;
-    let checkpoint = output.file(folder::CHECKPOINT);
-    if summary.status == Status::Ok && checkpoint.exists() {
-        std::fs::remove_file(&checkpoint).map_err(|source| Error::file(&checkpoint, source))?;
-    }
-    if summary.raised_mass_share > 0.2 {
-        eprintln!(
-            "note: {:.0} % of all node steps had their mass raised to keep the step stable: inertia is not what \
-             mass_scaling says; lower solver.time_step_us or raise solver.mass_scaling",
-            100.0 * summary.raised_mass_share
-        );
-    }
-    if summary.return_failures > 0 {
-        eprintln!(
-            "warning: the return mapping of the effect plasticity missed the yield condition in {} of {cell_steps:.0} cell \
-             steps; the first frame is marked in the column return_failures of {}",
-            summary.return_failures,
-            folder::ENERGY_TABLE
-        );
-    }
+    let summary = run.finish(status, first_step_ms)?;
     match failure {
         Some(error) => {
-            eprintln!("results up to the failure are in {}", output.path().display());
+            eprintln!("results up to the failure are in {}", folder.display());
             Err(error)
         }
-        None => Ok(RunOutcome { folder: output.path().to_path_buf(), summary }),
+        None => Ok(RunOutcome { folder, summary }),
     }
 }
 
-fn sum(a: Option<f64>, b: Option<f64>) -> Option<f64> {
-    Some(a? + b?)
+impl<'a> Run<'a> {
+    /// Prepares the simulation, then the folder; goes to where a resumed run was.
+    fn new(scene: Scene, options: &'a RunOptions) -> Result<Self> {
+        let mut simulation = Simulation::new(scene, options.engine)?;
+        let scene = simulation.model.scene.clone();
+        let resumed = options.resume.as_deref().zip(options.out.as_deref());
+        let output = match resumed {
+            Some((checkpoint, out)) => {
+                simulation.resume(&checkpoint.simulation)?;
+                OutputFolder::reopen(out)?
+            }
+            None => OutputFolder::create(options.out.as_deref(), &scene.name, options.force)?,
+        };
+        let info = simulation.engine().info().clone();
+        eprintln!("{}: {} on {} ({})", scene.name, info.engine, info.adapter, info.driver);
+        let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
+        let tables = Tables::create(&output, &driven, simulation.model.has_bore(), &scene.targets)?;
+        let mut run = Run {
+            moments: moments(&simulation),
+            fields: FieldFiles::new(&output),
+            device: simulation.device().cloned(),
+            clock: Clock::start((0.0, Some(0.0))),
+            records: Vec::new(),
+            cells_in_needle: None,
+            images: VecDeque::new(),
+            halvings: 0,
+            options,
+            scene,
+            simulation,
+            info,
+            output,
+            driven,
+            tables,
+        };
+        if let Some((checkpoint, _)) = resumed {
+            eprintln!("going on at {:.3} s", checkpoint.records.last().map_or(0.0, |r| r.time));
+            if checkpoint.adapter != run.info.adapter {
+                eprintln!(
+                    "note: the run began on {}; on another adapter the numbers go on alike, not bit for bit",
+                    checkpoint.adapter
+                );
+            }
+            run.fields = FieldFiles::resumed(&run.output, checkpoint.fields.clone());
+            run.cells_in_needle = checkpoint.cells_in_needle;
+            run.clock = Clock::start((checkpoint.wall, checkpoint.cpu));
+            run.keep_records(checkpoint.records.clone())?;
+        }
+        run.plan_stops();
+        run.keep_image()?;
+        Ok(run)
+    }
+
+    /// Starts the tables anew with these records.
+    fn keep_records(&mut self, records: Vec<FrameRecord>) -> Result<()> {
+        self.tables =
+            Tables::create(&self.output, &self.driven, self.simulation.model.has_bore(), &self.scene.targets)?;
+        self.records = records;
+        self.records.iter().try_for_each(|record| self.tables.append(record))
+    }
+
+    /// Tells the simulation after which frames its state will be read.
+    fn plan_stops(&mut self) {
+        let images = (0..self.simulation.frame_count()).step_by(IMAGE_FRAMES as usize);
+        for frame in self.moments.iter().map(|m| m.frame).chain(images) {
+            self.simulation.stop_after(frame);
+        }
+    }
+
+    /// One frame with all that is due at its end; its number, `None` after the last one.
+    fn advance(&mut self, progress: &Progress) -> Result<Option<u64>> {
+        let Some(record) = self.simulation.next_frame()? else { return Ok(None) };
+        self.tables.append(&record)?;
+        progress.update(&record, record.time / self.clock.here().max(1e-9));
+        let frame = record.frame;
+        self.records.push(record);
+        for moment in self.moments.iter().filter(|m| m.frame == frame) {
+            let record = &self.records[self.records.len() - 1];
+            let (simulation, output, fields) = (&mut self.simulation, &self.output, &mut self.fields);
+            let device = self.device.as_ref();
+            let inside = self.clock.aside(|| write_moment(simulation, record, moment, output, fields, device))?;
+            // The most of all moments; `None` is less than any number.
+            self.cells_in_needle = self.cells_in_needle.max(inside.map(|n| n as u64));
+        }
+        if frame % IMAGE_FRAMES == 0 {
+            self.keep_image()?;
+        }
+        Ok(Some(frame))
+    }
+
+    fn keep_image(&mut self) -> Result<()> {
+        let simulation = &mut self.simulation;
+        let image = self.clock.aside(|| simulation.checkpoint())?;
+        if self.images.len() == IMAGES {
+            self.images.pop_front();
+        }
+        self.images.push_back(image);
+        Ok(())
+    }
+
+    /// The run as it was at the end of `simulation.frames` frames.
+    fn checkpoint(&self, simulation: Checkpoint) -> RunCheckpoint {
+        RunCheckpoint {
+            version: env!("CARGO_PKG_VERSION").into(),
+            scene: std::path::absolute(&self.scene.path).unwrap_or_else(|_| self.scene.path.clone()),
+            overrides: self.options.overrides.clone(),
+            fingerprint: fingerprint(&self.scene),
+            adapter: self.info.adapter.clone(),
+            records: self.records[..simulation.frames as usize].to_vec(),
+            cells_in_needle: self.cells_in_needle,
+            fields: self.fields.written().to_vec(),
+            wall: self.clock.wall(),
+            cpu: self.clock.cpu(),
+            simulation,
+        }
+    }
+
+    fn write_checkpoint(&mut self) -> Result<()> {
+        let image = self.simulation.checkpoint()?;
+        let (checkpoint, path) = (self.checkpoint(image), self.output.file(folder::CHECKPOINT));
+        self.clock.aside(|| checkpoint.write(&path))
+    }
+
+    /// What can be done after a failure: half the step, if the scene wants that, else the folder `forensics` and the error.
+    fn recover(&mut self, error: Error) -> Result<()> {
+        let Error::Diverged { frame, .. } = &error else { return Err(error) };
+        let (frame, text) = (*frame, error.to_string());
+        let early = self.images.iter().rposition(|image| image.frames + BEFORE_FAILURE <= frame).unwrap_or(0);
+        let Some(image) = self.images.get(early).cloned() else { return Err(error) };
+        if self.scene.solver.on_trouble == OnTrouble::HalveStep && self.halvings < MOST_HALVINGS {
+            self.halvings += 1;
+            let mut next = self.simulation.halved(&image)?;
+            next.notices.push(format!(
+                "{text}\n      on_trouble = \"halve_step\": the run goes on from frame {} with steps of {:.3} us ({} of {MOST_HALVINGS})",
+                image.frames,
+                next.dt * 1e6,
+                self.halvings
+            ));
+            self.simulation = next;
+            let records = self.records[..image.frames as usize].to_vec();
+            self.keep_records(records)?;
+            self.images.clear();
+            self.plan_stops();
+            self.keep_image()?;
+            return Ok(());
+        }
+        // A replay of a failure leaves the folder that it came from as it is.
+        if self.output.path().ends_with(FORENSICS) {
+            return Err(error);
+        }
+        let finding = self.simulation.investigate(&image, frame)?;
+        let (checkpoint, model) = (self.checkpoint(image), self.simulation.model.clone());
+        match write_forensics(&self.output, &model, &finding, &text, &checkpoint, self.device.as_ref()) {
+            Ok(folder) => eprintln!("where it began, and how to see it again: {}", folder.display()),
+            Err(reason) => eprintln!("warning: no forensics: {reason}"),
+        }
+        Err(error)
+    }
+
+    /// Writes charts and summary.
+    fn finish(self, status: Status, first_step_ms: Option<f64>) -> Result<Summary> {
+        let (wall, cpu) = (self.clock.wall(), self.clock.cpu());
+        let mesh = &self.simulation.model.mesh;
+        let steps = self.records.last().map_or(0, |r| r.step);
+        let simulated = self.records.last().map_or(0.0, |r| r.time);
+        let cell_steps = (mesh.cell_count() as u64 * steps) as f64;
+        let (scene, records, output) = (&self.scene, &self.records, &self.output);
+        let mut summary = Summary {
+            status,
+            scene: scene.name.clone(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            engine: self.info.engine,
+            adapter: self.info.adapter,
+            driver: self.info.driver,
+            effects: scene.effects.keys().iter().map(|k| k.to_string()).collect(),
+            cells: mesh.cell_count() as u64,
+            nodes: mesh.node_count() as u64,
+            dt_s: self.simulation.dt,
+            stable_dt_s: self.simulation.stable_dt,
+            mass_scaling: self.simulation.model.mass_scaling(),
+            halvings: self.halvings,
+            steps,
+            simulated_s: simulated,
+            wall_s: wall,
+            real_time_factor: simulated / wall.max(1e-9),
+            cell_steps_per_s: cell_steps / wall.max(1e-9),
+            cpu_ns_per_cell_step: cpu.filter(|_| steps > 0).map(|c| c * 1e9 / cell_steps),
+            first_step_ms,
+            host_peak_bytes: process::peak_bytes(),
+            device_bytes: Some(self.info.device_bytes),
+            ..Default::default()
+        };
+        summary.cells_in_needle = self.cells_in_needle;
+        summary.take_frames(records);
+        summary.take_sample(&self.driven, records);
+        summary.targets = TargetFigures::of_run(&scene.targets, records);
+        if !records.is_empty() {
+            let figures = CurveFigures::from_records(records);
+            write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, records, &figures)?;
+            if scene.tool.is_some() {
+                write_parts_chart(&output.file(folder::FORCE_PARTS_CHART), &scene.title, records)?;
+            }
+            if !self.driven.is_empty() {
+                write_sample_chart(&output.file(folder::SAMPLE_CHART), &scene.title, &self.driven, records)?;
+            }
+        }
+        summary.write(&output.file(folder::SUMMARY))?;
+        let checkpoint = output.file(folder::CHECKPOINT);
+        // A replay of a failure may be wanted again.
+        if summary.status == Status::Ok && checkpoint.exists() && !output.path().ends_with(FORENSICS) {
+            std::fs::remove_file(&checkpoint).map_err(|source| Error::file(&checkpoint, source))?;
+        }
+        if summary.raised_mass_share > 0.2 {
+            eprintln!(
+                "note: {:.0} % of all node steps had their mass raised to keep the step stable: inertia is not what \
+                 mass_scaling says; lower solver.time_step_us or raise solver.mass_scaling",
+                100.0 * summary.raised_mass_share
+            );
+        }
+        if summary.return_failures > 0 {
+            eprintln!(
+                "warning: the return mapping of the effect plasticity missed the yield condition in {} of {cell_steps:.0} \
+                 cell steps; the first frame is marked in the column return_failures of {}",
+                summary.return_failures,
+                folder::ENERGY_TABLE
+            );
+        }
+        Ok(summary)
+    }
 }
 
 fn difference(after: Option<f64>, before: Option<f64>) -> Option<f64> {

@@ -18,6 +18,11 @@ pub struct Recorder {
 }
 
 impl Recorder {
+    /// Counts on in steps of half the length.
+    pub fn halve_step(&mut self) {
+        self.step *= 2;
+    }
+
     /// Books one frame whose steps lasted `dt` [s] each and returns its record.
     pub fn record(&mut self, model: &Model, dt: f64, sums: &FrameSums) -> FrameRecord {
         let duration = f64::from(sums.steps) * dt;

@@ -9,6 +9,7 @@ pub mod checkpoint;
 pub mod curve;
 pub mod fit_chart;
 pub mod folder;
+pub mod forensics;
 pub mod material_chart;
 pub mod page;
 pub mod parts_chart;

@@ -137,6 +137,9 @@ pub struct Summary {
     /// Area of the cohesive faces that parted [m^2]; only where some did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torn_area_m2: Option<f64>,
+    /// How often trouble made the run halve its time step; `dt_s` is the last one.
+    #[serde(default)]
+    pub halvings: u32,
     /// Most inverted cells in one frame.
     pub inverted_cells: u64,
     /// Share of all node steps in which selective mass scaling raised the mass of a node.

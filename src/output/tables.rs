@@ -4,7 +4,7 @@
 //! All are flushed after every row: whatever stops the program, the rows of all finished frames are on the disk.
 
 use std::fs::File;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE, TARGET_TABLE};
 use super::sample::{DrivenFace, SAMPLE_COLUMNS, SamplePoint};
@@ -182,6 +182,15 @@ fn force_row(record: &FrameRecord) -> Vec<String> {
     row.extend([f.lateral, f.torque].iter().flat_map(|v| v.to_array()).map(number));
     row.push(number(record.tip_coordinate));
     row
+}
+
+/// Writes the energies of some frames to a file of their own.
+///
+/// # Errors
+/// `Error::File` where it cannot be written.
+pub fn write_energy_table(path: &Path, records: &[FrameRecord]) -> Result<()> {
+    let mut table = Table::create(path.to_path_buf(), &ENERGY_COLUMNS)?;
+    records.iter().try_for_each(|record| table.write_row(&energy_row(record)))
 }
 
 fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {

@@ -679,6 +679,18 @@ pub struct SolverTable {
     pub frame_rate_hz: Option<f64>,
     /// Length of a run without a tool [s]; with a tool the phases decide.
     pub duration_s: Option<f64>,
+    /// What to do when the guard finds trouble: "stop" (default), or "halve_step": go back a little and on with half the
+    /// time step, counted and told, at most four times.
+    pub on_trouble: Option<OnTrouble>,
+}
+
+/// What to do when the guard finds trouble.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OnTrouble {
+    #[default]
+    Stop,
+    HalveStep,
 }
 
 /// A number or "auto".

@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+pub use file::OnTrouble;
 pub use motion::{Motion, Phase, Vibration};
 
 use crate::effects::{self, EffectSet};
@@ -412,6 +413,8 @@ pub struct SolverSettings {
     pub frame_rate: f64,
     /// Length of a run without a tool [s]; with a tool the phases decide.
     pub duration: Option<f64>,
+    /// What to do when the guard finds trouble.
+    pub on_trouble: OnTrouble,
 }
 
 /// What is written, and when.

@@ -82,6 +82,7 @@ pub fn block(size_mm: [f64; 3], cell_mm: f64) -> Scene {
         motion: Motion::default(),
         effects: EffectSet::default(),
         solver: SolverSettings {
+            on_trouble: Default::default(),
             safety: 0.8,
             time_step: None,
             mass_damping: 0.0,

@@ -456,6 +456,7 @@ impl Check<'_> {
             );
         }
         SolverSettings {
+            on_trouble: table.on_trouble.unwrap_or_default(),
             safety: self.optional("solver.safety", table.safety, 1.0, 0.8, Within::Positive(1.0)),
             time_step: table
                 .time_step_us

@@ -260,6 +260,14 @@ impl CpuEngine {
         self.sums.raised_mass += result.3;
     }
 
+    /// Dissipated by plastic flow and by damage since t = 0 [J].
+    fn dissipated(&self) -> (f64, f64) {
+        self.state.points.iter().enumerate().fold((0.0, 0.0), |sum, (cell, p)| {
+            let v = self.model.mesh.cell_volume(cell);
+            (sum.0 + v * p.plastic_dissipation, sum.1 + v * p.damage_dissipation)
+        })
+    }
+
     /// Stages `measure_cells`, `measure_nodes`, `measure_contact`.
     fn measure(&mut self) {
         let (model, elements, state) = (&self.model, &self.elements, &self.state);
@@ -269,6 +277,7 @@ impl CpuEngine {
             .into_par_iter()
             .map(|cell| elements.measure(model, cell, &state.displacement, averaged.as_ref().map(|a| a[cell]), states))
             .collect();
+        let dissipated = self.dissipated();
         let sums = &mut self.sums;
         sums.elastic = measures.iter().map(|m| m.elastic).sum();
         sums.hourglass = measures.iter().map(|m| m.hourglass).sum();
@@ -285,10 +294,6 @@ impl CpuEngine {
             measures.iter().enumerate().filter(|(c, m)| inverted(m) && !is_severed(*c)).map(|(c, _)| c as u32);
         sums.inverted_cell = broken.next();
         sums.inverted_cells = u32::from(sums.inverted_cell.is_some()) + broken.count() as u32;
-        let dissipated = state.points.iter().enumerate().fold((0.0, 0.0), |sum, (cell, p)| {
-            let v = model.mesh.cell_volume(cell);
-            (sum.0 + v * p.plastic_dissipation, sum.1 + v * p.damage_dissipation)
-        });
         sums.plastic_dissipation = dissipated.0 - self.booked.0;
         sums.damage_dissipation = dissipated.1 - self.booked.1;
         self.booked = dissipated;
@@ -385,6 +390,7 @@ impl Engine for CpuEngine {
             return Err(Error::Device("state of another mesh".into()));
         }
         self.state = state.clone();
+        self.booked = self.dissipated();
         Ok(())
     }
 
