@@ -129,7 +129,8 @@ fn a_scene_may_ask_for_half_the_step() {
         let output = stylet(folder.path(), &["run", path.to_str().unwrap(), "--engine", engine, "--out", "short"]);
         assert!(output.status.success(), "{}", told(&output));
         let short = summary("short");
-        assert_eq!(halved["dt_s"], short["dt_s"]);
+        let dt = |s: &serde_json::Value| s["dt_s"].as_f64().unwrap();
+        assert!((dt(&halved) / dt(&short) - 1.0).abs() < 0.05, "whole numbers of steps per frame");
         let last = |name: &str| -> Vec<f64> {
             let text = std::fs::read_to_string(folder.path().join(name).join("sample.csv")).unwrap();
             text.lines().last().unwrap().split(',').filter_map(|v| v.parse().ok()).collect()

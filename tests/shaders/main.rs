@@ -265,6 +265,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "MaterialPlace",
         "FreeContact",
         "Overlap",
+        "SlitForce",
         "Slopes",
         "IsochoricStress",
         "PointPlace",
