@@ -158,12 +158,13 @@ fn steps_table(steps: &[StepRecord]) -> String {
     text
 }
 
-/// A cut through the place: that of every picture of the run where it passes by, else one parallel to xz without the tool.
+/// A cut through the place: that of every picture of the run where its tool passes by, else one parallel to xz without it.
 fn draw(path: &Path, model: &Model, finding: &Finding, device: Option<&Gpu>) -> Result<()> {
     let mut scene = Scene { targets: Vec::new(), ..model.scene.clone() };
     let mut fields = finding.fields.clone();
     let plane = Plane::of_scene(&scene, &fields);
-    if (finding.place - plane.origin).dot(plane.normal).abs() > NEAR * scene.tissue.cell_size {
+    let far = (finding.place - plane.origin).dot(plane.normal).abs() > NEAR * scene.tissue.cell_size;
+    if far || scene.tool.is_none() {
         scene.tool = None;
         fields.tool_pose = None;
         scene.motion.entry = DVec3::new(finding.place.x, finding.place.y, 0.0);
