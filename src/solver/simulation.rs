@@ -225,6 +225,10 @@ impl Simulation {
         self.frames
     }
 
+    pub fn steps_per_frame(&self) -> u64 {
+        self.steps_per_frame
+    }
+
     pub fn total_steps(&self) -> u64 {
         self.total_steps
     }
