@@ -1,7 +1,7 @@
 //! The hard cases, in the order of the table. A bound stands where the physics puts it, not where a run comes out: energy
 //! within 1 %, with a needle within 2 %, as for every other scene; nothing inverted at the end.
 
-use super::{Answer, Case, Cure, Expected, Part, Setup, measure, prepare};
+use super::{Answer, Balance, Case, Cure, Expected, Part, Setup, measure, prepare};
 
 /// Energy within 1 %: no tool, so that all work is done by faces.
 const BALANCED: Expected = Expected::Survives { imbalance: 0.01 };
@@ -9,12 +9,13 @@ const BALANCED: Expected = Expected::Survives { imbalance: 0.01 };
 const BALANCED_WITH_TOOL: Expected = Expected::Survives { imbalance: 0.02 };
 
 /// The scene as it is written, and the energy of a scene without a tool.
-const PLAIN: Part = Part { label: "", overrides: &[], setup: Setup::NONE, expected: BALANCED, answer: None };
+const PLAIN: Part =
+    Part { label: "", overrides: &[], setup: Setup::NONE, balance: Balance::Frames, expected: BALANCED, answer: None };
 /// The same with a tool.
 const TOOL: Part = Part { expected: BALANCED_WITH_TOOL, ..PLAIN };
 
 /// A small block for a needle, in the short form.
-const SMALL: &str = "tissue.size_mm=[13.0, 13.0, 8.0]";
+const SMALL: &str = "tissue.size_mm=[12.0, 12.0, 7.0]";
 
 /// Removes the only hourglass term that holds a cell which a needle folds.
 const NO_QUARTIC: Cure = Cure::Switch { what: "quartic hourglass term", overrides: &["solver.hourglass_quartic=0"] };
@@ -47,13 +48,10 @@ pub const CASES: &[Case] = &[
         name: "twist_270",
         hard: "270 degrees of twist",
         scene: "hard/twist_270.toml",
-        short: &["tissue.cell_size_mm=2.0"],
+        short: &["boundaries.z_max.duration_s=0.08", "solver.duration_s=0.1"],
         parts: &[PLAIN],
         spread: None,
-        cure: Cure::Switch {
-            what: "hourglass stiffness 1",
-            overrides: &["solver.hourglass_stiffness=0.1", "effects=[]"],
-        },
+        cure: Cure::Switch { what: "hourglass stiffness 1", overrides: &["solver.hourglass_stiffness=0.1"] },
     },
     Case {
         name: "inverted",
@@ -62,7 +60,7 @@ pub const CASES: &[Case] = &[
         short: &["tissue.size_mm=[3.0, 3.0, 3.0]"],
         parts: &[
             Part { label: "mirrored", setup: Setup { state: Some(prepare::mirrored), ..Setup::NONE }, ..PLAIN },
-            Part { label: "scrambled", setup: Setup { state: Some(prepare::scrambled), ..Setup::NONE }, ..PLAIN },
+            Part { label: "scattered", setup: Setup { state: Some(prepare::scattered), ..Setup::NONE }, ..PLAIN },
             Part {
                 label: "tetrahedra",
                 setup: Setup { mesh: Some(prepare::tetrahedra), state: Some(prepare::mirrored), ..Setup::NONE },
@@ -137,7 +135,7 @@ pub const CASES: &[Case] = &[
         name: "tip_places",
         hard: "tip on node, edge, face",
         scene: "hard/tip_places.toml",
-        short: &[SMALL, "motion.phase.0.depth_mm=3.0"],
+        short: &[SMALL, "motion.phase.0.depth_mm=2.6"],
         parts: &[
             Part { label: "node", answer: Some(PUSH), ..TOOL },
             Part { label: "edge", overrides: &["tissue.axis_offset_cells=[0.0, 0.5]"], answer: Some(PUSH), ..TOOL },
@@ -148,7 +146,7 @@ pub const CASES: &[Case] = &[
                 ..TOOL
             },
         ],
-        spread: None,
+        spread: Some(0.1),
         cure: NO_QUARTIC,
     },
     Case {
@@ -203,6 +201,7 @@ pub const CASES: &[Case] = &[
             "motion.phase.1.depth_mm=2.0",
             "motion.phase.2.depth_mm=4.0",
             "motion.phase.4.depth_mm=4.0",
+            "solver.mass_scaling=1000",
         ],
         parts: &[TOOL],
         spread: None,
@@ -221,21 +220,14 @@ pub const CASES: &[Case] = &[
         name: "teleport",
         hard: "20 mm within a frame",
         scene: "hard/teleport.toml",
-        short: &["tissue.size_mm=[30.0, 12.0, 22.0]", "tissue.growth=1.6"],
+        short: &["tissue.size_mm=[12.0, 12.0, 22.0]", "tissue.growth=1.6"],
         parts: &[
             Part { label: "stab", ..TOOL },
             Part {
-                label: "drag",
-                overrides: &["motion.phase=[{kind = \"insert\", speed_mm_s = 1000.0, depth_mm = 8.0}, \
-                              {kind = \"move\", to_mm = [10.0, 0.0, -8.0], speed_mm_s = 1000.0}]"],
-                expected: Expected::Caught("would move faster than the limit"),
-                ..TOOL
-            },
-            Part {
                 label: "jump",
                 overrides: &["motion.phase=[{kind = \"insert\", speed_mm_s = 1000.0, depth_mm = 8.0}, \
-                              {kind = \"reposition\", entry_mm = [10.0, 0.0]}]"],
-                expected: Expected::Refused("outside the tissue only"),
+                              {kind = \"reposition\", entry_mm = [2.0, 0.0]}]"],
+                expected: Expected::Refused("deep in the tissue"),
                 ..TOOL
             },
         ],
@@ -243,16 +235,31 @@ pub const CASES: &[Case] = &[
         cure: Cure::Switch { what: "mass that waves cross", overrides: &["solver.mass_scaling=4000"] },
     },
     Case {
+        name: "drag",
+        hard: "sideways at 1000 mm/s",
+        scene: "hard/drag.toml",
+        short: &[
+            "tissue.size_mm=[18.0, 12.0, 10.0]",
+            "tissue.growth=1.6",
+            "motion.phase.0.depth_mm=5.0",
+            "motion.phase.1.to_mm=[5.0, 0.0, -5.0]",
+        ],
+        parts: &[TOOL],
+        spread: None,
+        cure: Cure::Fixed("the speed limit of the nodes, which takes energy"),
+    },
+    Case {
         name: "step_0_9",
         hard: "0.9 of critical step",
         scene: "hard/critical_step.toml",
         short: &[],
         parts: &[Part {
-            setup: Setup { scene: Some(prepare::step_below), state: Some(prepare::bent), ..Setup::NONE },
+            setup: Setup { scene: Some(prepare::step_below), state: Some(prepare::slightly_bent), ..Setup::NONE },
+            balance: Balance::Means,
             ..PLAIN
         }],
         spread: None,
-        cure: Cure::Switch { what: "a step below the limit", overrides: &["solver.time_step_us=52.0"] },
+        cure: Cure::Switch { what: "a step below the limit", overrides: &["solver.time_step_us=42.5"] },
     },
     Case {
         name: "step_1_1",
@@ -260,7 +267,7 @@ pub const CASES: &[Case] = &[
         scene: "hard/critical_step.toml",
         short: &[],
         parts: &[Part {
-            setup: Setup { scene: Some(prepare::step_above), state: Some(prepare::bent), ..Setup::NONE },
+            setup: Setup { scene: Some(prepare::step_above), state: Some(prepare::slightly_bent), ..Setup::NONE },
             expected: Expected::Caught("drop time_step_us"),
             ..PLAIN
         }],
@@ -271,7 +278,7 @@ pub const CASES: &[Case] = &[
         name: "mass_scaling",
         hard: "mass x 1 to 100,000",
         scene: "hard/mass_scaling.toml",
-        short: &["boundaries.z_max.duration_s=0.2", "solver.duration_s=0.24"],
+        short: &[],
         parts: &[
             PLAIN_AT_1,
             Part { label: "10", overrides: &["solver.mass_scaling=10"], ..PLAIN },
@@ -281,7 +288,7 @@ pub const CASES: &[Case] = &[
             Part { label: "100000", overrides: &["solver.mass_scaling=100000"], ..PLAIN },
         ],
         spread: None,
-        cure: Cure::Fixed("selective mass raising (an absent effect is a mass of 1)"),
+        cure: Cure::Fixed("selective mass raising, on with any factor"),
     },
     Case {
         name: "damage_095",
@@ -306,7 +313,7 @@ pub const CASES: &[Case] = &[
         name: "plastic_100",
         hard: "100 % plastic strain",
         scene: "hard/plastic_100.toml",
-        short: &["boundaries.z_max.duration_s=0.2", "solver.duration_s=0.2"],
+        short: &["boundaries.z_max.duration_s=0.1", "solver.duration_s=0.1"],
         parts: &[Part {
             answer: Some(Answer {
                 what: "smallest plastic strain",
@@ -329,7 +336,7 @@ pub const CASES: &[Case] = &[
             ..PLAIN
         }],
         spread: None,
-        cure: Cure::Switch { what: "the penalty's own step", overrides: &["effects=[\"cohesive\"]"] },
+        cure: Cure::Fixed("the penalty counts in the step"),
     },
     Case {
         name: "negative_c01",
@@ -364,8 +371,8 @@ pub const CASES: &[Case] = &[
         short: &["solver.duration_s=0.4"],
         parts: &[Part {
             answer: Some(Answer {
-                what: "largest motion [m, m/s]",
-                of: measure::largest_motion,
+                what: "largest displacement [nm]",
+                of: measure::largest_displacement,
                 at_least: 0.0,
                 at_most: 0.0,
             }),
@@ -379,13 +386,7 @@ pub const CASES: &[Case] = &[
         hard: "10^6 steps, undamped",
         scene: "hard/vibration.toml",
         short: &["solver.duration_s=0.4"],
-        parts: &[Part {
-            setup: Setup { state: Some(prepare::bent), ..Setup::NONE },
-            // Frame by frame the sum swings: velocities belong to half steps. The answer compares means.
-            expected: Expected::Survives { imbalance: 0.1 },
-            answer: Some(Answer { what: "energy kept", of: measure::energy_kept, at_least: 0.99, at_most: 1.01 }),
-            ..PLAIN
-        }],
+        parts: &[Part { setup: Setup { state: Some(prepare::bent), ..Setup::NONE }, balance: Balance::Means, ..PLAIN }],
         spread: None,
         cure: Cure::Fixed("displacement in fixed point"),
     },

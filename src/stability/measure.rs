@@ -2,25 +2,13 @@
 
 use super::Trace;
 use crate::Result;
-use crate::observables::FrameRecord;
 use crate::scene::Face;
 use crate::solver::simulation::Simulation;
 
-/// Largest displacement [m] or velocity [m/s] of a node: zero of a body at rest.
-pub fn largest_motion(simulation: &mut Simulation, _: &Trace) -> Result<f64> {
+/// Largest displacement of a node [nm]: zero of a body at rest.
+pub fn largest_displacement(simulation: &mut Simulation, _: &Trace) -> Result<f64> {
     let state = simulation.engine().read_state()?;
-    Ok(state.displacement.iter().chain(&state.velocity).map(|v| v.length()).fold(0.0, f64::max))
-}
-
-/// Mean energy over the last tenth of the frames over that of the first tenth. Velocities belong to half steps, so that the sum
-/// of one frame swings by some omega dt; the mean does not.
-pub fn energy_kept(_: &mut Simulation, trace: &Trace) -> Result<f64> {
-    let tenth = (trace.records.len() / 10).max(1);
-    let mean = |records: &[FrameRecord]| {
-        records.iter().map(|r| r.energy.elastic + r.energy.hourglass + r.energy.kinetic).sum::<f64>()
-            / records.len() as f64
-    };
-    Ok(mean(&trace.records[trace.records.len() - tenth..]) / mean(&trace.records[..tenth]))
+    Ok(1e9 * state.displacement.iter().map(|u| u.length()).fold(0.0, f64::max))
 }
 
 /// Force on the top face over shear modulus and area, mean over the last tenth of the frames.

@@ -54,8 +54,20 @@ pub struct Part {
     pub label: &'static str,
     pub overrides: &'static [&'static str],
     pub setup: Setup,
+    /// How the energy of its frames is compared.
+    pub balance: Balance,
     pub expected: Expected,
     pub answer: Option<Answer>,
+}
+
+/// How the energy of a run is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Balance {
+    /// In every frame, with the work done and the energy at the start; over the larger of the two.
+    Frames,
+    /// Mean over the last tenth of the run with that over the first, for bodies that swing freely: velocities belong to half
+    /// steps, so that the sum of one frame swings by some omega dt, and its mean does not.
+    Means,
 }
 
 /// What a scene cannot say.

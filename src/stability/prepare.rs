@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::material_point::Volumetric;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::model::Model;
 use crate::scene::Scene;
+use crate::solver::elements::{CellStates, Elements};
 use crate::solver::engine::State;
 use crate::solver::stable_dt::power_iteration;
 
@@ -41,13 +43,22 @@ fn displace(model: &Model, state: &mut State, mut u: impl FnMut(DVec3) -> DVec3)
     }
 }
 
-/// A smooth bend of a third of a millimetre at most, on a block of some millimetres that is held at its bottom.
-pub fn bent(model: &Model, state: &mut State) {
+/// A smooth bend of `part` of a third of a millimetre, on a block of some millimetres that is held at its bottom.
+fn bend(model: &Model, state: &mut State, part: f64) {
     let (low, high) = model.mesh.bounds();
     displace(model, state, |x| {
         let z = x.z / (high.z - low.z);
-        DVec3::new(2e-4 * z * z, -1e-4 * z, 1.5e-4 * (2e2 * (x.x + low.x) * z).sin())
+        DVec3::new(2e-4 * z * z, -1e-4 * z, 1.5e-4 * (2e2 * (x.x + low.x) * z).sin()) * part
     });
+}
+
+pub fn bent(model: &Model, state: &mut State) {
+    bend(model, state, 1.0);
+}
+
+/// So little that the speed limit, which is low with a large step, is far away.
+pub fn slightly_bent(model: &Model, state: &mut State) {
+    bend(model, state, 0.05);
 }
 
 /// Three times as long, with the lateral contraction of a body that keeps its volume.
@@ -56,23 +67,34 @@ pub fn stretched(model: &Model, state: &mut State) {
     displace(model, state, |x| DVec3::new(lateral * x.x, lateral * x.y, 2.0 * x.z));
 }
 
-/// Part of a cell edge by which the nodes of turned cells are moved at random.
-const SCATTER: f64 = 0.3;
-
-/// Every cell turned inside out: the block is mirrored at its bottom and half as high, every node moved at random.
+/// Every cell turned inside out: the block is mirrored at its bottom and half as high, every node moved at random by up to a
+/// tenth of an edge.
 pub fn mirrored(model: &Model, state: &mut State) {
     let (edge, mut random) = (model.scene.tissue.cell_size, Random(1));
-    displace(model, state, |x| {
-        // The nodes of the bottom are held.
-        let free = (x.z / edge).min(1.0);
-        DVec3::NEG_Z * (1.5 * x.z) + random.vector() * (SCATTER * edge * free)
-    });
+    displace(model, state, |x| DVec3::NEG_Z * (1.5 * x.z) + random.vector() * (0.1 * edge));
+    assert!(all_inverted(model, state), "the mirrored cells are inverted for this seed");
 }
 
-/// Every node somewhere in the block.
-pub fn scrambled(model: &Model, state: &mut State) {
-    let ((low, high), mut random) = (model.mesh.bounds(), Random(2));
-    displace(model, state, |x| (high - low) * (random.vector() + DVec3::ONE) * 0.5 - x);
+/// Every node moved at random, just so far that every cell is inverted at its centre or at a corner.
+pub fn scattered(model: &Model, state: &mut State) {
+    let edge = model.scene.tissue.cell_size;
+    for reach in 10..40 {
+        let mut random = Random(2);
+        displace(model, state, |_| random.vector() * (0.05 * f64::from(reach) * edge));
+        if all_inverted(model, state) {
+            return;
+        }
+    }
+    unreachable!("two edges are enough for this seed");
+}
+
+fn all_inverted(model: &Model, state: &State) -> bool {
+    let elements = Elements::new(model);
+    (0..model.mesh.cell_count()).all(|cell| {
+        let none = Some(Volumetric { stress: 0.0, energy: 0.0 });
+        let measure = elements.measure(model, cell, &state.displacement, none, CellStates::default());
+        measure.jacobian <= 0.0 || measure.corner_jacobian <= 0.0
+    })
 }
 
 /// Every cell at the plastic strain at which its damage is as large as it can be.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde::{Serialize, Serializer};
 
 use super::run::{End, Trace};
-use super::{CASES, Case, Cure, Expected, Options, Part};
+use super::{Balance, CASES, Case, Cure, Expected, Options, Part};
 use crate::solver::engine::EngineInfo;
 use crate::solver::simulation::EngineChoice;
 
@@ -94,7 +94,7 @@ impl RunReport {
     }
 
     /// Figures of a run with steps of `dt` [s] in tissue whose fastest wave has the speed `wave` [m/s].
-    pub(super) fn take(&mut self, trace: &Trace, dt: f64, wave: f64) {
+    pub(super) fn take(&mut self, trace: &Trace, balance: Balance, dt: f64, wave: f64) {
         self.step_us = Some(dt * 1e6);
         let Some(last) = trace.records.last() else { return };
         let smallest = |of: fn(&crate::observables::Health) -> f64| {
@@ -102,7 +102,7 @@ impl RunReport {
         };
         let speed = trace.records.iter().map(|r| r.health.max_speed).fold(0.0, f64::max);
         self.steps = last.step;
-        self.imbalance = Some(trace.imbalance());
+        self.imbalance = Some(trace.imbalance(balance));
         self.smallest_j = Some(smallest(|h| h.min_j));
         self.smallest_corner_j = Some(smallest(|h| h.min_corner_j));
         self.speed_over_wave_speed = Some(speed / wave);
@@ -153,7 +153,7 @@ impl RunReport {
         if let (Some(wanted), Some(value)) = (part.answer, self.answer)
             && !(value >= wanted.at_least && value <= wanted.at_most)
         {
-            problems.push(format!("{} {value:.4}, {}", wanted.what, range(wanted.at_least, wanted.at_most)));
+            problems.push(format!("{} {}, {}", wanted.what, brief(value), range(wanted.at_least, wanted.at_most)));
         }
         (!problems.is_empty()).then(|| problems.join("; "))
     }
@@ -170,6 +170,12 @@ impl Expected {
             Expected::Refused(text) => format!("refused: \"{text}\""),
         }
     }
+}
+
+/// A number with four digits.
+fn brief(value: f64) -> String {
+    let size = value.abs();
+    if size > 0.0 && !(1e-3..1e4).contains(&size) { format!("{value:.3e}") } else { format!("{value:.4}") }
 }
 
 /// A range in words; bounds that are no bounds are left out.

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::report::{CaseReport, RunReport};
-use super::{Case, Cure, Expected, Options, Part};
+use super::{Balance, Case, Cure, Expected, Options, Part};
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
 use crate::observables::FrameRecord;
@@ -24,18 +24,31 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Largest energy that was lost or created, over the largest work or the energy at the start; 0 where nothing happened.
-    pub(super) fn imbalance(&self) -> f64 {
-        let mut largest: f64 = 0.0;
-        for record in &self.records {
-            let e = &record.energy;
-            let scale = e.external_max.max(self.start_energy);
-            let residual = (e.external + self.start_energy - e.accounted()).abs();
-            let part = if residual == 0.0 { 0.0 } else { residual / scale };
-            // `f64::max` would drop what is no number.
-            largest = if part.is_nan() || largest.is_nan() { f64::NAN } else { largest.max(part) };
+    /// Largest part of the energy that was lost or created; 0 where nothing happened.
+    pub(super) fn imbalance(&self, balance: Balance) -> f64 {
+        match balance {
+            Balance::Frames => self.largest_residual(),
+            Balance::Means => self.drift(),
         }
-        largest
+    }
+
+    fn largest_residual(&self) -> f64 {
+        let residual = |r: &FrameRecord| (r.energy.external + self.start_energy - r.energy.accounted()).abs();
+        let work = self.records.last().map_or(0.0, |r| r.energy.external_max);
+        // `f64::max` would drop what is no number.
+        let larger = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
+        let largest = self.records.iter().map(residual).fold(0.0, larger);
+        if largest == 0.0 { 0.0 } else { largest / work.max(self.start_energy) }
+    }
+
+    fn drift(&self) -> f64 {
+        let tenth = (self.records.len() / 10).max(1);
+        let stored = |r: &FrameRecord| r.energy.elastic + r.energy.hourglass + r.energy.kinetic;
+        let sum = |records: &[FrameRecord]| records.iter().map(stored).sum::<f64>();
+        (sum(&self.records[self.records.len().saturating_sub(tenth)..])
+            / sum(&self.records[..tenth.min(self.records.len())])
+            - 1.0)
+            .abs()
     }
 }
 
@@ -109,7 +122,7 @@ fn part(
             Err(error) => return Err(error),
         }
     };
-    report.take(&trace, simulation.dt, fastest_wave(&simulation.model));
+    report.take(&trace, part.balance, simulation.dt, fastest_wave(&simulation.model));
     if let (End::Survived, Some(answer)) = (&end, part.answer) {
         report.answer = Some((answer.of)(&mut simulation, &trace)?);
     }
