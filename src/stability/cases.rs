@@ -133,7 +133,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "tip_places",
-        hard: "tip on node, edge, face",
+        hard: "on node, edge and face",
         scene: "hard/tip_places.toml",
         short: &[SMALL, "motion.phase.0.depth_mm=2.6"],
         parts: &[
@@ -151,7 +151,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "grid_lines",
-        hard: "45 deg along grid lines",
+        hard: "45 deg on grid lines",
         scene: "hard/grid_lines.toml",
         short: &["tissue.size_mm=[16.0, 12.0, 8.0]", "motion.phase.0.depth_mm=4.0"],
         parts: &[TOOL],
@@ -169,7 +169,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "reinsertion",
-        hard: "in the same track again",
+        hard: "the same track again",
         scene: "hard/reinsertion.toml",
         short: &[
             SMALL,
@@ -366,7 +366,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "rest",
-        hard: "a million steps at rest",
+        hard: "10^6 steps at rest",
         scene: "hard/rest.toml",
         short: &["solver.duration_s=0.4"],
         parts: &[Part {

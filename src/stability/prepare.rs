@@ -72,28 +72,34 @@ pub fn stretched(model: &Model, state: &mut State) {
 pub fn mirrored(model: &Model, state: &mut State) {
     let (edge, mut random) = (model.scene.tissue.cell_size, Random(1));
     displace(model, state, |x| DVec3::NEG_Z * (1.5 * x.z) + random.vector() * (0.1 * edge));
-    assert!(all_inverted(model, state), "the mirrored cells are inverted for this seed");
+    assert!(first_upright(model, state).is_none(), "the mirrored cells are inverted for this seed");
 }
 
-/// Every node moved at random, just so far that every cell is inverted at its centre or at a corner.
+/// Every node moved at random by up to an edge; the corners of a cell that is not inverted, at its centre or at a corner, are
+/// moved anew until there is none.
 pub fn scattered(model: &Model, state: &mut State) {
-    let edge = model.scene.tissue.cell_size;
-    for reach in 10..40 {
-        let mut random = Random(2);
-        displace(model, state, |_| random.vector() * (0.05 * f64::from(reach) * edge));
-        if all_inverted(model, state) {
-            return;
+    let (edge, mut random) = (model.scene.tissue.cell_size, Random(2));
+    displace(model, state, |_| random.vector() * edge);
+    for _ in 0..100_000 {
+        let Some(cell) = first_upright(model, state) else { return };
+        for node in model.mesh.cell_nodes(cell).iter().copied() {
+            let fixed = model.fixed_components(node);
+            let wanted = random.vector() * edge;
+            for a in (0..3).filter(|a| !fixed[*a]) {
+                state.displacement[node][a] = wanted[a];
+            }
         }
     }
-    unreachable!("two edges are enough for this seed");
+    unreachable!("the cells of this block are inverted after some hundred draws");
 }
 
-fn all_inverted(model: &Model, state: &State) -> bool {
+/// First cell that is inverted neither at its centre nor at a corner.
+fn first_upright(model: &Model, state: &State) -> Option<usize> {
     let elements = Elements::new(model);
-    (0..model.mesh.cell_count()).all(|cell| {
-        let none = Some(Volumetric { stress: 0.0, energy: 0.0 });
-        let measure = elements.measure(model, cell, &state.displacement, none, CellStates::default());
-        measure.jacobian <= 0.0 || measure.corner_jacobian <= 0.0
+    let none = Some(Volumetric { stress: 0.0, energy: 0.0 });
+    (0..model.mesh.cell_count()).find(|cell| {
+        let measure = elements.measure(model, *cell, &state.displacement, none, CellStates::default());
+        measure.jacobian > 0.0 && measure.corner_jacobian > 0.0
     })
 }
 
@@ -107,10 +113,12 @@ pub fn damaged(model: &Model, state: &mut State) {
     }
 }
 
-/// Sets the step to `part` of the limit at rest, unless the scene has one of its own.
+/// Sets the step to `part` of the limit at rest, unless the scene has one of its own; 30 of them fill a frame, so that none
+/// is shortened.
 fn step(scene: &mut Scene, mesh: &Mesh, part: f64) {
     let limit = power_iteration(&Model::new(scene.clone(), mesh.clone()));
-    scene.solver.time_step.get_or_insert(part * limit);
+    let step = *scene.solver.time_step.get_or_insert(part * limit);
+    scene.solver.frame_rate = 1.0 / (30.0 * step);
 }
 
 pub fn step_below(scene: &mut Scene, mesh: &Mesh) {

@@ -144,14 +144,14 @@ impl RunReport {
         let mut problems = Vec::new();
         let imbalance = self.imbalance.unwrap_or(f64::NAN);
         // Not a number is no balance either.
-        if !(imbalance <= bound) {
+        if imbalance.is_nan() || imbalance > bound {
             problems.push(format!("energy off by {}, allowed {}", percent(imbalance), percent(bound)));
         }
         if self.inverted_cells_at_end > 0 {
             problems.push(format!("{} cells inverted at the end", self.inverted_cells_at_end));
         }
         if let (Some(wanted), Some(value)) = (part.answer, self.answer)
-            && !(value >= wanted.at_least && value <= wanted.at_most)
+            && !(wanted.at_least..=wanted.at_most).contains(&value)
         {
             problems.push(format!("{} {}, {}", wanted.what, brief(value), range(wanted.at_least, wanted.at_most)));
         }
@@ -227,7 +227,7 @@ impl CaseReport {
             let low = answers.iter().copied().fold(f64::INFINITY, f64::min);
             let high = answers.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let spread = high / low - 1.0;
-            if !(spread <= allowed) {
+            if spread.is_nan() || spread > allowed {
                 problems.push(format!("the answers differ by {}, allowed {}", percent(spread), percent(allowed)));
             }
         }

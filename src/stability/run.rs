@@ -111,6 +111,7 @@ fn part(
     };
     let (mut simulation, start_energy) = prepared(scene, part, engine)?;
     let mut trace = Trace { records: Vec::new(), start_energy };
+    let mut stopped_at = None;
     let end = loop {
         if interrupted.load(Ordering::Relaxed) {
             return Ok(None);
@@ -118,11 +119,15 @@ fn part(
         match simulation.next_frame() {
             Ok(Some(record)) => trace.records.push(record),
             Ok(None) => break End::Survived,
-            Err(error @ Error::Diverged { .. }) => break End::Stopped(error.to_string()),
-            Err(error) => return Err(error),
+            Err(error) => {
+                let Error::Diverged { step, .. } = error else { return Err(error) };
+                stopped_at = Some(step);
+                break End::Stopped(error.to_string());
+            }
         }
     };
     report.take(&trace, part.balance, simulation.dt, fastest_wave(&simulation.model));
+    report.steps = stopped_at.unwrap_or(report.steps);
     if let (End::Survived, Some(answer)) = (&end, part.answer) {
         report.answer = Some((answer.of)(&mut simulation, &trace)?);
     }
