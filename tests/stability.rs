@@ -53,13 +53,13 @@ fn every_case_comes_out_as_it_must(engine: EngineChoice, known: &[&str]) {
 
 #[test]
 fn the_suite_holds_in_f64() {
-    every_case_comes_out_as_it_must(EngineChoice::Cpu, &["drag"]);
+    every_case_comes_out_as_it_must(EngineChoice::Cpu, &["inverted_tets", "drag"]);
 }
 
 #[test]
 fn the_suite_holds_on_the_gpu() {
     if has_gpu() {
-        every_case_comes_out_as_it_must(EngineChoice::Gpu, &["drag", "rest"]);
+        every_case_comes_out_as_it_must(EngineChoice::Gpu, &["inverted_tets", "drag", "rest"]);
     }
 }
 
