@@ -2,7 +2,7 @@
 //!
 //! Reading order, which is also the straight line that data takes:
 //! [`scene`] -> [`mesh`] -> [`effects`] -> [`separation`] and [`model`] -> [`solver`] (engines [`solver::cpu`] and
-//! [`gpu`]) -> [`observables`] -> [`output`] and [`render`].
+//! [`gpu`]) -> [`observables`] -> [`output`] and [`render`]. [`stability`] runs the hard cases.
 
 pub mod commands;
 pub mod effects;
@@ -21,5 +21,6 @@ pub mod render;
 pub mod scene;
 pub mod separation;
 pub mod solver;
+pub mod stability;
 
 pub use error::{Error, Result};

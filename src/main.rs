@@ -44,6 +44,8 @@ enum Command {
     Fit(FitArgs),
     /// Run the scenes of a publication and put its numbers beside ours, as one HTML page
     Report(ReportArgs),
+    /// Run the hard cases of scenes/hard: which survive, which are caught, which are refused
+    Stability(commands::stability::StabilityArgs),
     /// List the GPU adapters
     Adapters,
     /// Print the JSON schema of scene files
@@ -308,6 +310,11 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
             Ok(0)
         }
         Some(Command::Report(args)) => report(args),
+        Some(Command::Stability(args)) => {
+            let (text, code) = commands::stability::stability(&args, &until_interrupted())?;
+            print(&text);
+            Ok(code)
+        }
         Some(Command::FirstStep { engine }) => {
             print(&commands::bench::first_step(engine, start)?);
             Ok(0)

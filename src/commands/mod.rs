@@ -7,6 +7,7 @@ pub mod fit;
 pub mod material;
 pub mod report;
 pub mod run;
+pub mod stability;
 
 use crate::error::Result;
 

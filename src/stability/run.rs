@@ -1,0 +1,179 @@
+//! Runs one case and judges what came out.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use super::report::{CaseReport, RunReport};
+use super::{Balance, Case, Cure, Expected, Options, Part};
+use crate::mesh::{BlockMesh, Mesh};
+use crate::model::Model;
+use crate::observables::FrameRecord;
+use crate::scene::Scene;
+use crate::solver::elements::{CellStates, Elements};
+use crate::solver::engine::{EngineInfo, State};
+use crate::solver::simulation::{EngineChoice, Simulation};
+use crate::{Error, Result};
+
+/// What a run left behind.
+#[derive(Debug, Clone, Default)]
+pub struct Trace {
+    pub records: Vec<FrameRecord>,
+    /// Energy of the state that was written before the first step [J].
+    pub start_energy: f64,
+}
+
+impl Trace {
+    /// Largest part of the energy that was lost or created; 0 where nothing happened.
+    pub(super) fn imbalance(&self, balance: Balance) -> f64 {
+        match balance {
+            Balance::Frames => self.largest_residual(),
+            Balance::Means => self.drift(),
+        }
+    }
+
+    fn largest_residual(&self) -> f64 {
+        let residual = |r: &FrameRecord| (r.energy.external + self.start_energy - r.energy.accounted()).abs();
+        let work = self.records.last().map_or(0.0, |r| r.energy.external_max);
+        // `f64::max` would drop what is no number.
+        let larger = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
+        let largest = self.records.iter().map(residual).fold(0.0, larger);
+        if largest == 0.0 { 0.0 } else { largest / work.max(self.start_energy) }
+    }
+
+    fn drift(&self) -> f64 {
+        let tenth = (self.records.len() / 10).max(1);
+        let stored = |r: &FrameRecord| r.energy.elastic + r.energy.hourglass + r.energy.kinetic;
+        let sum = |records: &[FrameRecord]| records.iter().map(stored).sum::<f64>();
+        (sum(&self.records[self.records.len().saturating_sub(tenth)..])
+            / sum(&self.records[..tenth.min(self.records.len())])
+            - 1.0)
+            .abs()
+    }
+}
+
+/// How a run ended, with the message of whoever ended it.
+pub(super) enum End {
+    Survived,
+    Stopped(String),
+    Refused(String),
+}
+
+/// Runs a case; `None`: interrupted. The engine tells of itself where one was made.
+pub(super) fn case(
+    case: &Case,
+    options: &Options,
+    folder: &Path,
+    engine: EngineChoice,
+    interrupted: &AtomicBool,
+) -> Result<Option<(CaseReport, Option<EngineInfo>)>> {
+    let (mut runs, mut info) = (Vec::new(), None);
+    for part in case.parts {
+        // Without its cure only what should survive can fail.
+        if options.without_cure && !matches!(part.expected, Expected::Survives { .. }) {
+            continue;
+        }
+        match self::part(case, part, options, folder, engine, interrupted)? {
+            Some((run, made)) => {
+                runs.push(run);
+                info = made.or(info);
+            }
+            None => return Ok(None),
+        }
+    }
+    Ok(Some((CaseReport::new(case, runs), info)))
+}
+
+/// Runs one part; `None`: interrupted.
+fn part(
+    case: &Case,
+    part: &Part,
+    options: &Options,
+    folder: &Path,
+    engine: EngineChoice,
+    interrupted: &AtomicBool,
+) -> Result<Option<(RunReport, Option<EngineInfo>)>> {
+    let begin = Instant::now();
+    let short = if options.short { case.short } else { &[] };
+    let cure = match case.cure {
+        Cure::Switch { overrides, .. } if options.without_cure => overrides,
+        _ => &[],
+    };
+    let overrides: Vec<String> = [short, part.overrides, cure].concat().iter().map(|text| text.to_string()).collect();
+    let mut report = RunReport::new(part);
+    let scene = match Scene::load(&folder.join(case.scene), &overrides) {
+        Ok(scene) => scene,
+        Err(Error::Scene(text)) => {
+            report.judge(part, End::Refused(text));
+            return Ok(Some((report, None)));
+        }
+        Err(error) => return Err(error),
+    };
+    let (mut simulation, start_energy) = prepared(scene, part, engine)?;
+    let mut trace = Trace { records: Vec::new(), start_energy };
+    let mut stopped_at = None;
+    let end = loop {
+        if interrupted.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        match simulation.next_frame() {
+            Ok(Some(record)) => trace.records.push(record),
+            Ok(None) => break End::Survived,
+            Err(error) => {
+                let Error::Diverged { step, .. } = error else { return Err(error) };
+                stopped_at = Some(step);
+                break End::Stopped(error.to_string());
+            }
+        }
+    };
+    report.take(&trace, part.balance, simulation.dt, fastest_wave(&simulation.model));
+    report.steps = stopped_at.unwrap_or(report.steps);
+    if let (End::Survived, Some(answer)) = (&end, part.answer) {
+        report.answer = Some((answer.of)(&mut simulation, &trace)?);
+    }
+    report.wall_s = begin.elapsed().as_secs_f64();
+    report.judge(part, end);
+    Ok(Some((report, Some(simulation.engine().info().clone()))))
+}
+
+/// The simulation before its first step, and the energy of the state that it starts from [J].
+fn prepared(mut scene: Scene, part: &Part, engine: EngineChoice) -> Result<(Simulation, f64)> {
+    let mesh = match (part.setup.mesh, &scene.mesh) {
+        (Some(mesh), _) => mesh(&scene),
+        (None, Some(tets)) => Mesh::Tets(tets.clone()),
+        (None, None) => Mesh::Block(BlockMesh::for_scene(&scene)),
+    };
+    if let Some(change) = part.setup.scene {
+        change(&mut scene, &mesh);
+    }
+    let mut simulation = Simulation::with_mesh(scene, mesh, engine)?;
+    let Some(change) = part.setup.state else { return Ok((simulation, 0.0)) };
+    let mut state = simulation.engine().read_state()?;
+    change(&simulation.model, &mut state);
+    simulation.engine().write_state(&state)?;
+    // As the engine keeps it.
+    let state = simulation.engine().read_state()?;
+    let energy = energy(&simulation.model, &state);
+    Ok((simulation, energy))
+}
+
+/// Elastic, hourglass and kinetic energy of a state [J], in f64.
+fn energy(model: &Model, state: &State) -> f64 {
+    let elements = Elements::new(model);
+    let states = CellStates { points: &state.points, stiffness: &state.stiffness };
+    let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
+    let cell = |cell: usize| {
+        let volumetric = averaged.as_ref().map(|a| a[cell]);
+        let measure = elements.measure(model, cell, &state.displacement, volumetric, states);
+        measure.elastic + measure.hourglass
+    };
+    let stored: f64 = (0..model.mesh.cell_count()).map(cell).sum();
+    let kinetic: f64 = state.velocity.iter().zip(&model.node_mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
+    stored + kinetic
+}
+
+/// Fastest P wave of all materials at the scaled density [m/s].
+fn fastest_wave(model: &Model) -> f64 {
+    let speed = |m: &crate::material_point::Material| (m.law.p_wave_modulus() / m.density).sqrt();
+    model.materials.iter().map(speed).fold(0.0, f64::max) / model.mass_scaling().sqrt()
+}

@@ -1,0 +1,149 @@
+//! The stability suite in its short form on both engines, the cases without their cure, and the command as a user calls it.
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+use std::sync::atomic::AtomicBool;
+
+use assert_cmd::cargo::CommandCargoExt;
+use serde_json::Value;
+use stylet::gpu::Gpu;
+use stylet::solver::simulation::EngineChoice;
+use stylet::stability::{CASES, EngineReport, Options, Suite, run};
+
+fn options(without_cure: bool) -> Options {
+    Options {
+        only: Vec::new(),
+        short: true,
+        without_cure,
+        scenes: Some(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes")),
+    }
+}
+
+/// True where an adapter can be opened; `REQUIRE_GPU=1` turns its absence into a failure.
+fn has_gpu() -> bool {
+    match Gpu::open() {
+        Ok(gpu) => {
+            println!("adapter: {} ({} {})", gpu.info.name, gpu.info.driver, gpu.info.driver_info);
+            true
+        }
+        Err(error) if std::env::var("REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("REQUIRE_GPU=1, but {error}"),
+        Err(error) => {
+            println!("skipped: no adapter ({error})");
+            false
+        }
+    }
+}
+
+/// The short form; its table must fit a terminal.
+fn short_form(engine: EngineChoice, without_cure: bool) -> EngineReport {
+    let report = run(&options(without_cure), engine, &mut |_| (), &AtomicBool::new(false)).unwrap();
+    println!("{}", report.table());
+    for line in report.table().lines() {
+        assert!(line.chars().count() <= 80, "{line:?}");
+    }
+    report
+}
+
+/// `known`: cases that fail on this engine; the README says why. One that is mended must leave the list.
+fn every_case_comes_out_as_it_must(engine: EngineChoice, known: &[&str]) {
+    let report = short_form(engine, false);
+    assert_eq!(report.cases.len(), CASES.len());
+    assert_eq!(report.surprises(), known);
+}
+
+#[test]
+fn the_suite_holds_in_f64() {
+    every_case_comes_out_as_it_must(EngineChoice::Cpu, &["inverted_tets", "drag"]);
+}
+
+#[test]
+fn the_suite_holds_on_the_gpu() {
+    if has_gpu() {
+        every_case_comes_out_as_it_must(EngineChoice::Gpu, &["inverted_tets", "drag", "rest"]);
+    }
+}
+
+/// What a bound is worth: without the cure the same bound is missed.
+#[test]
+fn no_case_holds_without_its_cure() {
+    let engine = if has_gpu() { EngineChoice::Gpu } else { EngineChoice::Cpu };
+    let report = short_form(engine, true);
+    assert!(report.cases.len() >= 10, "{}", report.cases.len());
+    assert!(report.surprises().is_empty(), "{:?}", report.surprises());
+    assert!(report.cases.iter().all(|case| !case.problems.is_empty()));
+}
+
+#[test]
+fn a_case_that_fails_is_told_with_its_reason() {
+    let options = Options { only: vec!["plastic_100".into()], ..options(true) };
+    let report = run(&options, EngineChoice::Cpu, &mut |_| (), &AtomicBool::new(false)).unwrap();
+    let table = report.table();
+    assert!(table.contains("FAILS") && table.contains("plastic_100: "), "{table}");
+    assert!(Suite::new(&options, vec![report]).as_expected);
+}
+
+#[test]
+fn a_stopped_suite_keeps_what_is_done() {
+    let report = run(&options(false), EngineChoice::Cpu, &mut |_| (), &AtomicBool::new(true)).unwrap();
+    assert!(report.interrupted && report.cases.is_empty());
+    assert!(report.table().ends_with("interrupted"), "{}", report.table());
+}
+
+/// `stylet stability` in the repository.
+fn stability(args: &[&str]) -> Output {
+    let mut command = Command::cargo_bin("stylet").unwrap();
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("stability").args(args);
+    command.output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn the_command_prints_json_and_writes_both_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("results");
+    let arguments = ["--short", "--json", "--engine", "cpu", "--only", "table1", "--only", "negative_c01", "--out"];
+    let output = stability(&[&arguments[..], &[out.to_str().unwrap()]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((json["short"].as_str(), json["as_expected"].as_bool()), (Some("short"), Some(true)));
+    let cases = json["engines"][0]["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 2);
+    // In the order of the table, whatever the order of the names.
+    assert_eq!((&cases[0]["name"], &cases[0]["verdict"]), (&"negative_c01".into(), &"holds".into()));
+    assert_eq!((&cases[1]["name"], &cases[1]["verdict"]), (&"table1".into(), &"refused".into()));
+    assert!(cases[1]["imbalance"].is_null());
+    let caught = &cases[0]["runs"][1];
+    assert_eq!(caught["verdict"], "caught");
+    assert!(caught["message"].as_str().unwrap().contains("principal stretch"));
+    let table = std::fs::read_to_string(out.join("stability.txt")).unwrap();
+    assert!(table.contains("negative_c01") && table.contains("1 refused"), "{table}");
+    let written: Value = serde_json::from_slice(&std::fs::read(out.join("stability.json")).unwrap()).unwrap();
+    assert_eq!(written, json);
+}
+
+#[test]
+fn the_list_names_every_case() {
+    let output = stability(&["--list"]);
+    assert_eq!(output.status.code(), Some(0));
+    let list = text(&output.stdout);
+    assert!(list.lines().all(|line| line.chars().count() <= 80), "{list}");
+    assert!(CASES.iter().all(|case| list.contains(case.name)));
+}
+
+#[test]
+fn wrong_calls_are_refused() {
+    for (args, expected) in [
+        (&["--only", "twist"][..], &["no stability case `twist`", "twist_270"][..]),
+        (&["--engine", "fast"], &["auto, gpu, cpu or both"]),
+        (&["--scenes", "assets", "--only", "rest"], &["no scene", "--scenes"]),
+        (&["--list", "--json"], &["cannot be used with"]),
+    ] {
+        let output = stability(args);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {error}");
+        assert!(expected.iter().all(|e| error.contains(e)), "{args:?}: {error}");
+    }
+}
