@@ -21,5 +21,6 @@ pub mod render;
 pub mod scene;
 pub mod separation;
 pub mod solver;
+pub mod study;
 
 pub use error::{Error, Result};

@@ -1,5 +1,6 @@
 //! What the command line does, one file per command.
 
+pub mod advise;
 pub mod bench;
 pub mod bench_effects;
 pub mod check;
@@ -7,6 +8,7 @@ pub mod fit;
 pub mod material;
 pub mod report;
 pub mod run;
+pub mod study;
 
 use crate::error::Result;
 

@@ -1,0 +1,338 @@
+//! `stylet study`: runs a scene over mesh size, mass scaling, step, engine and effects, and writes one page on what accuracy
+//! costs.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::report::moment;
+use crate::error::{Error, Result};
+use crate::output::folder::safe_name;
+use crate::output::progress::time_left;
+use crate::output::whole_file;
+use crate::solver::simulation::EngineChoice;
+use crate::study::analysis::Analysis;
+use crate::study::plan::{Costs, LeftOut, Plan, PlannedRun, Role, shard};
+use crate::study::store::{FIGURES, PAGE, RunRecord, Store, TABLE};
+use crate::study::subject::Subject;
+use crate::study::{Axis, Engine, page, runner, tables};
+
+/// What the command line says.
+#[derive(Debug, Clone, Default)]
+pub struct StudyOptions {
+    pub scene: PathBuf,
+    /// `key=value` texts.
+    pub overrides: Vec<String>,
+    pub engine: EngineChoice,
+    /// Names of axes, separated by commas; `None`: all.
+    pub axes: Option<String>,
+    /// Time that the study may take [min].
+    pub budget: f64,
+    /// Folder of runs and page; `None`: `out/study_<scene>`.
+    pub out: Option<PathBuf>,
+    /// `K/N`: only this part of the runs, without a page.
+    pub shard: Option<String>,
+    /// Compute everything again.
+    pub force: bool,
+}
+
+/// How a study ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum StudyOutcome {
+    /// The page, what to choose, and what the page lacks.
+    Page { path: PathBuf, sentences: Vec<String>, missing: usize },
+    /// A part is finished; its folder.
+    Part { folder: PathBuf, runs: usize, of: usize },
+    /// Stopped by the user; finished runs stay.
+    Interrupted { done: usize, of: usize },
+}
+
+/// Runs what is missing and writes the page, the table and the figures into the folder.
+///
+/// # Errors
+/// Wrong options, scenes and folders come before anything is run.
+pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOutcome> {
+    let axes = options.axes.as_deref().map_or(Ok(Axis::ALL.to_vec()), Axis::list)?;
+    if !(options.budget > 0.0 && options.budget.is_finite()) {
+        return Err(Error::input(
+            format!("a budget of {} minutes is none", options.budget),
+            "give the minutes that the study may take, e.g. --budget 20",
+        ));
+    }
+    let part = options.shard.as_deref().map(parse_shard).transpose()?;
+    let subject = Subject::load(&options.scene, &options.overrides, options.engine)?;
+    let name = safe_name(&subject.scene.name);
+    let out = options.out.clone().unwrap_or_else(|| match part {
+        None => PathBuf::from(format!("out/study_{name}")),
+        Some((part, of)) => PathBuf::from(format!("out/study_{name}_part_{part}_of_{of}")),
+    });
+    let store = Store::open(&out, &subject.scene.name, options.force)?;
+    let plan = plan(&store, &subject, &axes, options, part.is_some())?;
+    let mine: Vec<&PlannedRun> = match part {
+        None => plan.runs.iter().collect(),
+        Some((part, of)) => shard(&plan.runs, part, of),
+    };
+    eprintln!(
+        "{}: {} of {} runs, about {} on {}",
+        plan.scene,
+        mine.len(),
+        plan.runs.len(),
+        time_left(mine.iter().map(|run| run.predicted_s).sum()),
+        subject.adapter.as_deref().unwrap_or("the processor")
+    );
+    // A part does as it is told: the budget is kept by the plan of the whole.
+    let budget = if part.is_some() { f64::INFINITY } else { plan.budget_s };
+    let label = part.map(|(part, of)| format!("{part}/{of}"));
+    let left_out = match run_all(&store, &subject, &mine, budget, label.as_deref(), interrupted)? {
+        Done::All(left_out) => left_out,
+        Done::Interrupted { done } => return Ok(StudyOutcome::Interrupted { done, of: mine.len() }),
+    };
+    match part {
+        Some(_) => Ok(StudyOutcome::Part { folder: out, runs: mine.len(), of: plan.runs.len() }),
+        None => write(&store, &plan, &left_out, &command(options)),
+    }
+}
+
+/// Joins the parts of a study in one folder and writes the page.
+///
+/// # Errors
+/// `Error::Input` where a folder holds no study, the studies are not parts of one, or none holds a finished run.
+pub fn merge(folders: &[PathBuf], out: Option<&PathBuf>, force: bool) -> Result<StudyOutcome> {
+    let Some(out) = out else {
+        return Err(Error::input("--merge needs a folder for the whole", "name it with --out DIR"));
+    };
+    let parts = folders.iter().map(|folder| Store::existing(folder)).collect::<Result<Vec<_>>>()?;
+    let Some((first, plan)) = parts.first() else {
+        return Err(Error::input("--merge names no folder", "give the folders of the parts"));
+    };
+    for (store, other) in &parts[1..] {
+        let (a, b) = (first.path().display(), store.path().display());
+        let apart = |what: &str| format!("{a} and {b} are no parts of one study: {what}");
+        let (message, way_out) = if other.scene_hash != plan.scene_hash || other.scene != plan.scene {
+            (apart("their scenes or overrides differ"), "run all parts with the same scene file and the same --set")
+        } else if other.version != plan.version {
+            (apart("they are of different versions of the program"), "run all parts with one version")
+        } else if other.axes != plan.axes || other.budget_s != plan.budget_s || other.base != plan.base {
+            (
+                apart("their axes, budgets or engines differ"),
+                "run all parts with the same --axes, --budget and --engine",
+            )
+        } else if other.runs != plan.runs {
+            (
+                apart("their plans differ"),
+                "make all parts with --shard, none without it, on machines with the same engines",
+            )
+        } else {
+            continue;
+        };
+        return Err(Error::input(message, way_out));
+    }
+    let mut runs: Vec<RunRecord> = Vec::new();
+    for planned in &plan.runs {
+        let of_plan = |run: &RunRecord| run.belongs_to(plan, &planned.settings);
+        runs.extend(parts.iter().find_map(|(store, _)| store.run(&planned.id).filter(of_plan)));
+    }
+    if runs.is_empty() {
+        return Err(Error::input(
+            "none of these folders holds a finished run",
+            "run the parts first: stylet study SCENE --shard K/N --out DIR",
+        ));
+    }
+    let plan = plan.clone();
+    let store = Store::open(out, &plan.scene, force)?;
+    store.write_plan(&plan)?;
+    for run in &runs {
+        store.write_run(run)?;
+    }
+    write(&store, &plan, &[], "stylet study --merge DIR... --out DIR")
+}
+
+/// `K/N` with 1 <= K <= N.
+fn parse_shard(text: &str) -> Result<(usize, usize)> {
+    let parsed = text.split_once('/').and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
+    match parsed {
+        Some((part, of)) if (1..=of).contains(&part) => Ok((part, of)),
+        _ => Err(Error::input(
+            format!("--shard {text} names no part"),
+            "write K/N with K from 1 to N, e.g. --shard 1/3, --shard 2/3 and --shard 3/3 for three parts",
+        )),
+    }
+}
+
+/// The plan that the folder holds, where it fits; else a new one, which is stored.
+fn plan(store: &Store, subject: &Subject, axes: &[Axis], options: &StudyOptions, part: bool) -> Result<Plan> {
+    let budget = 60.0 * options.budget;
+    let engines: Vec<Engine> = match subject.adapter {
+        Some(_) => vec![Engine::Gpu, Engine::Cpu],
+        None => vec![Engine::Cpu],
+    };
+    let old = store.plan()?;
+    let current = |plan: &Plan| plan.scene_hash == subject.scene_hash() && plan.version == env!("CARGO_PKG_VERSION");
+    let mut costs = None;
+    if let Some(old) = old {
+        if !current(&old) {
+            eprintln!(
+                "scene, overrides or version have changed since the study in {} was made",
+                store.path().display()
+            );
+        } else {
+            let fits = old.costs.measured != part && old.costs.engines.keys().eq(&engines);
+            if fits && old.axes == axes && old.budget_s == budget && old.base == subject.base {
+                return Ok(old);
+            }
+            costs = fits.then_some(old.costs);
+        }
+    }
+    let costs = match costs {
+        Some(costs) => costs,
+        None if part => {
+            let mut costs = Costs::assumed();
+            costs.engines.retain(|engine, _| engines.contains(engine));
+            costs
+        }
+        None => {
+            eprintln!("measuring what a step costs here");
+            runner::measure_costs(subject, &engines)?
+        }
+    };
+    let plan = Plan::new(subject, axes, budget, costs)?;
+    store.write_plan(&plan)?;
+    Ok(plan)
+}
+
+/// How a row of runs ended.
+enum Done {
+    /// What was given up for the budget: the name of the run and the reason.
+    All(Vec<LeftOut>),
+    Interrupted {
+        done: usize,
+    },
+}
+
+/// Runs one after the other what the folder does not hold yet.
+fn run_all(
+    store: &Store,
+    subject: &Subject,
+    runs: &[&PlannedRun],
+    budget: f64,
+    part: Option<&str>,
+    interrupted: &AtomicBool,
+) -> Result<Done> {
+    let usable = |planned: &PlannedRun| {
+        let adapter = if planned.settings.engine == Engine::Gpu { subject.adapter.clone() } else { None };
+        let is_ours = |run: &RunRecord| {
+            run.hash == subject.hash(&planned.settings) && run.adapter == adapter.clone().unwrap_or_default()
+        };
+        store.run(&planned.id).filter(is_ours)
+    };
+    let (mut spent, mut predicted, mut reused) = (0.0, 0.0, 0);
+    let mut left: f64 = runs.iter().map(|run| run.predicted_s).sum();
+    let mut todo: Vec<(usize, &PlannedRun)> = Vec::new();
+    for (number, planned) in runs.iter().enumerate() {
+        match usable(planned) {
+            Some(run) => {
+                spent += run.wall_s + run.setup_s;
+                predicted += planned.predicted_s;
+                left -= planned.predicted_s;
+                reused += 1;
+            }
+            None => todo.push((number, planned)),
+        }
+    }
+    if reused > 0 {
+        eprintln!("{reused} of {} runs are finished already", runs.len());
+    }
+    let mut left_out = Vec::new();
+    let bar = progress();
+    for (number, planned) in todo {
+        // How much slower than predicted this machine is.
+        let pace = if predicted > 0.0 { (spent / predicted).clamp(0.2, 10.0) } else { 1.0 };
+        let needed = matches!(planned.role, Role::Base | Role::Reference);
+        if !needed && spent + pace * planned.predicted_s > budget {
+            let reason = format!(
+                "the budget: {} of it were used, and it would take about {}",
+                time_left(spent),
+                time_left(pace * planned.predicted_s)
+            );
+            eprintln!("{} of {}, {}: left out for {reason}", number + 1, runs.len(), planned.id);
+            left -= planned.predicted_s;
+            left_out.push(LeftOut { what: planned.id.clone(), reason });
+            continue;
+        }
+        let place = format!("{} of {}", number + 1, runs.len());
+        if bar.is_hidden() {
+            eprintln!("{place}, {} left: {}", time_left(pace * left), describe(planned, subject));
+        }
+        let mut told = |part: f64| {
+            let now = pace * (left - part * planned.predicted_s);
+            bar.set_position((1000.0 * part) as u64);
+            bar.set_message(format!("{place}  {} left  {}", time_left(now), describe(planned, subject)));
+        };
+        told(0.0);
+        let Some(run) = runner::run(subject, planned, part, interrupted, &mut told)? else {
+            bar.finish_and_clear();
+            return Ok(Done::Interrupted { done: number - left_out.len() });
+        };
+        if let Some(why) = &run.failure {
+            bar.suspend(|| eprintln!("{place}, {}: {why}", planned.id));
+        }
+        store.write_run(&run)?;
+        spent += run.wall_s + run.setup_s;
+        predicted += planned.predicted_s;
+        left -= planned.predicted_s;
+    }
+    bar.finish_and_clear();
+    Ok(Done::All(left_out))
+}
+
+/// One line about a run.
+fn describe(planned: &PlannedRun, subject: &Subject) -> String {
+    let (with, without) = planned.settings.effects_beside(&subject.base);
+    let mut text = format!("{}: {}", planned.role.key(), planned.settings.describe());
+    if planned.role == Role::Effects {
+        for (word, keys) in [("with", with), ("without", without)] {
+            if !keys.is_empty() {
+                text += &format!(", {word} {}", keys.join(" and "));
+            }
+        }
+    }
+    text
+}
+
+/// The line on the terminal; indicatif hides it where standard error is none.
+fn progress() -> ProgressBar {
+    let bar = ProgressBar::new(1000);
+    let style = ProgressStyle::with_template("{bar:10} {percent:>3}% {wide_msg}")
+        .expect("the template is a constant that every study on a terminal draws");
+    bar.set_style(style.progress_chars("=> "));
+    bar
+}
+
+/// Page, table and figures of what is finished.
+fn write(store: &Store, plan: &Plan, left_out: &[LeftOut], command: &str) -> Result<StudyOutcome> {
+    let analysis = Analysis::read(store, plan, left_out)?;
+    tables::write_csv(&store.file(TABLE), &analysis)?;
+    tables::write_figures(&store.file(FIGURES), &analysis)?;
+    let path = store.file(PAGE);
+    // Of the last run, so that writing the page again changes nothing.
+    let last = analysis.rows.iter().map(|row| row.run.finished).max().unwrap_or(0);
+    whole_file::write(&path, page::page(&analysis, command, &moment(last))?.as_bytes())?;
+    Ok(StudyOutcome::Page { path, missing: analysis.missing.len(), sentences: analysis.sentences })
+}
+
+/// The command line that makes the same page, without the folder.
+fn command(options: &StudyOptions) -> String {
+    let mut text = format!("stylet study {}", options.scene.display());
+    if let Some(axes) = &options.axes {
+        text += &format!(" --axes {axes}");
+    }
+    text += &format!(" --budget {}", options.budget);
+    if options.engine != EngineChoice::Auto {
+        text += &format!(" --engine {}", options.engine.key());
+    }
+    for set in &options.overrides {
+        text += &format!(" --set {set}");
+    }
+    text
+}
