@@ -276,8 +276,10 @@ fn study(args: StudyArgs) -> Result<u8> {
             print(&path.display().to_string());
             Ok(0)
         }
-        StudyOutcome::Part { folder, runs, of } => {
-            eprintln!("{runs} of the {of} runs are here; join all parts with: stylet study --merge DIR... --out DIR");
+        StudyOutcome::Part { part, folder, runs, of } => {
+            eprintln!(
+                "part {part}: {runs} of the {of} runs are here; join all parts with: stylet study --merge DIR... --out DIR"
+            );
             print(&folder.display().to_string());
             Ok(0)
         }

@@ -99,8 +99,7 @@ pub fn advise(options: &AdviseOptions) -> Result<String> {
                 store.path().display()
             ));
         }
-        Analysis::read(store, plan, &[])
-            .map_err(|error| error.to_string().lines().next().unwrap_or_default().to_string())
+        Analysis::read(store, plan).map_err(|error| error.to_string().lines().next().unwrap_or_default().to_string())
     });
     let command = study_command(options);
     let proposal = match usable {

@@ -43,7 +43,7 @@ pub enum StudyOutcome {
     /// The page, what to choose, and what the page lacks.
     Page { path: PathBuf, sentences: Vec<String>, missing: usize },
     /// A part is finished; its folder.
-    Part { folder: PathBuf, runs: usize, of: usize },
+    Part { part: String, folder: PathBuf, runs: usize, of: usize },
     /// Stopped by the user; finished runs stay.
     Interrupted { done: usize, of: usize },
 }
@@ -68,7 +68,7 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
         Some((part, of)) => PathBuf::from(format!("out/study_{name}_part_{part}_of_{of}")),
     });
     let store = Store::open(&out, &subject.scene.name, options.force)?;
-    let plan = plan(&store, &subject, &axes, options, part.is_some())?;
+    let mut plan = plan(&store, &subject, &axes, options, part.is_some())?;
     let mine: Vec<&PlannedRun> = match part {
         None => plan.runs.iter().collect(),
         Some((part, of)) => shard(&plan.runs, part, of),
@@ -84,14 +84,21 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
     // A part does as it is told: the budget is kept by the plan of the whole.
     let budget = if part.is_some() { f64::INFINITY } else { plan.budget_s };
     let label = part.map(|(part, of)| format!("{part}/{of}"));
-    let left_out = match run_all(&store, &subject, &mine, budget, label.as_deref(), interrupted)? {
-        Done::All(left_out) => left_out,
+    let done = run_all(&store, &subject, &mine, &plan.given_up, budget, label.as_deref(), interrupted)?;
+    let given_up = match done {
+        Done::All(given_up) => given_up,
         Done::Interrupted { done } => return Ok(StudyOutcome::Interrupted { done, of: mine.len() }),
     };
-    match part {
-        Some(_) => Ok(StudyOutcome::Part { folder: out, runs: mine.len(), of: plan.runs.len() }),
-        None => write(&store, &plan, &left_out, &command(options)),
+    if let Some(part) = label {
+        let runs = mine.len();
+        return Ok(StudyOutcome::Part { part, folder: out, runs, of: plan.runs.len() });
     }
+    if !given_up.is_empty() {
+        plan.given_up.extend(given_up);
+        // So that the same call gives up the same.
+        store.write_plan(&plan)?;
+    }
+    write(&store, &plan, &command(options))
 }
 
 /// Joins the parts of a study in one folder and writes the page.
@@ -145,7 +152,7 @@ pub fn merge(folders: &[PathBuf], out: Option<&PathBuf>, force: bool) -> Result<
     for run in &runs {
         store.write_run(run)?;
     }
-    write(&store, &plan, &[], "stylet study --merge DIR... --out DIR")
+    write(&store, &plan, "stylet study --merge DIR... --out DIR")
 }
 
 /// `K/N` with 1 <= K <= N.
@@ -215,16 +222,16 @@ fn run_all(
     store: &Store,
     subject: &Subject,
     runs: &[&PlannedRun],
+    given_up: &[LeftOut],
     budget: f64,
     part: Option<&str>,
     interrupted: &AtomicBool,
 ) -> Result<Done> {
     let usable = |planned: &PlannedRun| {
-        let adapter = if planned.settings.engine == Engine::Gpu { subject.adapter.clone() } else { None };
-        let is_ours = |run: &RunRecord| {
-            run.hash == subject.hash(&planned.settings) && run.adapter == adapter.clone().unwrap_or_default()
+        let here = |run: &RunRecord| {
+            planned.settings.engine == Engine::Cpu || subject.adapter.as_deref() == Some(run.adapter.as_str())
         };
-        store.run(&planned.id).filter(is_ours)
+        store.run(&planned.id).filter(|run| run.hash == subject.hash(&planned.settings) && here(run))
     };
     let (mut spent, mut predicted, mut reused) = (0.0, 0.0, 0);
     let mut left: f64 = runs.iter().map(|run| run.predicted_s).sum();
@@ -237,13 +244,14 @@ fn run_all(
                 left -= planned.predicted_s;
                 reused += 1;
             }
+            None if given_up.iter().any(|l| l.what == planned.id) => left -= planned.predicted_s,
             None => todo.push((number, planned)),
         }
     }
     if reused > 0 {
         eprintln!("{reused} of {} runs are finished already", runs.len());
     }
-    let mut left_out = Vec::new();
+    let (mut finished, mut left_out) = (reused, Vec::new());
     let bar = progress();
     for (number, planned) in todo {
         // How much slower than predicted this machine is.
@@ -272,12 +280,13 @@ fn run_all(
         told(0.0);
         let Some(run) = runner::run(subject, planned, part, interrupted, &mut told)? else {
             bar.finish_and_clear();
-            return Ok(Done::Interrupted { done: number - left_out.len() });
+            return Ok(Done::Interrupted { done: finished });
         };
         if let Some(why) = &run.failure {
             bar.suspend(|| eprintln!("{place}, {}: {why}", planned.id));
         }
         store.write_run(&run)?;
+        finished += 1;
         spent += run.wall_s + run.setup_s;
         predicted += planned.predicted_s;
         left -= planned.predicted_s;
@@ -310,8 +319,8 @@ fn progress() -> ProgressBar {
 }
 
 /// Page, table and figures of what is finished.
-fn write(store: &Store, plan: &Plan, left_out: &[LeftOut], command: &str) -> Result<StudyOutcome> {
-    let analysis = Analysis::read(store, plan, left_out)?;
+fn write(store: &Store, plan: &Plan, command: &str) -> Result<StudyOutcome> {
+    let analysis = Analysis::read(store, plan)?;
     tables::write_csv(&store.file(TABLE), &analysis)?;
     tables::write_figures(&store.file(FIGURES), &analysis)?;
     let path = store.file(PAGE);

@@ -98,11 +98,11 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Reads the finished runs of a plan; `left_out` are planned runs that this study gave up, with the reason.
+    /// Reads the finished runs of a plan.
     ///
     /// # Errors
     /// `Error::Input` where base or reference are missing or failed: without them there is nothing to compare with.
-    pub fn read(store: &Store, plan: &Plan, left_out: &[LeftOut]) -> Result<Self> {
+    pub fn read(store: &Store, plan: &Plan) -> Result<Self> {
         let mut found: Vec<(Role, Settings, RunRecord)> = Vec::new();
         let mut missing = Vec::new();
         for planned in &plan.runs {
@@ -110,7 +110,7 @@ impl Analysis {
             match run {
                 Some(run) => found.push((planned.role, planned.settings.clone(), run)),
                 None => {
-                    let known = left_out.iter().find(|l| l.what == planned.id);
+                    let known = plan.given_up.iter().find(|l| l.what == planned.id);
                     let reason = known.map_or("not run yet".into(), |l| l.reason.clone());
                     missing.push(LeftOut { what: planned.id.clone(), reason });
                 }
@@ -188,19 +188,16 @@ impl Analysis {
         self.of(Role::Base).next()
     }
 
-    /// Adapter of the base, for people.
+    /// Adapter of the base.
     pub fn adapter(&self) -> String {
-        match self.base().map(|row| row.run.adapter.as_str()) {
-            Some("") | None => "the processor".into(),
-            Some(adapter) => adapter.into(),
-        }
+        self.base().map_or(String::new(), |row| row.run.adapter.clone())
     }
 
     /// All adapters, drivers and parts that runs come from, each once.
     pub fn origins(&self) -> Vec<String> {
         let mut origins: Vec<String> = Vec::new();
         for row in &self.rows {
-            let adapter = if row.run.adapter.is_empty() { "processor" } else { &row.run.adapter };
+            let adapter = &row.run.adapter;
             let driver = if row.run.driver.is_empty() { String::new() } else { format!(" ({})", row.run.driver) };
             let origin = format!("{adapter}{driver}");
             if !origins.contains(&origin) {

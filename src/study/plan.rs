@@ -27,7 +27,7 @@ const GRID: [(i32, f64); 8] = [(1, 4.0), (1, 16.0), (2, 4.0), (2, 16.0), (-1, 4.
 /// Predicted cost of a run with an effect more over the same without.
 const ADDED_EFFECT: f64 = 1.5;
 /// Preparation of a run beside its steps [s]: mesh, model, shaders.
-const SETUP_S: f64 = 0.4;
+const SETUP_S: f64 = 0.2;
 
 /// What a mesh costs before its engine is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -148,6 +148,9 @@ pub struct Plan {
     pub costs: Costs,
     pub runs: Vec<PlannedRun>,
     pub left_out: Vec<LeftOut>,
+    /// Planned runs that were given up because the machine was slower than predicted, by name.
+    #[serde(default)]
+    pub given_up: Vec<LeftOut>,
     /// Effects that are neither switched on nor off.
     pub skipped: Vec<LeftOut>,
     /// What is not as the scene has it, one sentence each.
@@ -218,6 +221,7 @@ impl Plan {
             costs,
             runs: choice.runs,
             left_out: choice.left_out,
+            given_up: Vec::new(),
             skipped: skipped
                 .iter()
                 .map(|(what, reason)| LeftOut { what: what.clone(), reason: reason.clone() })
@@ -327,6 +331,9 @@ pub fn choose(
             reason: "the mesh of this scene is a file; its edges cannot be chosen".into(),
         });
     }
+    // Minutes after the first run of the same, and never for want of time: without it no time means anything.
+    let again = Settings { repetition: 1, ..base.clone() };
+    wanted.push((Role::Again, again, 0));
     if has(Axis::Mass) {
         wanted.extend(MASS_FACTORS.map(|factor| (Role::Mass, with_mass(base.clone(), factor), 0)));
     }
@@ -335,7 +342,7 @@ pub fn choose(
             true => wanted.push((Role::Engine, Settings { engine: base.engine.other(), ..base.clone() }, 0)),
             false => choice.left_out.push(LeftOut {
                 what: format!("engine {}", base.engine.other().key()),
-                reason: "there is no adapter here".into(),
+                reason: "no adapter was found, or --engine cpu looks for none".into(),
             }),
         }
     }
@@ -343,8 +350,6 @@ pub fn choose(
         let safeties = STEP_FACTORS.map(|factor| round4((base.safety * factor).min(1.0)));
         wanted.extend(safeties.map(|safety| (Role::Step, Settings { safety, ..base.clone() }, 0)));
     }
-    // In the middle of the study, minutes after the first run of the same.
-    wanted.push((Role::Again, Settings { repetition: 1, ..base.clone() }, 0));
     if has(Axis::Effects) {
         let variants = basis.variants.iter().map(|v| Settings { effects: v.effects.clone(), ..base.clone() });
         wanted.extend(variants.map(|settings| (Role::Effects, settings, 0)));
@@ -356,7 +361,7 @@ pub fn choose(
         }));
     }
 
-    let mut left = PLANNED_SHARE * budget_s - base_run.predicted_s - reference.predicted_s;
+    let mut left = PLANNED_SHARE * budget_s - 2.0 * base_run.predicted_s - reference.predicted_s;
     choice.runs = vec![base_run, reference];
     for (role, settings, level) in wanted {
         if choice.runs.iter().any(|run| run.settings == settings) {
@@ -376,6 +381,7 @@ pub fn choose(
         match meshes.size(level) {
             Err(reason) => choice.left_out.push(LeftOut { what, reason }),
             Ok(size) => match planned(role, settings, size) {
+                Some(run) if role == Role::Again => choice.runs.push(run),
                 Some(run) if run.predicted_s <= left => {
                     left -= run.predicted_s;
                     choice.runs.push(run);

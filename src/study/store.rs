@@ -26,7 +26,7 @@ pub struct RunRecord {
     pub hash: String,
     pub scene_hash: String,
     pub version: String,
-    /// Empty on the engine `cpu`.
+    /// As the engine names it; threads on the engine `cpu`.
     pub adapter: String,
     pub driver: String,
     /// True for a software adapter and for the engine `cpu`: then processor time counts, not wall time.
@@ -127,8 +127,6 @@ impl Store {
                 Err(error) => return Err(error),
             }
         }
-        let runs = path.join(RUNS);
-        fs::create_dir_all(&runs).map_err(unusable)?;
         // Permission bits alone do not tell whether a file system can be written to.
         let probe = path.join(format!(".write_test_{}{}", std::process::id(), whole_file::UNFINISHED));
         fs::write(&probe, b"").and_then(|()| fs::remove_file(&probe)).map_err(unusable)?;
@@ -191,6 +189,8 @@ impl Store {
     }
 
     pub fn write_run(&self, run: &RunRecord) -> Result<()> {
+        let folder = self.path.join(RUNS);
+        fs::create_dir_all(&folder).map_err(|reason| Error::file(folder, reason))?;
         write_json(&self.run_file(&run.id), run)
     }
 
