@@ -147,7 +147,7 @@ fn plans_keep_their_budget_and_have_a_better_reference() {
         ids.dedup();
         assert_eq!(ids.len(), choice.runs.len(), "a name per run");
         // What does not fit is told.
-        assert!(choice.runs.len() > 20 || !choice.left_out.is_empty());
+        assert!(choice.runs.len() > 20 || !choice.spare.is_empty());
         assert_eq!(planned(&Axis::ALL, 60.0 * minutes).unwrap(), choice, "the same every time");
     }
     let roles: Vec<Role> = planned(&Axis::ALL, 1e6).unwrap().runs.iter().map(|run| run.role).collect();

@@ -18,6 +18,9 @@ use crate::study::store::{FIGURES, PAGE, RunRecord, Store, TABLE};
 use crate::study::subject::Subject;
 use crate::study::{Axis, Engine, page, runner, tables};
 
+/// Part of the budget that may be used before another spare run is begun and predicted to end.
+const SPARE_SHARE: f64 = 0.95;
+
 /// What the command line says.
 #[derive(Debug, Clone, Default)]
 pub struct StudyOptions {
@@ -84,8 +87,8 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
     // A part does as it is told: the budget is kept by the plan of the whole.
     let budget = if part.is_some() { f64::INFINITY } else { plan.budget_s };
     let label = part.map(|(part, of)| format!("{part}/{of}"));
-    let done = run_all(&store, &subject, &mine, &plan.given_up, budget, label.as_deref(), interrupted)?;
-    let given_up = match done {
+    let row = Row { store: &store, subject: &subject, plan: &plan, part: label.as_deref(), budget, interrupted };
+    let given_up = match row.run(&mine)? {
         Done::All(given_up) => given_up,
         Done::Interrupted { done } => return Ok(StudyOutcome::Interrupted { done, of: mine.len() }),
     };
@@ -98,7 +101,33 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
         // So that the same call gives up the same.
         store.write_plan(&plan)?;
     }
+    // A machine that is faster than predicted has time for more.
+    while let Some(place) = plan.spare.iter().position(|run| fits(&store, &plan, run)) {
+        let run = plan.spare.remove(place);
+        plan.runs.push(run.clone());
+        store.write_plan(&plan)?;
+        let row = Row { store: &store, subject: &subject, plan: &plan, part: None, budget, interrupted };
+        if let Done::Interrupted { .. } = row.run(&[&run])? {
+            let of = plan.runs.len();
+            return Ok(StudyOutcome::Interrupted { done: of - 1 - plan.given_up.len(), of });
+        }
+    }
     write(&store, &plan, &command(options))
+}
+
+/// Time that the finished runs of the plan took, and that they were predicted to take [s].
+fn pace(store: &Store, plan: &Plan) -> (f64, f64) {
+    let finished = plan.runs.iter().filter_map(|planned| {
+        let run = store.run(&planned.id).filter(|run| run.belongs_to(plan, &planned.settings))?;
+        Some((run.wall_s + run.setup_s, planned.predicted_s))
+    });
+    finished.fold((0.0, 0.0), |sum, run| (sum.0 + run.0, sum.1 + run.1))
+}
+
+/// True where a run more keeps the budget at the pace of the runs so far.
+fn fits(store: &Store, plan: &Plan, run: &PlannedRun) -> bool {
+    let (spent, predicted) = pace(store, plan);
+    predicted > 0.0 && spent + spent / predicted * run.predicted_s <= SPARE_SHARE * plan.budget_s
 }
 
 /// Joins the parts of a study in one folder and writes the page.
@@ -217,96 +246,92 @@ enum Done {
     },
 }
 
-/// Runs one after the other what the folder does not hold yet.
-fn run_all(
-    store: &Store,
-    subject: &Subject,
-    runs: &[&PlannedRun],
-    given_up: &[LeftOut],
+/// What all runs of a call share.
+struct Row<'a> {
+    store: &'a Store,
+    subject: &'a Subject,
+    plan: &'a Plan,
+    /// `K/N` of a part.
+    part: Option<&'a str>,
+    /// Wall time that all runs of the plan may take [s].
     budget: f64,
-    part: Option<&str>,
-    interrupted: &AtomicBool,
-) -> Result<Done> {
-    let usable = |planned: &PlannedRun| {
-        let here = |run: &RunRecord| {
-            planned.settings.engine == Engine::Cpu || subject.adapter.as_deref() == Some(run.adapter.as_str())
-        };
-        store.run(&planned.id).filter(|run| run.hash == subject.hash(&planned.settings) && here(run))
-    };
-    let (mut spent, mut predicted, mut reused) = (0.0, 0.0, 0);
-    let mut left: f64 = runs.iter().map(|run| run.predicted_s).sum();
-    let mut todo: Vec<(usize, &PlannedRun)> = Vec::new();
-    for (number, planned) in runs.iter().enumerate() {
-        match usable(planned) {
-            Some(run) => {
-                spent += run.wall_s + run.setup_s;
-                predicted += planned.predicted_s;
-                left -= planned.predicted_s;
-                reused += 1;
-            }
-            None if given_up.iter().any(|l| l.what == planned.id) => left -= planned.predicted_s,
-            None => todo.push((number, planned)),
-        }
-    }
-    if reused > 0 {
-        eprintln!("{reused} of {} runs are finished already", runs.len());
-    }
-    let (mut finished, mut left_out) = (reused, Vec::new());
-    let bar = progress();
-    for (number, planned) in todo {
-        // How much slower than predicted this machine is.
-        let pace = if predicted > 0.0 { (spent / predicted).clamp(0.2, 10.0) } else { 1.0 };
-        let needed = matches!(planned.role, Role::Base | Role::Reference);
-        if !needed && spent + pace * planned.predicted_s > budget {
-            let reason = format!(
-                "the budget: {} of it were used, and it would take about {}",
-                time_left(spent),
-                time_left(pace * planned.predicted_s)
-            );
-            eprintln!("{} of {}, {}: left out for {reason}", number + 1, runs.len(), planned.id);
-            left -= planned.predicted_s;
-            left_out.push(LeftOut { what: planned.id.clone(), reason });
-            continue;
-        }
-        let place = format!("{} of {}", number + 1, runs.len());
-        if bar.is_hidden() {
-            eprintln!("{place}, {} left: {}", time_left(pace * left), describe(planned, subject));
-        }
-        let mut told = |part: f64| {
-            let now = pace * (left - part * planned.predicted_s);
-            bar.set_position((1000.0 * part) as u64);
-            bar.set_message(format!("{place}  {} left  {}", time_left(now), describe(planned, subject)));
-        };
-        told(0.0);
-        let Some(run) = runner::run(subject, planned, part, interrupted, &mut told)? else {
-            bar.finish_and_clear();
-            return Ok(Done::Interrupted { done: finished });
-        };
-        if let Some(why) = &run.failure {
-            bar.suspend(|| eprintln!("{place}, {}: {why}", planned.id));
-        }
-        store.write_run(&run)?;
-        finished += 1;
-        spent += run.wall_s + run.setup_s;
-        predicted += planned.predicted_s;
-        left -= planned.predicted_s;
-    }
-    bar.finish_and_clear();
-    Ok(Done::All(left_out))
+    interrupted: &'a AtomicBool,
 }
 
-/// One line about a run.
-fn describe(planned: &PlannedRun, subject: &Subject) -> String {
-    let (with, without) = planned.settings.effects_beside(&subject.base);
-    let mut text = format!("{}: {}", planned.role.key(), planned.settings.describe());
-    if planned.role == Role::Effects {
-        for (word, keys) in [("with", with), ("without", without)] {
-            if !keys.is_empty() {
-                text += &format!(", {word} {}", keys.join(" and "));
-            }
-        }
+impl Row<'_> {
+    /// The finished run, if the folder holds it: of the same scene, settings and version, on the same adapter.
+    fn finished(&self, planned: &PlannedRun) -> Option<RunRecord> {
+        let here = |run: &RunRecord| {
+            planned.settings.engine == Engine::Cpu || self.subject.adapter.as_deref() == Some(run.adapter.as_str())
+        };
+        let run = self.store.run(&planned.id)?;
+        (run.hash == self.subject.hash(&planned.settings) && here(&run)).then_some(run)
     }
-    text
+
+    /// Runs one after the other what the folder does not hold yet.
+    fn run(&self, runs: &[&PlannedRun]) -> Result<Done> {
+        let given_up = |run: &PlannedRun| self.plan.given_up.iter().any(|l| l.what == run.id);
+        let mut left: f64 = runs.iter().map(|run| run.predicted_s).sum();
+        let mut todo: Vec<&PlannedRun> = Vec::new();
+        let mut finished = 0;
+        for planned in runs {
+            if self.finished(planned).is_some() {
+                finished += 1;
+            } else if !given_up(planned) {
+                todo.push(planned);
+                continue;
+            }
+            left -= planned.predicted_s;
+        }
+        if finished > 0 {
+            eprintln!("{finished} of {} runs are finished already", runs.len());
+        }
+        let mut left_out = Vec::new();
+        let bar = progress();
+        for planned in todo {
+            let (spent, predicted) = pace(self.store, self.plan);
+            // How much slower than predicted this machine is.
+            let pace = if predicted > 0.0 { (spent / predicted).clamp(0.2, 10.0) } else { 1.0 };
+            let number = self.plan.runs.iter().position(|run| run.id == planned.id).unwrap_or(0) + 1;
+            let place = format!("{number} of {}", self.plan.runs.len());
+            let needed = matches!(planned.role, Role::Base | Role::Again | Role::Reference);
+            if !needed && spent + pace * planned.predicted_s > self.budget {
+                let reason = format!(
+                    "the budget: {} of it were used, and this would have taken about {}",
+                    time_left(spent),
+                    time_left(pace * planned.predicted_s)
+                );
+                eprintln!("{place}, {}: left out, {reason}", planned.id);
+                left -= planned.predicted_s;
+                left_out.push(LeftOut { what: planned.id.clone(), reason });
+                continue;
+            }
+            let what = self.plan.describe(planned);
+            if bar.is_hidden() {
+                eprintln!("{place}, {} left: {what}", time_left(pace * left));
+            }
+            let mut told = |part: f64| {
+                bar.set_position((1000.0 * part) as u64);
+                bar.set_message(format!(
+                    "{place}  {} left  {what}",
+                    time_left(pace * (left - part * planned.predicted_s))
+                ));
+            };
+            told(0.0);
+            let Some(run) = runner::run(self.subject, planned, self.part, self.interrupted, &mut told)? else {
+                bar.finish_and_clear();
+                return Ok(Done::Interrupted { done: finished });
+            };
+            if let Some(why) = &run.failure {
+                bar.suspend(|| eprintln!("{place}, {}: {why}", planned.id));
+            }
+            self.store.write_run(&run)?;
+            finished += 1;
+            left -= planned.predicted_s;
+        }
+        bar.finish_and_clear();
+        Ok(Done::All(left_out))
+    }
 }
 
 /// The line on the terminal; indicatif hides it where standard error is none.

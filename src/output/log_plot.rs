@@ -11,12 +11,16 @@ use super::plot::{PAGE_SIZE, PlotResult, in_page};
 
 /// Room beyond the outermost points, and the least span of an axis, as factors.
 const ROOM: f64 = 1.3;
-const LEAST_SPAN: f64 = 6.0;
+const LEAST_SPAN: f64 = 3.0;
 
 /// Leading digits of the ticks, from sparse to dense.
 const TICKS: [&[f64]; 4] = [&[1.0], &[1.0, 3.0], &[1.0, 2.0, 5.0], &[1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0]];
 /// Fewest labelled ticks of an axis.
 const LEAST_TICKS: usize = 3;
+
+/// Mean width of a letter beside a point, and height of its row [px].
+const LETTER: i32 = 7;
+const ROW: i32 = 15;
 
 /// Form of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -146,6 +150,7 @@ impl LogPlot {
                 Some((dash, gap)) => chart.draw_series(DashedLineSeries::new(points, fine(dash), fine(gap), style))?,
             };
         }
+        let mut written: Vec<(i32, i32, i32)> = Vec::new();
         for point in &self.points {
             let radius = fine(if point.strong { 6 } else { 4 });
             let edge = BLACK.stroke_width(fine(1));
@@ -165,6 +170,17 @@ impl LogPlot {
             if let Some(text) = &point.text {
                 let left = point.at.0 < (x_low * x_high).sqrt();
                 let (anchor, shift) = if left { (HPos::Left, 9) } else { (HPos::Right, -9) };
+                // Where it would stand on another text it stays away.
+                let (x, y) = chart.backend_coord(&point.at);
+                let width = LETTER * fine(text.chars().count() as u32) as i32;
+                let begin = if left { x } else { x - width };
+                if written
+                    .iter()
+                    .any(|(a, b, row)| begin < *b && begin + width > *a && (y - row).abs() < ROW * FINER as i32)
+                {
+                    continue;
+                }
+                written.push((begin, begin + width, y));
                 let style = ("sans-serif", fine(13)).into_font().color(&BLACK).pos(Pos::new(anchor, VPos::Bottom));
                 let shift = (shift * FINER as i32, -4 * FINER as i32);
                 chart.draw_series([EmptyElement::at(point.at) + Text::new(text.clone(), shift, style)])?;

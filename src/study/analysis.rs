@@ -112,7 +112,7 @@ impl Analysis {
                 None => {
                     let known = plan.given_up.iter().find(|l| l.what == planned.id);
                     let reason = known.map_or("not run yet".into(), |l| l.reason.clone());
-                    missing.push(LeftOut { what: planned.id.clone(), reason });
+                    missing.push(LeftOut { what: plan.describe(planned), reason });
                 }
             }
         }

@@ -72,9 +72,9 @@ impl Page<'_> {
         }
         text += &format!(
             "<p>One scene, run with different settings one after the other. Every error is a difference from the reference, \
-             the best run that {:.0} minutes allow; what the reference itself is off is not in it (see <a href=\"#mesh\">mesh \
+             the best run that {} minutes allow; what the reference itself is off is not in it (see <a href=\"#mesh\">mesh \
              size</a>).</p>\n",
-            plan.budget_s / 60.0
+            trimmed(plan.budget_s / 60.0)
         );
         if !a.missing.is_empty() {
             text += &format!(
@@ -108,7 +108,7 @@ impl Page<'_> {
         rows.push(("Stylet", plan.version.clone()));
         rows.push(("last run finished", written.into()));
         let wall: f64 = a.rows.iter().map(|row| row.run.wall_s + row.run.setup_s).sum();
-        rows.push(("time of all runs", format!("{:.1} of {:.0} minutes", wall / 60.0, plan.budget_s / 60.0)));
+        rows.push(("time of all runs", format!("{:.1} of {} minutes", wall / 60.0, trimmed(plan.budget_s / 60.0))));
         let rows: Vec<Vec<String>> =
             rows.into_iter().map(|(what, value)| vec![what.to_string(), escape(&value)]).collect();
         text + &table("", "", &[words("what"), words("value")], &rows)
@@ -489,10 +489,10 @@ impl Page<'_> {
             })
             .collect();
         items.push(format!(
-            "Mesh sizes and reference were chosen by {} costs ({}) for {:.0} minutes.",
+            "Mesh sizes and reference were chosen by {} costs ({}) for {} minutes.",
             if plan.costs.measured { "measured" } else { "assumed" },
             costs.join(", "),
-            plan.budget_s / 60.0
+            trimmed(plan.budget_s / 60.0)
         ));
         let predicted: f64 =
             a.rows.iter().filter_map(|row| plan.runs.iter().find(|p| p.id == row.run.id)).map(|p| p.predicted_s).sum();
@@ -513,7 +513,12 @@ impl Page<'_> {
     }
 
     fn left_out(&self) -> String {
-        let all: Vec<LeftOut> = self.a.plan.left_out.iter().chain(&self.a.missing).cloned().collect();
+        let plan = &self.a.plan;
+        let spare = plan.spare.iter().map(|run| LeftOut {
+            what: plan.describe(run),
+            reason: format!("the budget: it would take about {:.0} s", run.predicted_s.max(1.0)),
+        });
+        let all: Vec<LeftOut> = plan.left_out.iter().chain(&self.a.missing).cloned().chain(spare).collect();
         if all.is_empty() {
             return "<p>Nothing.</p>\n".into();
         }

@@ -147,6 +147,9 @@ pub struct Plan {
     pub base: Settings,
     pub costs: Costs,
     pub runs: Vec<PlannedRun>,
+    /// Runs that did not fit into the budget, in the order in which they are run where the machine is faster than predicted.
+    #[serde(default)]
+    pub spare: Vec<PlannedRun>,
     pub left_out: Vec<LeftOut>,
     /// Planned runs that were given up because the machine was slower than predicted, by name.
     #[serde(default)]
@@ -173,6 +176,9 @@ pub struct Basis<'a> {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Choice {
     pub runs: Vec<PlannedRun>,
+    /// Wanted, but too much for the budget.
+    pub spare: Vec<PlannedRun>,
+    /// What cannot be run, and why.
     pub left_out: Vec<LeftOut>,
 }
 
@@ -220,6 +226,7 @@ impl Plan {
             base: subject.base.clone(),
             costs,
             runs: choice.runs,
+            spare: choice.spare,
             left_out: choice.left_out,
             given_up: Vec::new(),
             skipped: skipped
@@ -232,6 +239,20 @@ impl Plan {
 
     pub fn reference(&self) -> Option<&PlannedRun> {
         self.runs.iter().find(|run| run.role == Role::Reference)
+    }
+
+    /// One line about a run, with the effects that it has more or less than the base.
+    pub fn describe(&self, run: &PlannedRun) -> String {
+        let (with, without) = run.settings.effects_beside(&self.base);
+        let mut text = format!("{}: {}", run.role.key(), run.settings.describe());
+        for (word, keys) in [("with", with), ("without", without)] {
+            // Mass scaling comes and goes with its factor.
+            let keys: Vec<String> = keys.into_iter().filter(|key| key != "mass_scaling").collect();
+            if !keys.is_empty() {
+                text += &format!(", {word} {}", keys.join(" and "));
+            }
+        }
+        text
     }
 
     /// Wall time of all runs [s].
@@ -308,11 +329,11 @@ pub fn choose(
             format!("give more time, about --budget {:.1} or more, or more axes", (least / 60.0).max(0.1)),
         ));
     };
-    for level in finest..reference_level {
-        if let Err(reason) = meshes.size(level) {
-            let what = format!("cells of {} mm", trimmed(meshes.edge(level)));
-            choice.left_out.push(LeftOut { what, reason });
-        }
+    if let Err(reason) = meshes.size(reference_level - 1)
+        && reference_level > finest
+    {
+        let what = format!("cells of {} mm", trimmed(meshes.edge(reference_level - 1)));
+        choice.left_out.push(LeftOut { what, reason });
     }
 
     let mut wanted: Vec<(Role, Settings, i32)> = Vec::new();
@@ -367,29 +388,18 @@ pub fn choose(
         if choice.runs.iter().any(|run| run.settings == settings) {
             continue;
         }
-        let what = match role {
-            Role::Effects => {
-                let (with, without) = settings.effects_beside(base);
-                let list = |word: &str, keys: &[String]| match keys.is_empty() {
-                    true => String::new(),
-                    false => format!("{word} {}", keys.join(" and ")),
-                };
-                format!("the base {}{}", list("with", &with), list("without", &without))
-            }
-            _ => settings.describe(),
-        };
         match meshes.size(level) {
-            Err(reason) => choice.left_out.push(LeftOut { what, reason }),
+            Err(reason) => {
+                let what = format!("{}: {}", role.key(), settings.describe());
+                choice.left_out.push(LeftOut { what, reason });
+            }
             Ok(size) => match planned(role, settings, size) {
                 Some(run) if role == Role::Again => choice.runs.push(run),
                 Some(run) if run.predicted_s <= left => {
                     left -= run.predicted_s;
                     choice.runs.push(run);
                 }
-                Some(run) => choice.left_out.push(LeftOut {
-                    what,
-                    reason: format!("the budget: it would take about {:.0} s", run.predicted_s),
-                }),
+                Some(run) => choice.spare.push(run),
                 None => {}
             },
         }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::analysis::{Analysis, EffectCost, Order, Row, Scatter};
 use super::metrics::Errors;
-use super::plan::LeftOut;
+use super::plan::{LeftOut, PlannedRun};
 use super::store::write_json;
 use super::{Axis, Settings};
 use crate::error::{Error, Result};
@@ -114,6 +114,7 @@ struct Figures<'a> {
     effects: &'a [EffectCost],
     skipped_effects: &'a [LeftOut],
     left_out: &'a [LeftOut],
+    left_out_for_the_budget: &'a [PlannedRun],
     missing: &'a [LeftOut],
 }
 
@@ -186,6 +187,7 @@ pub fn write_figures(path: &Path, analysis: &Analysis) -> Result<()> {
         effects: &analysis.effects,
         skipped_effects: &plan.skipped,
         left_out: &plan.left_out,
+        left_out_for_the_budget: &plan.spare,
         missing: &analysis.missing,
     };
     write_json(path, &figures)
