@@ -2,7 +2,7 @@
 //!
 //! Reading order, which is also the straight line that data takes:
 //! [`scene`] -> [`mesh`] -> [`effects`] -> [`separation`] and [`model`] -> [`solver`] (engines [`solver::cpu`] and
-//! [`gpu`]) -> [`observables`] -> [`output`] and [`render`].
+//! [`gpu`]) -> [`observables`] -> [`output`] and [`render`]. [`study`] runs that line many times.
 
 pub mod commands;
 pub mod effects;

@@ -154,7 +154,8 @@ fn plans_keep_their_budget_and_have_a_better_reference() {
     for role in [Role::Mesh, Role::Mass, Role::Step, Role::Engine, Role::Effects, Role::Grid, Role::Again] {
         assert!(roles.contains(&role), "{role:?}");
     }
-    // One axis: the reference is finer along it and along no other.
+    // Axes without the mesh keep it.
+    assert!(planned(&[Axis::Effects], 600.0).unwrap().runs.iter().all(|run| run.settings.cell_size_mm == 0.6));
     let mass = planned(&[Axis::Mass], 600.0).unwrap();
     assert!(mass.runs.iter().all(|run| run.settings.cell_size_mm == 0.6));
     let message = planned(&Axis::ALL, 10.0).unwrap_err().to_string();
@@ -200,13 +201,14 @@ fn sentences_say_what_there_is() {
         settings: Settings { cell_size_mm, ..base() },
         real_time_factor,
         error,
+        same_mesh: cell_size_mm == 0.3,
     };
     let all =
         [candidate(1.2, 6.0, 0.08), candidate(0.85, 1.4, 0.031), candidate(0.6, 0.5, 0.02), candidate(0.3, 0.1, 0.008)];
     let told = sentences("an adapter", &all);
     assert!(told[0].starts_with("For real time on an adapter choose cells of 0.85 mm"), "{told:?}");
     assert!(told[0].contains("3.10 %") && told[1].starts_with("For 1.00 % error choose cells of 0.3 mm"), "{told:?}");
-    assert!(told[1].contains("10.0 times slower than real time"), "{told:?}");
+    assert!(told[1].contains("10.0 times slower than real time (on the mesh of the reference"), "{told:?}");
     let told = sentences("an adapter", &all[2..3]);
     assert!(
         told[0].starts_with("No setting of this study is real time") && told[0].contains("2.00 times slower"),
@@ -505,6 +507,7 @@ fn wrong_calls_end_with_2_and_a_way_out() {
         (&["study", "tiny.toml", "--shard", "3/2", "--out", "out"], "--shard 3/2 names no part"),
         (&["study", "tiny.toml", "--shard", "0/2", "--out", "out"], "--shard 0/2 names no part"),
         (&["study", "tiny.toml", "--shard", "two", "--out", "out"], "--shard two names no part"),
+        (&["study", "tiny.toml", "--shard", "1/99999999999", "--out", "out"], "names no part"),
         (&["study", "tiny.toml", "--budget", "0", "--out", "out"], "a budget of 0 minutes"),
         (&["study", "tiny.toml", "--engine", "cpu", "--out", "full"], "full is not empty and holds no study"),
         (&["study", "nowhere.toml", "--out", "out"], "nowhere.toml"),

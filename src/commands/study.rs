@@ -21,6 +21,9 @@ use crate::study::{Axis, Engine, page, runner, tables};
 /// Part of the budget that may be used before another spare run is begun and predicted to end.
 const SPARE_SHARE: f64 = 0.95;
 
+/// A study has fewer runs.
+const MOST_PARTS: usize = 1000;
+
 /// What the command line says.
 #[derive(Debug, Clone, Default)]
 pub struct StudyOptions {
@@ -188,10 +191,10 @@ pub fn merge(folders: &[PathBuf], out: Option<&PathBuf>, force: bool) -> Result<
 fn parse_shard(text: &str) -> Result<(usize, usize)> {
     let parsed = text.split_once('/').and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
     match parsed {
-        Some((part, of)) if (1..=of).contains(&part) => Ok((part, of)),
+        Some((part, of)) if (1..=of).contains(&part) && of <= MOST_PARTS => Ok((part, of)),
         _ => Err(Error::input(
             format!("--shard {text} names no part"),
-            "write K/N with K from 1 to N, e.g. --shard 1/3, --shard 2/3 and --shard 3/3 for three parts",
+            "write K/N with K from 1 to N and N up to 1000, e.g. --shard 1/3, --shard 2/3 and --shard 3/3 for three parts",
         )),
     }
 }

@@ -13,6 +13,8 @@ pub struct Candidate {
     pub real_time_factor: f64,
     /// Relative L2 norm over depth of the error of the force.
     pub error: f64,
+    /// True on the mesh of the reference: then its error holds no part of the mesh.
+    pub same_mesh: bool,
 }
 
 /// The most accurate candidate that keeps real time.
@@ -40,10 +42,11 @@ pub fn sentences(adapter: &str, candidates: &[Candidate]) -> Vec<String> {
     let mut sentences = Vec::new();
     match (best_in_real_time(&usable), fastest) {
         (Some(choice), _) => sentences.push(format!(
-            "For real time on {adapter} choose {}: error of the force curve {}, {} times real time.",
+            "For real time on {adapter} choose {}: error of the force curve {}, {} times real time{}.",
             choice.settings.describe(),
             percent(choice.error),
-            digits(choice.real_time_factor)
+            digits(choice.real_time_factor),
+            remark(choice)
         )),
         (None, Some(fastest)) => sentences.push(format!(
             "No setting of this study is real time on {adapter}; the fastest, {}, is {} times slower than real time, with an \
@@ -56,20 +59,30 @@ pub fn sentences(adapter: &str, candidates: &[Candidate]) -> Vec<String> {
     }
     match (fastest_within(&usable, ACCURATE), best) {
         (Some(choice), _) => sentences.push(format!(
-            "For {accuracy} error choose {}: error {}, {}.",
+            "For {accuracy} error choose {}: error {}, {}{}.",
             choice.settings.describe(),
             percent(choice.error),
-            speed(choice.real_time_factor)
+            speed(choice.real_time_factor),
+            remark(choice)
         )),
         (None, Some(best)) => sentences.push(format!(
-            "No setting of this study comes within {accuracy} of the reference; the closest, {}, has an error of {} and is {}.",
+            "No setting of this study comes within {accuracy} of the reference; the closest, {}, has an error of {} and is {}{}.",
             best.settings.describe(),
             percent(best.error),
-            speed(best.real_time_factor)
+            speed(best.real_time_factor),
+            remark(best)
         )),
         (None, None) => {}
     }
     sentences
+}
+
+/// What the error of a candidate does not hold.
+fn remark(candidate: &Candidate) -> &'static str {
+    match candidate.same_mesh {
+        true => " (on the mesh of the reference, so without the error of that mesh itself)",
+        false => "",
+    }
 }
 
 /// A real-time factor in words.

@@ -210,12 +210,14 @@ impl Analysis {
     /// Settings to choose from.
     pub fn candidates(&self) -> Vec<Candidate> {
         let choices = self.rows.iter().filter(|row| row.is_choice());
+        let finest = self.reference().map(|row| row.settings.cell_size_mm);
         choices
             .filter_map(|row| {
                 Some(Candidate {
                     settings: row.settings.clone(),
                     real_time_factor: row.run.real_time_factor(),
                     error: row.errors.force_curve?,
+                    same_mesh: Some(row.settings.cell_size_mm) == finest,
                 })
             })
             .collect()

@@ -18,7 +18,7 @@ const FINER_LEVELS: i32 = 6;
 const COARSER_LEVELS: i32 = 2;
 /// Factors on the mass scaling of the base.
 const MASS_FACTORS: [f64; 4] = [4.0, 0.25, 16.0, 0.0625];
-/// Those that a reference may have where mass scaling is an axis, best first.
+/// Those that a reference may have, best first; it keeps that of the base where only the mesh is varied.
 const REFERENCE_MASS_FACTORS: [f64; 2] = [0.0625, 0.25];
 /// Factors on the safety of the base; 1 is the most that a scene may have.
 const STEP_FACTORS: [f64; 2] = [0.5, 1.25];
@@ -305,7 +305,9 @@ pub fn choose(
     'levels: for level in finest..=0 {
         let Ok(size) = meshes.size(level) else { continue };
         for engine in [Engine::Cpu, Engine::Gpu] {
-            let factors: &[f64] = if has(Axis::Mass) { &REFERENCE_MASS_FACTORS } else { &[1.0] };
+            // Something has to be better than in the base.
+            let lower = has(Axis::Mass) || !has(Axis::Mesh);
+            let factors: &[f64] = if lower { &REFERENCE_MASS_FACTORS } else { &[1.0] };
             for factor in factors {
                 let settings = Settings { cell_size_mm: meshes.edge(level), engine, ..base.clone() };
                 let run = planned(Role::Reference, with_mass(settings, *factor), size);
