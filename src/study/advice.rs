@@ -1,6 +1,6 @@
 //! What a study means for somebody who wants a frame rate or an accuracy.
 
-use super::{Settings, digits};
+use super::{Settings, digits, trimmed};
 
 /// Error of the force curve that counts as accurate.
 pub const ACCURATE: f64 = 0.01;
@@ -32,7 +32,7 @@ pub fn fastest_within(candidates: &[Candidate], error: f64) -> Option<&Candidate
 /// What to choose on an adapter, for real time and for 1 % error.
 pub fn sentences(adapter: &str, candidates: &[Candidate]) -> Vec<String> {
     let percent = |error: f64| format!("{} %", digits(100.0 * error));
-    let accuracy = percent(ACCURATE);
+    let accuracy = format!("{} %", trimmed(100.0 * ACCURATE));
     let usable: Vec<Candidate> = candidates.iter().filter(|c| c.error.is_finite()).cloned().collect();
     if usable.is_empty() {
         return vec![format!("No finished run of this study on {adapter} can be compared with the reference.")];

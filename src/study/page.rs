@@ -154,7 +154,7 @@ impl Page<'_> {
     fn legend(&self) -> String {
         let present = ROLES.iter().filter(|(role, ..)| self.choices().any(|row| row.role == *role));
         let mut entries: Vec<String> = present.map(|(_, colour, name)| legend_dot(*colour, name)).collect();
-        entries.push(legend_line(GREY, 2.0, None, "Pareto front (large points): nothing is both cheaper and closer"));
+        entries.push(legend_line(GREY, 2.0, None, "Pareto front"));
         legend_row(&entries)
     }
 
@@ -187,7 +187,7 @@ impl Page<'_> {
         for ((chart, _), caption) in panels.iter().zip(captions) {
             text += &figure(chart, caption);
         }
-        text += "</div>\n<p class=\"soft\">Circles: gpu f32. Squares: cpu f64. A run on the mesh of the \
+        text += "</div>\n<p class=\"soft\">Large points are on the Pareto front: no other run is both cheaper and closer. Circles: gpu f32. Squares: cpu f64. A run on the mesh of the \
                  reference has no error of the mesh in its own. The repetition of the base and runs with effects \
                  switched on or off are not in these charts.</p>\n";
         Ok(text)
@@ -363,7 +363,7 @@ impl Page<'_> {
             let Some(row) = row else { continue };
             match shown.iter_mut().find(|(other, ..)| other.run.id == row.run.id) {
                 Some((_, known, ..)) => *known = format!("{name} and {known}"),
-                None => shown.push((row, format!("{name}: {}", row.settings.describe()), colour, width, dash)),
+                None => shown.push((row, format!("{name}: {}", short(&row.settings)), colour, width, dash)),
             }
         }
         let mut plot =
@@ -375,7 +375,13 @@ impl Page<'_> {
             legend.push(legend_line(colour, f64::from(width), dash, &name));
         }
         let chart = drawn(plot.inline("Axial force against depth"))?;
-        Ok(figure(&chart, &format!("{}Axial force on the way in.", legend_row(&legend))))
+        Ok(figure(
+            &chart,
+            &format!(
+                "{}Axial force on the way in. Names: cell edge in mm, factor of mass scaling.",
+                legend_row(&legend)
+            ),
+        ))
     }
 
     fn effects(&self) -> Result<String> {
@@ -588,7 +594,8 @@ fn described(row: &Row) -> String {
 
 /// Cell edge and mass scaling, where a point has room for no more.
 fn short(settings: &Settings) -> String {
-    format!("{}, {}", trimmed(settings.cell_size_mm), trimmed(settings.mass_scaling))
+    let edge = (settings.cell_size_mm * 100.0).round() / 100.0;
+    format!("{}, {}", trimmed(edge), trimmed(settings.mass_scaling))
 }
 
 fn shape(settings: &Settings) -> Shape {
