@@ -177,6 +177,9 @@ struct StudyArgs {
     /// Folder of the runs and of the page [default: out/study_<scene>]
     #[arg(long)]
     out: Option<PathBuf>,
+    /// Finest cell edge that may be planned [mm]
+    #[arg(long, value_name = "MM")]
+    finest: Option<f64>,
     /// Run only part K of N, for another machine or job; join the parts with --merge
     #[arg(long, value_name = "K/N")]
     shard: Option<String>,
@@ -257,6 +260,7 @@ fn study(args: StudyArgs) -> Result<u8> {
             engine: args.scene.engine,
             axes: args.axes,
             budget: args.budget,
+            finest: args.finest,
             out: args.out,
             shard: args.shard,
             force: args.force,

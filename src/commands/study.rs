@@ -37,6 +37,8 @@ pub struct StudyOptions {
     pub budget: f64,
     /// Folder of runs and page; `None`: `out/study_<scene>`.
     pub out: Option<PathBuf>,
+    /// Finest cell edge that may be planned [mm].
+    pub finest: Option<f64>,
     /// `K/N`: only this part of the runs, without a page.
     pub shard: Option<String>,
     /// Compute everything again.
@@ -66,6 +68,12 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
             "give the minutes that the study may take, e.g. --budget 20",
         ));
     }
+    if let Some(finest) = options.finest.filter(|finest| !(*finest > 0.0 && finest.is_finite())) {
+        return Err(Error::input(
+            format!("a finest edge of {finest} mm is none"),
+            "give the edge of the finest cells in mm, e.g. --finest 0.4",
+        ));
+    }
     let part = options.shard.as_deref().map(parse_shard).transpose()?;
     let subject = Subject::load(&options.scene, &options.overrides, options.engine)?;
     let name = safe_name(&subject.scene.name);
@@ -75,6 +83,11 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
     });
     let store = Store::open(&out, &subject.scene.name, options.force)?;
     let mut plan = plan(&store, &subject, &axes, options, part.is_some())?;
+    if part.is_none()
+        && let Done::Interrupted { done } = settle_reference(&store, &subject, &mut plan, interrupted)?
+    {
+        return Ok(StudyOutcome::Interrupted { done, of: plan.runs.len() });
+    }
     let mine: Vec<&PlannedRun> = match part {
         None => plan.runs.iter().collect(),
         Some((part, of)) => shard(&plan.runs, part, of),
@@ -118,6 +131,26 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
     write(&store, &plan, &command(options))
 }
 
+/// Runs base and reference, and plans with a coarser one as long as the reference is not fit to be one: it may be the first
+/// to be computed on a mesh that fine.
+fn settle_reference(store: &Store, subject: &Subject, plan: &mut Plan, interrupted: &AtomicBool) -> Result<Done> {
+    loop {
+        let first: Vec<&PlannedRun> =
+            plan.runs.iter().filter(|run| matches!(run.role, Role::Base | Role::Reference)).collect();
+        let row = Row { store, subject, plan, part: None, budget: plan.budget_s, interrupted };
+        if let Done::Interrupted { done } = row.run(&first)? {
+            return Ok(Done::Interrupted { done });
+        }
+        let reference = plan.reference().and_then(|planned| store.run(&planned.id));
+        let Some((run, reason)) = reference.and_then(|run| run.unfit().map(|reason| (run, reason))) else {
+            return Ok(Done::All(Vec::new()));
+        };
+        eprintln!("{} is no reference: {reason}; a coarser one is taken", run.id);
+        *plan = plan.with_coarser_reference(subject, reason, run.wall_s + run.setup_s)?;
+        store.write_plan(plan)?;
+    }
+}
+
 /// Time that the finished runs of the plan took, and that they were predicted to take [s].
 fn pace(store: &Store, plan: &Plan) -> (f64, f64) {
     let finished = plan.runs.iter().filter_map(|planned| {
@@ -130,7 +163,7 @@ fn pace(store: &Store, plan: &Plan) -> (f64, f64) {
 /// True where a run more keeps the budget at the pace of the runs so far.
 fn fits(store: &Store, plan: &Plan, run: &PlannedRun) -> bool {
     let (spent, predicted) = pace(store, plan);
-    predicted > 0.0 && spent + spent / predicted * run.predicted_s <= SPARE_SHARE * plan.budget_s
+    predicted > 0.0 && plan.lost_s() + spent + spent / predicted * run.predicted_s <= SPARE_SHARE * plan.budget_s
 }
 
 /// Joins the parts of a study in one folder and writes the page.
@@ -201,7 +234,7 @@ fn parse_shard(text: &str) -> Result<(usize, usize)> {
 
 /// The plan that the folder holds, where it fits; else a new one, which is stored.
 fn plan(store: &Store, subject: &Subject, axes: &[Axis], options: &StudyOptions, part: bool) -> Result<Plan> {
-    let budget = 60.0 * options.budget;
+    let (budget, finest) = (60.0 * options.budget, options.finest.unwrap_or(0.0));
     let engines: Vec<Engine> = match subject.adapter {
         Some(_) => vec![Engine::Gpu, Engine::Cpu],
         None => vec![Engine::Cpu],
@@ -217,7 +250,8 @@ fn plan(store: &Store, subject: &Subject, axes: &[Axis], options: &StudyOptions,
             );
         } else {
             let fits = old.costs.measured != part && old.costs.engines.keys().eq(&engines);
-            if fits && old.axes == axes && old.budget_s == budget && old.base == subject.base {
+            let same = old.axes == axes && old.budget_s == budget && old.base == subject.base;
+            if fits && same && old.asked_finest_mm == finest {
                 return Ok(old);
             }
             costs = fits.then_some(old.costs);
@@ -235,7 +269,7 @@ fn plan(store: &Store, subject: &Subject, axes: &[Axis], options: &StudyOptions,
             runner::measure_costs(subject, &engines)?
         }
     };
-    let plan = Plan::new(subject, axes, budget, costs)?;
+    let plan = Plan::new(subject, axes, budget, costs, finest)?;
     store.write_plan(&plan)?;
     Ok(plan)
 }
@@ -298,10 +332,10 @@ impl Row<'_> {
             let number = self.plan.runs.iter().position(|run| run.id == planned.id).unwrap_or(0) + 1;
             let place = format!("{number} of {}", self.plan.runs.len());
             let needed = matches!(planned.role, Role::Base | Role::Again | Role::Reference);
-            if !needed && spent + pace * planned.predicted_s > self.budget {
+            if !needed && self.plan.lost_s() + spent + pace * planned.predicted_s > self.budget {
                 let reason = format!(
                     "the budget: {} of it were used, and this would have taken about {}",
-                    time_left(spent),
+                    time_left(self.plan.lost_s() + spent),
                     time_left(pace * planned.predicted_s)
                 );
                 eprintln!("{place}, {}: left out, {reason}", planned.id);
@@ -365,6 +399,9 @@ fn command(options: &StudyOptions) -> String {
         text += &format!(" --axes {axes}");
     }
     text += &format!(" --budget {}", options.budget);
+    if let Some(finest) = options.finest {
+        text += &format!(" --finest {finest}");
+    }
     if options.engine != EngineChoice::Auto {
         text += &format!(" --engine {}", options.engine.key());
     }

@@ -26,9 +26,10 @@ pub struct Row {
 }
 
 impl Row {
-    /// True where its settings are a choice: all effects of the scene, the run came to its end, and it is no reference.
+    /// True where its settings are a choice: all effects of the scene, the run kept its energy to the end, and it is no
+    /// reference.
     pub fn is_choice(&self) -> bool {
-        !matches!(self.role, Role::Reference | Role::Again | Role::Effects) && self.run.failure.is_none()
+        !matches!(self.role, Role::Reference | Role::Again | Role::Effects) && self.run.unfit().is_none()
     }
 }
 
@@ -233,7 +234,7 @@ impl RunRecord {
 
 fn orders(rows: &[Row], reference: &RunRecord) -> Vec<Order> {
     let mut meshes: Vec<&Row> =
-        rows.iter().filter(|row| matches!(row.role, Role::Base | Role::Mesh) && row.run.failure.is_none()).collect();
+        rows.iter().filter(|row| matches!(row.role, Role::Base | Role::Mesh) && row.run.unfit().is_none()).collect();
     meshes.sort_by(|a, b| a.settings.cell_size_mm.total_cmp(&b.settings.cell_size_mm));
     if meshes.len() < 2 {
         return Vec::new();

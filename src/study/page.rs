@@ -83,6 +83,20 @@ impl Page<'_> {
                 plan.runs.len()
             );
         }
+        for unfit in &plan.unfit {
+            text += &format!(
+                "<p class=\"notice\">No reference: {}. {}. The reference is the finest mesh below that is fit.</p>\n",
+                escape(&unfit.what),
+                escape(&unfit.reason)
+            );
+        }
+        if let Some(why) = a.reference().and_then(|row| row.run.unfit()) {
+            text += &format!(
+                "<p class=\"notice\">The reference is not fit to be one: {}. No error on this page can be trusted; make the \
+                 study again with <code>--finest</code> and a coarser mesh.</p>\n",
+                escape(&why)
+            );
+        }
         let clamped = a.reference().map_or(0, |row| row.run.clamped_nodes);
         if clamped > 0 {
             text += &format!(
@@ -187,9 +201,9 @@ impl Page<'_> {
         for ((chart, _), caption) in panels.iter().zip(captions) {
             text += &figure(chart, caption);
         }
-        text += "</div>\n<p class=\"soft\">Large points are on the Pareto front: no other run is both cheaper and closer. Circles: gpu f32. Squares: cpu f64. A run on the mesh of the \
-                 reference has no error of the mesh in its own. The repetition of the base and runs with effects \
-                 switched on or off are not in these charts.</p>\n";
+        text += "</div>\n<p class=\"soft\">Large points are on the Pareto front: no other run is both cheaper and closer. \
+                 Circles: gpu f32. Squares: cpu f64. A run on the mesh of the reference has no error of the mesh in its own. The \
+                 repetition of the base and runs with effects switched on or off are not in these charts.</p>\n";
         Ok(text)
     }
 
@@ -525,7 +539,12 @@ impl Page<'_> {
             what: plan.describe(run),
             reason: format!("the budget: it would take about {:.0} s", run.predicted_s.max(1.0)),
         });
-        let all: Vec<LeftOut> = plan.left_out.iter().chain(&self.a.missing).cloned().chain(spare).collect();
+        let unfit = self.a.rows.iter().filter(|row| row.role != Role::Reference).filter_map(|row| {
+            let reason = format!("run, but no choice: {}", row.run.unfit()?);
+            Some(LeftOut { what: format!("{}: {}", row.role.key(), row.settings.describe()), reason })
+        });
+        let all: Vec<LeftOut> =
+            unfit.chain(plan.left_out.iter().chain(&self.a.missing).cloned()).chain(spare).collect();
         if all.is_empty() {
             return "<p>Nothing.</p>\n".into();
         }
@@ -559,7 +578,7 @@ impl Page<'_> {
                     percent(e.displacement),
                     percent(r.energy_imbalance),
                     clamped(row),
-                    r.failure.as_deref().map_or("ok".into(), |why| escape(&super::subject::first_line(why))),
+                    r.unfit().map_or("ok".into(), |why| escape(&why)),
                 ]
             })
             .collect();

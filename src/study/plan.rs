@@ -132,6 +132,15 @@ pub struct LeftOut {
     pub reason: String,
 }
 
+/// A reference that was run and cannot be one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Unfit {
+    pub what: String,
+    pub reason: String,
+    /// Wall time that it took [s].
+    pub took_s: f64,
+}
+
 /// The runs of a study in their order, and everything that they share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
@@ -151,6 +160,14 @@ pub struct Plan {
     #[serde(default)]
     pub spare: Vec<PlannedRun>,
     pub left_out: Vec<LeftOut>,
+    /// Finest edge that may be planned [mm], as the user wants it and as references that were not fit leave it; 0: no limit.
+    #[serde(default)]
+    pub asked_finest_mm: f64,
+    #[serde(default)]
+    pub finest_mm: f64,
+    /// References that were run and were not fit.
+    #[serde(default)]
+    pub unfit: Vec<Unfit>,
     /// Planned runs that were given up because the machine was slower than predicted, by name.
     #[serde(default)]
     pub given_up: Vec<LeftOut>,
@@ -205,7 +222,34 @@ impl Plan {
     ///
     /// # Errors
     /// As [`choose`].
-    pub fn new(subject: &Subject, axes: &[Axis], budget_s: f64, costs: Costs) -> Result<Self> {
+    pub fn new(subject: &Subject, axes: &[Axis], budget_s: f64, costs: Costs, finest_mm: f64) -> Result<Self> {
+        Self::with_unfit(subject, axes, (budget_s, budget_s), costs, (finest_mm, finest_mm), Vec::new())
+    }
+
+    /// The plan without the meshes as fine as that of this plan's reference, which was not fit.
+    ///
+    /// # Errors
+    /// As [`choose`].
+    pub fn with_coarser_reference(&self, subject: &Subject, reason: String, took_s: f64) -> Result<Self> {
+        let Some(reference) = self.reference() else { return Ok(self.clone()) };
+        let mut unfit = self.unfit.clone();
+        unfit.push(Unfit { what: reference.settings.describe(), reason, took_s });
+        let left = self.budget_s - unfit.iter().map(|u| u.took_s).sum::<f64>();
+        // Any edge between this one and the next.
+        let finest = reference.settings.cell_size_mm * MESH_RATIO.sqrt();
+        let costs = self.costs.clone();
+        Self::with_unfit(subject, &self.axes, (self.budget_s, left), costs, (self.asked_finest_mm, finest), unfit)
+    }
+
+    /// `budget`: whole and left [s]; `finest`: as asked and as it is [mm].
+    fn with_unfit(
+        subject: &Subject,
+        axes: &[Axis],
+        budget: (f64, f64),
+        costs: Costs,
+        finest: (f64, f64),
+        unfit: Vec<Unfit>,
+    ) -> Result<Self> {
         let basis = Basis {
             base: &subject.base,
             duration_s: subject.duration(),
@@ -213,7 +257,11 @@ impl Plan {
             has_block: subject.has_block(),
             variants: &subject.variants,
         };
-        let choice = choose(&basis, axes, budget_s, &costs, &mut |edge| subject.mesh_size(edge))?;
+        let mut size_of = |edge: f64| match edge < finest.1 {
+            true => Err(format!("finer than {} mm is not planned", trimmed(round4(finest.1)))),
+            false => subject.mesh_size(edge),
+        };
+        let choice = choose(&basis, axes, budget.1, &costs, &mut size_of)?;
         let skipped = if axes.contains(&Axis::Effects) { &subject.skipped[..] } else { &[] };
         Ok(Plan {
             scene: subject.scene.name.clone(),
@@ -222,12 +270,15 @@ impl Plan {
             overrides: subject.overrides.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             axes: axes.to_vec(),
-            budget_s,
+            budget_s: budget.0,
             base: subject.base.clone(),
             costs,
             runs: choice.runs,
             spare: choice.spare,
             left_out: choice.left_out,
+            asked_finest_mm: finest.0,
+            finest_mm: finest.1,
+            unfit,
             given_up: Vec::new(),
             skipped: skipped
                 .iter()
@@ -239,6 +290,11 @@ impl Plan {
 
     pub fn reference(&self) -> Option<&PlannedRun> {
         self.runs.iter().find(|run| run.role == Role::Reference)
+    }
+
+    /// Wall time that went into references that were not fit [s].
+    pub fn lost_s(&self) -> f64 {
+        self.unfit.iter().map(|unfit| unfit.took_s).sum()
     }
 
     /// One line about a run, with the effects that it has more or less than the base.

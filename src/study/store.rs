@@ -17,6 +17,9 @@ pub const PAGE: &str = "study.html";
 pub const TABLE: &str = "study.csv";
 pub const FIGURES: &str = "study.json";
 
+/// Energy imbalance of a run that can be trusted.
+const LARGEST_IMBALANCE: f64 = 0.02;
+
 /// One finished run. `None` stands for "the run does not hold this number".
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RunRecord {
@@ -71,6 +74,20 @@ impl RunRecord {
     /// (depth [m], axial force [N]) on the way in.
     pub fn curve(&self) -> Vec<(f64, f64)> {
         self.depth_m.iter().copied().zip(self.force_n.iter().copied()).collect()
+    }
+
+    /// Why its numbers mean nothing, where they do not: it ended early or did not keep its energy.
+    pub fn unfit(&self) -> Option<String> {
+        if let Some(why) = &self.failure {
+            return Some(super::subject::first_line(why));
+        }
+        let imbalance = self.energy_imbalance.filter(|i| *i > LARGEST_IMBALANCE)?;
+        Some(format!(
+            "energy imbalance {} % of the work (at most {} %), {} clamped node steps",
+            super::digits(100.0 * imbalance),
+            super::trimmed(100.0 * LARGEST_IMBALANCE),
+            self.clamped_nodes
+        ))
     }
 
     /// Simulated time over wall time.
