@@ -9,7 +9,7 @@ use super::{Engine, Settings, trimmed};
 use crate::effects::EFFECTS;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::device::adapter_wanted_by_name;
+use crate::gpu::device::{adapter_wanted_by_name, describe};
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
 use crate::scene::{Phase, Scene, Tool};
@@ -75,7 +75,7 @@ impl Subject {
                 found => found.ok(),
             },
         };
-        let adapter = gpu.map(|gpu| gpu.info.name);
+        let adapter = gpu.map(|gpu| describe(&gpu.info));
         let engine = if adapter.is_some() { Engine::Gpu } else { Engine::Cpu };
         let base = Settings {
             cell_size_mm: round4(scene.tissue.cell_size * 1e3),
