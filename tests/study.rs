@@ -28,7 +28,7 @@ gauge = "16G"
 tip_half_angle_deg = 18.0
 [[motion.phase]]
 kind = "insert"
-speed_mm_s = 2.0
+speed_mm_s = 4.0
 depth_mm = 3.0
 [[motion.phase]]
 kind = "withdraw"
@@ -39,7 +39,7 @@ mass_scaling = 40000
 "#;
 
 /// Arguments of a study of seconds.
-const SHORT: [&str; 4] = ["--engine", "cpu", "--budget", "0.4"];
+const SHORT: [&str; 4] = ["--engine", "cpu", "--budget", "0.2"];
 
 fn base() -> Settings {
     Settings {
@@ -146,8 +146,6 @@ fn plans_keep_their_budget_and_have_a_better_reference() {
         ids.sort_unstable();
         ids.dedup();
         assert_eq!(ids.len(), choice.runs.len(), "a name per run");
-        // What does not fit is told.
-        assert!(choice.runs.len() > 20 || !choice.spare.is_empty());
         assert_eq!(planned(&Axis::ALL, 60.0 * minutes).unwrap(), choice, "the same every time");
     }
     let roles: Vec<Role> = planned(&Axis::ALL, 1e6).unwrap().runs.iter().map(|run| run.role).collect();
@@ -311,7 +309,7 @@ fn a_study_is_one_page_and_a_rerun_computes_nothing() {
     let place = Place::new();
     let output = place.study("out", &[]);
     assert_eq!(succeeded(&output), "out/study.html", "{}", errors(&output));
-    assert!(errors(&output).contains("For real time on "), "{}", errors(&output));
+    assert!(errors(&output).contains("real time"), "{}", errors(&output));
     let text = check_page(&place.path("out/study.html"));
     for said in ["Only the way in to 3 mm", "reference", "friction", "The base was run twice", "real-time factor"] {
         assert!(text.contains(said), "{said}");
@@ -370,7 +368,7 @@ fn a_study_is_one_page_and_a_rerun_computes_nothing() {
 fn a_killed_study_goes_on_from_its_finished_runs() {
     for (signal, code) in [("-KILL", None), ("-INT", Some(130))] {
         let place = Place::new();
-        let arguments = ["study", "tiny.toml", "--out", "out", "--engine", "cpu", "--budget", "0.6"];
+        let arguments = ["study", "tiny.toml", "--out", "out", "--engine", "cpu", "--budget", "0.3"];
         let mut child = place.command(&arguments).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
         let begin = std::time::Instant::now();
         while place.runs("out").len() < 2 {

@@ -83,6 +83,7 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
     });
     let store = Store::open(&out, &subject.scene.name, options.force)?;
     let mut plan = plan(&store, &subject, &axes, options, part.is_some())?;
+    tell_finished(&Row { store: &store, subject: &subject, plan: &plan, part: None, budget: 0.0, interrupted });
     if part.is_none()
         && let Done::Interrupted { done } = settle_reference(&store, &subject, &mut plan, interrupted)?
     {
@@ -129,6 +130,14 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
         }
     }
     write(&store, &plan, &command(options))
+}
+
+/// How many runs the folder holds.
+fn tell_finished(row: &Row) {
+    let finished = row.plan.runs.iter().filter(|run| row.finished(run).is_some()).count();
+    if finished > 0 {
+        eprintln!("{finished} of {} runs are finished already", row.plan.runs.len());
+    }
 }
 
 /// Runs base and reference, and plans with a coarser one as long as the reference is not fit to be one: it may be the first
@@ -319,9 +328,6 @@ impl Row<'_> {
                 continue;
             }
             left -= planned.predicted_s;
-        }
-        if finished > 0 {
-            eprintln!("{finished} of {} runs are finished already", runs.len());
         }
         let mut left_out = Vec::new();
         let bar = progress();

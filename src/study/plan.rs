@@ -52,7 +52,7 @@ impl UnitCost {
         let slope = if span > 0.0 { (large.1 - small.1) / span } else { least };
         // Noise may tilt the line beyond "all of it per step" and "all of it per cell".
         let cell_step_s = slope.clamp(0.25 * least, least);
-        UnitCost { step_s: large.1 - large.0 as f64 * cell_step_s, cell_step_s }
+        UnitCost { step_s: (large.1 - large.0 as f64 * cell_step_s).max(0.0), cell_step_s }
     }
 
     pub fn of_step(&self, cells: u64) -> f64 {
