@@ -2,7 +2,8 @@
 //!
 //! Reading order, which is also the straight line that data takes:
 //! [`scene`] -> [`mesh`] -> [`effects`] -> [`separation`] and [`model`] -> [`solver`] (engines [`solver::cpu`] and
-//! [`gpu`]) -> [`observables`] -> [`output`] and [`render`]. [`stability`] runs the hard cases.
+//! [`gpu`]) -> [`observables`] -> [`output`] and [`render`]. [`stability`] runs that line on the hard cases, [`study`] many
+//! times over.
 
 pub mod commands;
 pub mod effects;
@@ -22,5 +23,6 @@ pub mod scene;
 pub mod separation;
 pub mod solver;
 pub mod stability;
+pub mod study;
 
 pub use error::{Error, Result};

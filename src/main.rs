@@ -8,8 +8,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
+use stylet::commands::advise::AdviseOptions;
 use stylet::commands::fit::{FitOptions, Volumetric};
 use stylet::commands::report::{ReportOptions, ReportOutcome};
+use stylet::commands::study::{StudyOptions, StudyOutcome};
 use stylet::commands::{self, bench::BenchOptions, run::RunOptions};
 use stylet::error::{Error, Result};
 use stylet::output::checkpoint::RunCheckpoint;
@@ -46,6 +48,10 @@ enum Command {
     Report(ReportArgs),
     /// Run the hard cases of scenes/hard: which survive, which are caught, which are refused
     Stability(commands::stability::StabilityArgs),
+    /// Run a scene over mesh size, mass scaling, step, engine and effects: what accuracy costs, as one HTML page
+    Study(StudyArgs),
+    /// Propose settings with which a scene keeps real time on this machine
+    Advise(AdviseArgs),
     /// List the GPU adapters
     Adapters,
     /// Print the JSON schema of scene files
@@ -168,6 +174,48 @@ struct ReportArgs {
     force: bool,
 }
 
+#[derive(Args)]
+struct StudyArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// What is varied, separated by commas: mesh, mass, step, engine, effects [default: all]
+    #[arg(long, value_name = "LIST")]
+    axes: Option<String>,
+    /// Time that the study may take; it chooses mesh sizes and reference
+    #[arg(long, value_name = "MINUTES", default_value_t = 20.0)]
+    budget: f64,
+    /// Folder of the runs and of the page [default: out/study_<scene>]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Finest cell edge that may be planned [mm]
+    #[arg(long, value_name = "MM")]
+    finest: Option<f64>,
+    /// Run only part K of N, for another machine or job; join the parts with --merge
+    #[arg(long, value_name = "K/N")]
+    shard: Option<String>,
+    /// Join the parts in these folders and write the page into --out
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
+    merge: Vec<PathBuf>,
+    /// Compute everything again, and replace the study that the folder holds
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Args)]
+struct AdviseArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Ask for settings that keep real time
+    #[arg(long)]
+    real_time: bool,
+    /// Frames per second
+    #[arg(long, default_value_t = 60.0)]
+    rate: f64,
+    /// Folder of a study of the scene [default: out/study_<scene>, if it is there]
+    #[arg(long)]
+    study: Option<PathBuf>,
+}
+
 /// Prints to standard output; a closed pipe (`| head`) is no failure.
 fn print(text: &str) {
     let mut out = std::io::stdout().lock();
@@ -212,6 +260,61 @@ fn report(args: ReportArgs) -> Result<u8> {
             Ok(commands::run::EXIT_INTERRUPTED)
         }
     }
+}
+
+fn study(args: StudyArgs) -> Result<u8> {
+    let outcome = if args.merge.is_empty() {
+        let options = StudyOptions {
+            scene: args.scene.scene,
+            overrides: args.scene.overrides,
+            engine: args.scene.engine,
+            axes: args.axes,
+            budget: args.budget,
+            finest: args.finest,
+            out: args.out,
+            shard: args.shard,
+            force: args.force,
+        };
+        commands::study::study(&options, &until_interrupted())?
+    } else {
+        commands::study::merge(&args.merge, args.out.as_ref(), args.force)?
+    };
+    match outcome {
+        StudyOutcome::Page { path, sentences, missing } => {
+            for sentence in sentences {
+                eprintln!("{sentence}");
+            }
+            if missing > 0 {
+                eprintln!("note: {missing} planned runs are not there; the page lists them");
+            }
+            print(&path.display().to_string());
+            Ok(0)
+        }
+        StudyOutcome::Part { part, folder, runs, of } => {
+            eprintln!(
+                "part {part}: {runs} of the {of} runs are here; join all parts with: stylet study --merge DIR... --out DIR"
+            );
+            print(&folder.display().to_string());
+            Ok(0)
+        }
+        StudyOutcome::Interrupted { done, of } => {
+            eprintln!("interrupted: {done} of {of} runs are finished and stay; the same command goes on from there");
+            Ok(commands::run::EXIT_INTERRUPTED)
+        }
+    }
+}
+
+fn advise(args: AdviseArgs) -> Result<String> {
+    if !args.real_time {
+        return Err(Error::input("advise needs to know what for", "ask for real time with --real-time"));
+    }
+    commands::advise::advise(&AdviseOptions {
+        scene: args.scene.scene,
+        overrides: args.scene.overrides,
+        engine: args.scene.engine,
+        rate: args.rate,
+        study: args.study,
+    })
 }
 
 fn run(args: &RunArgs, start: Instant) -> Result<u8> {
@@ -314,6 +417,11 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
             let (text, code) = commands::stability::stability(&args, &until_interrupted())?;
             print(&text);
             Ok(code)
+        }
+        Some(Command::Study(args)) => study(args),
+        Some(Command::Advise(args)) => {
+            print(&advise(args)?);
+            Ok(0)
         }
         Some(Command::FirstStep { engine }) => {
             print(&commands::bench::first_step(engine, start)?);

@@ -1,5 +1,6 @@
 //! What the command line does, one file per command.
 
+pub mod advise;
 pub mod bench;
 pub mod bench_effects;
 pub mod check;
@@ -8,6 +9,7 @@ pub mod material;
 pub mod report;
 pub mod run;
 pub mod stability;
+pub mod study;
 
 use crate::error::Result;
 

@@ -268,12 +268,12 @@ fn command(options: &ReportOptions) -> String {
     text
 }
 
-fn now() -> u64 {
+pub(super) fn now() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs())
 }
 
 /// `2022-03-01 14:05 UTC` from seconds since 1970.
-fn moment(seconds: u64) -> String {
+pub(crate) fn moment(seconds: u64) -> String {
     let (days, rest) = (seconds / 86_400, seconds % 86_400);
     // Years that begin on 1 March end with the leap day; 719468 days lie between 0000-03-01 and 1970-01-01.
     let days = days + 719_468;

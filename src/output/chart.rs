@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use plotters::chart::MeshStyle;
-use plotters::coord::types::RangedCoordf64;
+use plotters::coord::ranged1d::Ranged;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -13,18 +13,18 @@ use crate::observables::{ForceParts, FrameRecord};
 use crate::{Error, Result};
 
 /// Size of the chart [px].
-pub(super) const SIZE: (u32, u32) = (900, 600);
+pub(crate) const SIZE: (u32, u32) = (900, 600);
 /// plotters rounds to whole units of the drawing: it draws this many times larger, and the viewer scales down.
-pub(super) const FINER: u32 = 8;
+pub(crate) const FINER: u32 = 8;
 /// Height of the strip above the chart that holds title and legend [px].
-pub(super) const HEAD: u32 = 84;
+pub(crate) const HEAD: u32 = 84;
 
 // Colours that people with colour-blindness tell apart (Okabe and Ito 2008), each with its own dash or width.
-pub(super) const INWARD: RGBColor = RGBColor(0, 114, 178);
-pub(super) const OUTWARD: RGBColor = RGBColor(213, 94, 0);
-pub(super) const PINK: RGBColor = RGBColor(204, 121, 167);
-pub(super) const GREEN: RGBColor = RGBColor(0, 158, 115);
-pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);
+pub(crate) const INWARD: RGBColor = RGBColor(0, 114, 178);
+pub(crate) const OUTWARD: RGBColor = RGBColor(213, 94, 0);
+pub(crate) const PINK: RGBColor = RGBColor(204, 121, 167);
+pub(crate) const GREEN: RGBColor = RGBColor(0, 158, 115);
+pub(crate) const ORANGE: RGBColor = RGBColor(230, 159, 0);
 
 /// Dash and gap of the parts of the force, in their order [px].
 const PART_DASHES: [Option<(u32, u32)>; 6] =
@@ -34,7 +34,7 @@ const PART_DASHES: [Option<(u32, u32)>; 6] =
 const LEAST_TRAVEL: f64 = 1e-6;
 
 /// One line of the chart and of its legend.
-pub(super) struct Curve {
+pub(crate) struct Curve {
     pub label: &'static str,
     pub colour: RGBColor,
     /// [1/FINER px]
@@ -168,7 +168,7 @@ fn curves(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRe
 }
 
 /// Title and, below it, the legend outside the chart, in two rows where one is too short.
-pub(super) fn draw_head<DB: DrawingBackend>(
+pub(crate) fn draw_head<DB: DrawingBackend>(
     head: &DrawingArea<DB, plotters::coord::Shift>,
     title: &str,
     curves: &[Curve],
@@ -207,7 +207,7 @@ pub(super) fn draw_head<DB: DrawingBackend>(
 }
 
 /// A title that fits above the chart.
-pub(super) fn shortened(title: &str) -> String {
+pub(crate) fn shortened(title: &str) -> String {
     let longest = (SIZE.0 as usize - 100) / 10;
     if title.chars().count() > longest {
         title.chars().take(longest - 3).chain("...".chars()).collect()
@@ -216,32 +216,32 @@ pub(super) fn shortened(title: &str) -> String {
     }
 }
 
-pub(super) fn rgb([red, green, blue]: [u8; 3]) -> RGBColor {
+pub(crate) fn rgb([red, green, blue]: [u8; 3]) -> RGBColor {
     RGBColor(red, green, blue)
 }
 
 /// Pixels to units of the drawing.
-pub(super) fn fine(pixels: u32) -> u32 {
+pub(crate) fn fine(pixels: u32) -> u32 {
     pixels * FINER
 }
 
-pub(super) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub(crate) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.filter(|v| v.is_finite()).fold(None, |range, v| match range {
         None => Some((v, v)),
         Some((low, high)) => Some((low.min(v), high.max(v))),
     })
 }
 
-pub(super) fn widened(low: f64, high: f64, fraction: f64) -> (f64, f64) {
+pub(crate) fn widened(low: f64, high: f64, fraction: f64) -> (f64, f64) {
     let span = if high > low { high - low } else { 1.0 };
     let below = if low < 0.0 { fraction * span } else { 0.0 };
     (low - below, low.max(high).max(low + span) + fraction * span)
 }
 
 /// Fonts, grid and axes of every chart of the program.
-pub(super) fn house_style<'m, 'a, 'b, DB: DrawingBackend>(
-    mesh: &'m mut MeshStyle<'a, 'b, RangedCoordf64, RangedCoordf64, DB>,
-) -> &'m mut MeshStyle<'a, 'b, RangedCoordf64, RangedCoordf64, DB> {
+pub(crate) fn house_style<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
+    mesh: &'m mut MeshStyle<'a, 'b, X, Y, DB>,
+) -> &'m mut MeshStyle<'a, 'b, X, Y, DB> {
     mesh.axis_desc_style(("sans-serif", fine(17)))
         .label_style(("sans-serif", fine(15)))
         .bold_line_style(BLACK.mix(0.14).stroke_width(fine(1)))
@@ -252,7 +252,7 @@ pub(super) fn house_style<'m, 'a, 'b, DB: DrawingBackend>(
 }
 
 /// A tick label with as many decimals as the span needs.
-pub(super) fn tick(value: f64, span: f64) -> String {
+pub(crate) fn tick(value: f64, span: f64) -> String {
     let decimals = (1.0 - span.log10()).ceil().clamp(0.0, 9.0) as usize;
     let text = format!("{value:.decimals$}");
     if text.trim_start_matches('-').bytes().all(|b| matches!(b, b'0' | b'.')) { "0".into() } else { text }

@@ -248,7 +248,7 @@ fn listing(path: &Path, files: &[PathBuf]) -> String {
 }
 
 /// A scene name as one folder name: letters, digits, `-`, `_` and inner dots stay, everything else becomes `_`.
-fn safe_name(scene_name: &str) -> String {
+pub(crate) fn safe_name(scene_name: &str) -> String {
     let name: String =
         scene_name.chars().map(|c| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '_' }).collect();
     match name.trim_matches('.') {

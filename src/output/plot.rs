@@ -6,13 +6,13 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::chart::{Curve, FINER, HEAD, SIZE, draw_head, fine, house_style, range, tick, widened};
 
-pub(super) type PlotResult = std::result::Result<String, Box<dyn std::error::Error>>;
+pub(crate) type PlotResult = std::result::Result<String, Box<dyn std::error::Error>>;
 
 /// Size of a chart inside a page, where several stand beside one another and a phone shows one [px].
-const PAGE_SIZE: (u32, u32) = (440, 320);
+pub(super) const PAGE_SIZE: (u32, u32) = (440, 320);
 
 /// A filled area; corners in units of the axes.
-pub(super) struct Area {
+pub(crate) struct Area {
     pub label: &'static str,
     pub colour: RGBColor,
     pub opacity: f64,
@@ -20,7 +20,7 @@ pub(super) struct Area {
 }
 
 /// A point; one with a text beside it is drawn larger.
-pub(super) struct Mark {
+pub(crate) struct Mark {
     pub at: (f64, f64),
     pub colour: RGBColor,
     pub text: Option<String>,
@@ -28,7 +28,7 @@ pub(super) struct Mark {
 
 /// What is drawn, from the back to the front.
 #[derive(Default)]
-pub(super) struct Plot {
+pub(crate) struct Plot {
     pub x_label: &'static str,
     pub y_label: &'static str,
     pub areas: Vec<Area>,
@@ -70,12 +70,7 @@ impl Plot {
             self.draw(&root, 7, 9)?;
             root.present()?;
         }
-        let body = text.find('>').map_or("", |end| &text[end + 1..]);
-        let body = body.replace("#000000", "currentColor");
-        Ok(format!(
-            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">{body}",
-            super::page::escape(description)
-        ))
+        Ok(in_page(&text, description))
     }
 
     /// Draws the axes with about as many ticks as asked for, and what lies between them.
@@ -143,19 +138,30 @@ impl Plot {
     }
 }
 
+/// A drawing of [`PAGE_SIZE`] as a part of a page: as wide as its place, black in the colour of the text around it.
+pub(super) fn in_page(drawing: &str, description: &str) -> String {
+    let (width, height) = (fine(PAGE_SIZE.0), fine(PAGE_SIZE.1));
+    let body = drawing.find('>').map_or("", |end| &drawing[end + 1..]);
+    let body = body.replace("#000000", "currentColor");
+    format!(
+        "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">{body}",
+        super::page::escape(description)
+    )
+}
+
 /// The entries of a legend beside one another, as markup.
-pub(super) fn legend_row(entries: &[String]) -> String {
+pub(crate) fn legend_row(entries: &[String]) -> String {
     format!("<div class=\"legend\">{}</div>", entries.concat())
 }
 
 /// Entry of an area.
-pub(super) fn legend_swatch(colour: RGBColor, opacity: f64, text: &str) -> String {
+pub(crate) fn legend_swatch(colour: RGBColor, opacity: f64, text: &str) -> String {
     let colour = page_colour(colour);
     legend_entry(&format!("<rect width=\"34\" height=\"14\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>"), text)
 }
 
 /// Entry of a line of a width [px], with the length of dash and gap.
-pub(super) fn legend_line(colour: RGBColor, width: f64, dash: Option<(u32, u32)>, text: &str) -> String {
+pub(crate) fn legend_line(colour: RGBColor, width: f64, dash: Option<(u32, u32)>, text: &str) -> String {
     let colour = page_colour(colour);
     let dash = dash.map_or(String::new(), |(dash, gap)| format!(" stroke-dasharray=\"{dash} {gap}\""));
     let line =
@@ -164,7 +170,7 @@ pub(super) fn legend_line(colour: RGBColor, width: f64, dash: Option<(u32, u32)>
 }
 
 /// Entry of a mark.
-pub(super) fn legend_dot(colour: RGBColor, text: &str) -> String {
+pub(crate) fn legend_dot(colour: RGBColor, text: &str) -> String {
     let colour = page_colour(colour);
     legend_entry(&format!("<circle cx=\"17\" cy=\"7\" r=\"5.5\" fill=\"{colour}\" stroke=\"currentColor\"/>"), text)
 }

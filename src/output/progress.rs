@@ -54,8 +54,9 @@ fn ticks(time: f64) -> u64 {
     (time * TICKS_PER_SECOND) as u64
 }
 
-fn message(record: &FrameRecord, real_time_factor: f64, left: f64) -> String {
-    let left = match Duration::try_from_secs_f64(left) {
+/// A time left in words: `12s`, `4m05s`, `1h23m`; `?` where it is no number.
+pub(crate) fn time_left(seconds: f64) -> String {
+    match Duration::try_from_secs_f64(seconds) {
         Ok(left) if left.as_secs() >= 3600 => {
             format!("{}h{:02}m", left.as_secs() / 3600, left.as_secs() / 60 % 60)
         }
@@ -64,7 +65,11 @@ fn message(record: &FrameRecord, real_time_factor: f64, left: f64) -> String {
         }
         Ok(left) => format!("{:.0}s", left.as_secs_f64()),
         Err(_) => "?".into(),
-    };
+    }
+}
+
+fn message(record: &FrameRecord, real_time_factor: f64, left: f64) -> String {
+    let left = time_left(left);
     format!(
         "{:.1}mm {:.2}N {left} left   {real_time_factor:.2} x real time   t = {:.2} s",
         record.depth * 1e3,
