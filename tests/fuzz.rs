@@ -222,7 +222,7 @@ fn damaged_overrides_are_refused_or_taken() {
             text[at] = *random.of(b"\"'[]{}=., \n\t#x0");
         }
         let text = String::from_utf8(text).unwrap();
-        let outcome = catch_unwind(|| match Scene::load(&path, &[text.clone()]) {
+        let outcome = catch_unwind(|| match Scene::load(&path, std::slice::from_ref(&text)) {
             Err(error) => assert_clear(&error, &text),
             Ok(scene) => drop(scene),
         });

@@ -63,6 +63,9 @@ struct Page<'a> {
     a: &'a Analysis,
 }
 
+/// A run that a chart names: run, label, colour, size of its mark [px], place of the label beside it [px].
+type Wanted<R, L> = (R, L, RGBColor, u32, Option<(u32, u32)>);
+
 impl Page<'_> {
     fn head(&self, written: &str) -> String {
         let (a, plan) = (self.a, &self.a.plan);
@@ -365,14 +368,14 @@ impl Page<'_> {
             let error = |row: &Row| row.errors.force_curve.unwrap_or(0.0);
             error(a).total_cmp(&error(b))
         });
-        let wanted: [(Option<&Row>, &str, RGBColor, u32, Option<(u32, u32)>); 5] = [
+        let wanted: [Wanted<Option<&Row>, &str>; 5] = [
             (self.a.reference(), "reference", BLACK, 3, None),
             (self.a.base(), "base", INWARD, 2, None),
             (fast, "real time", GREEN, 2, Some((7, 3))),
             (good, "fastest within 1 %", PINK, 2, Some((3, 3))),
             (coarse, "farthest", ORANGE, 2, Some((2, 3))),
         ];
-        let mut shown: Vec<(&Row, String, RGBColor, u32, Option<(u32, u32)>)> = Vec::new();
+        let mut shown: Vec<Wanted<&Row, String>> = Vec::new();
         for (row, name, colour, width, dash) in wanted {
             let Some(row) = row else { continue };
             match shown.iter_mut().find(|(other, ..)| other.run.id == row.run.id) {
