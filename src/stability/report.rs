@@ -358,7 +358,8 @@ impl EngineReport {
             of(Verdict::Caught),
             of(Verdict::Refused),
             failed.len(),
-            self.cases.iter().map(|case| case.wall_s).sum::<f64>()
+            // The sum of nothing is -0.
+            self.cases.iter().map(|case| case.wall_s).sum::<f64>().abs()
         );
         if self.interrupted {
             out += "; interrupted";
