@@ -63,7 +63,7 @@ struct Page<'a> {
     a: &'a Analysis,
 }
 
-/// A run that a chart names: run, label, colour, size of its mark [px], place of the label beside it [px].
+/// A run that a chart names: run, label, colour, width of its line, and dash and gap where it is dashed [px].
 type Wanted<R, L> = (R, L, RGBColor, u32, Option<(u32, u32)>);
 
 impl Page<'_> {
