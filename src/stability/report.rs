@@ -445,7 +445,9 @@ fn percent(part: f64) -> String {
 fn count(n: u64) -> String {
     match n {
         0..1_000_000 => n.to_string(),
-        _ => format!("{:.2}M", n as f64 * 1e-6),
+        1_000_000..9_995_000 => format!("{:.2}M", n as f64 * 1e-6),
+        9_995_000..999_500_000 => format!("{:.0}M", n as f64 * 1e-6),
+        _ => format!("{:.1e}", n as f64),
     }
 }
 
@@ -478,7 +480,7 @@ mod tests {
         for part in [0.0, 0.0001, 0.5, 0.09999, 0.99999, 5.0, 9.994, 1e9, f64::NAN, f64::INFINITY] {
             assert!(percent(part).len() <= 7, "{}", percent(part));
         }
-        for n in [0, 999_999, 1_000_000, 99_999_999] {
+        for n in [0, 999_999, 1_000_000, 9_994_999, 9_995_000, 99_999_999, 999_499_999, 999_999_999, 99_999_999_999] {
             assert!(count(n).len() <= 6, "{}", count(n));
         }
     }
