@@ -28,14 +28,15 @@ pub struct ContactNode {
     /// others only carry tip springs.
     pub pushed: bool,
     pub surface: ContactSurface,
-    /// On a slit: the faces around the node, at whose points the needle touches; and a quarter of their areas [m^2].
+    /// On a slit: the faces around the node, at whose points the needle touches.
     pub faces: Option<SlitFaces>,
-    pub area: f64,
+    /// What the node stands for in contact: on a slit a quarter of the areas of those faces [m^2], else its rest volume [m^3].
+    pub share: f64,
 }
 
 impl ContactNode {
     /// A node that carries tip springs and no more.
-    fn carrier(node: usize, rest_radius: f64, rest_axial: f64) -> Self {
+    fn carrier(node: usize, rest_radius: f64, rest_axial: f64, share: f64) -> Self {
         ContactNode {
             node: node as u32,
             rest_radius,
@@ -43,7 +44,7 @@ impl ContactNode {
             pushed: false,
             surface: ContactSurface::OpenedPath,
             faces: None,
-            area: 0.0,
+            share,
         }
     }
 }
@@ -75,8 +76,8 @@ pub enum ContactSurface {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathCell {
     pub cell: u32,
-    /// Fraction phi of the cell's volume within a0 of the axis.
-    pub fraction: f64,
+    /// Part of the stiffness that is left once the tip has passed, from the fraction phi of the volume within a0 of the axis.
+    pub left: f64,
     /// Smallest and largest s0 of that part [m].
     pub axial_start: f64,
     pub axial_end: f64,
@@ -115,6 +116,11 @@ impl PuncturePlan {
         self.contact_stiffness / REFERENCE_EDGE.powi(2)
     }
 
+    /// Contact stiffness of a node in the ring around the opened path, of full weight where `weight` is 1 [N/m].
+    pub fn ring_stiffness(&self, contact: &ContactNode, weight: f64) -> f64 {
+        self.ring_stiffness_per_volume * contact.share * weight
+    }
+
     /// Tip force at which the tip advances at the coordinate a [N]: from F_pun of the material that it enters down to
     /// F_cut over the transition length; over the last transition length before the bottom it fades to nothing, since a spring
     /// that ended at once would throw the tissue back.
@@ -145,8 +151,10 @@ pub struct PuncturePlan {
     /// Material coordinate at which the path leaves the block through the bottom [m].
     pub exit: f64,
     pub cells: Vec<PathCell>,
-    /// Contact stiffness k [N/m].
+    /// Contact stiffness k of a face that separates [N/m].
     pub contact_stiffness: f64,
+    /// Contact stiffness of the ring around the opened path, per rest volume [N/m^4].
+    pub ring_stiffness_per_volume: f64,
     /// Time constant of the damping at the points of a slit: damping over stiffness [s].
     pub face_damping: f64,
     /// The path is not planned but found while the tip moves.
@@ -326,6 +334,12 @@ impl Model {
         factor * self.scene.material.law.p_wave_modulus() * REFERENCE_EDGE * REFERENCE_EDGE / h
     }
 
+    /// Contact stiffness of the ring around an opened path per rest volume, `factor (K + 4/3 mu) / l^2`, the same on every
+    /// mesh [N/m^4].
+    fn ring_stiffness_per_volume(&self, factor: f64) -> f64 {
+        factor * self.scene.material.law.p_wave_modulus() / (REFERENCE_EDGE * REFERENCE_EDGE)
+    }
+
     /// The planned path, if the tool is a needle that cuts.
     fn planned_path(&self) -> Option<PlannedPath> {
         let motion = &self.scene.motion;
@@ -365,7 +379,7 @@ impl Model {
         let cells = match (&self.cohesion, mesh.bore) {
             (Some(_), Some(bore)) => core_cells(mesh, &bore, deepest),
             (Some(_), None) => Vec::new(),
-            (None, _) => path_cells(mesh, &path, params.softened_radius, deepest),
+            (None, _) => path_cells(mesh, &path, &params, deepest),
         };
         let exit = self.scene.tissue.size.z / -path.direction.z;
         let surfaces = self.separated_surfaces(&path);
@@ -376,12 +390,12 @@ impl Model {
             .filter_map(|node| {
                 let (r0, s0) = path.material_coordinates(mesh.rest_position(node));
                 let surface = surfaces.get(&(node as u32)).copied().unwrap_or(ContactSurface::OpenedPath);
-                let in_ring = r0 > params.softened_radius && r0 < params.ring_radius;
+                let in_ring = params.ring_weight(r0) > 0.0;
                 let on_slit = matches!(surface, ContactSurface::Slit { .. });
                 let on_face = surface != ContactSurface::OpenedPath;
                 let pushed = on_slit || s0 < deepest && if cohesive { on_face } else { in_ring };
                 let carries = r0 < anchor_reach && s0 < deepest + 2.0 * self.scene.tissue.cell_size;
-                let carrier = ContactNode::carrier(node, r0, s0);
+                let carrier = ContactNode::carrier(node, r0, s0, mesh.node_volume(node));
                 (pushed || carries).then_some(ContactNode { pushed, surface, ..carrier })
             })
             .collect();
@@ -396,6 +410,7 @@ impl Model {
             anchors: tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
             cells,
             contact_stiffness,
+            ring_stiffness_per_volume: self.ring_stiffness_per_volume(params.contact_stiffness_factor),
             face_damping: 2.0 * params.contact_damping * (face_mass / contact_stiffness).sqrt(),
             params,
             profile: Profile::new(&needle, path.direction),
@@ -421,7 +436,7 @@ impl Model {
         let reach = params.ring_radius.max(needle.radius + 1.5 * h) + FREE_PATH_ROOM;
         self.contact_nodes = (0..mesh.node_count())
             .filter(|&node| near(mesh.rest_position(node), reach))
-            .map(|node| ContactNode { pushed: true, ..ContactNode::carrier(node, 0.0, 0.0) })
+            .map(|node| ContactNode { pushed: true, ..ContactNode::carrier(node, 0.0, 0.0, mesh.node_volume(node)) })
             .collect();
         let opened = (0..mesh.cell_count()).filter(|&cell| {
             let size = mesh.cell_size(cell);
@@ -459,6 +474,7 @@ impl Model {
             anchors: Vec::new(),
             cells: Vec::new(),
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
+            ring_stiffness_per_volume: self.ring_stiffness_per_volume(params.contact_stiffness_factor),
             face_damping: 0.0,
             profile: Profile::new(&needle, motion.direction),
             params,
@@ -549,7 +565,7 @@ impl Model {
             });
             let area = areas.sum();
             let contact = &mut self.contact_nodes[own as usize];
-            (contact.faces, contact.area) = (Some(faces), area);
+            (contact.faces, contact.share) = (Some(faces), area);
         }
     }
 
@@ -584,7 +600,7 @@ impl Model {
             .filter_map(|node| {
                 let lateral = mesh.rest_position(node) - entry;
                 let r0 = lateral.truncate().length();
-                let carrier = ContactNode::carrier(node, r0, 0.0);
+                let carrier = ContactNode::carrier(node, r0, 0.0, mesh.node_volume(node));
                 (r0 < 1.5 * radius).then_some(ContactNode { pushed: true, ..carrier })
             })
             .collect();
@@ -785,9 +801,10 @@ fn tip_anchors(path: &PlannedPath, needle: &NeedleShape, cohesive: bool) -> Vec<
         .collect()
 }
 
-/// Cells that lie partly within `radius` of the path, with the volume fraction found from 10^3 sample points.
-fn path_cells(mesh: &BlockMesh, path: &PlannedPath, radius: f64, deepest: f64) -> Vec<PathCell> {
+/// Cells that lie partly within a0 of the path, with the volume fraction found from 10^3 sample points.
+fn path_cells(mesh: &BlockMesh, path: &PlannedPath, params: &puncture::Params, deepest: f64) -> Vec<PathCell> {
     const SAMPLES: usize = 10;
+    let radius = params.softened_radius;
     (0..mesh.cell_count())
         .filter_map(|cell| {
             let size = mesh.cell_size(cell);
@@ -810,7 +827,7 @@ fn path_cells(mesh: &BlockMesh, path: &PlannedPath, radius: f64, deepest: f64) -
             }
             (inside > 0 && start < deepest).then_some(PathCell {
                 cell: cell as u32,
-                fraction: inside as f64 / SAMPLES.pow(3) as f64,
+                left: params.stiffness_left(inside as f64 / SAMPLES.pow(3) as f64),
                 axial_start: start,
                 axial_end: end,
             })
@@ -832,7 +849,7 @@ fn core_cells(mesh: &BlockMesh, bore: &Bore, deepest: f64) -> Vec<PathCell> {
             let (start, end) = (-mesh.lines[2][at[2] + 1], -mesh.lines[2][at[2]]);
             (inside && start < deepest).then_some(PathCell {
                 cell: cell as u32,
-                fraction: 1.0,
+                left: 0.0,
                 axial_start: start,
                 axial_end: end,
             })

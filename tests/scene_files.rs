@@ -287,7 +287,7 @@ fn wrong_tools_and_parameters() {
     );
     assert_refused(&[("[needle]", "[sphere]\nradius_mm = 5\n\n[needle]")], "[sphere]", &["keep one"]);
     assert_refused(
-        &[("softened_radius_mm = 0.72", "softened_radius_mm = 2.0")],
+        &[("softened_radius_mm = 0.55", "softened_radius_mm = 2.0")],
         "softened_radius_mm",
         &["ring_radius_mm = 2.0"],
     );

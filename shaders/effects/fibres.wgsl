@@ -21,14 +21,17 @@ struct FibreStress {
 
 fn fibre_stress(number: u32, H: mat3x3<f32>, cof: mat3x3<f32>, dj: f32) -> FibreStress {
     let n = fibres[number].direction.xyz;
-    let stretched = n + H * n;
+    let lengthened = H * n;
+    let stretched = n + lengthened;
     let f = isochoric_factors(1.0 + dj);
     let square = dot(stretched, stretched);
-    let e = max(f.a * square - 1.0, 0.0);
+    // a |F n|^2 - 1 without cancellation.
+    let square_1 = 2.0 * dot(n, lengthened) + dot(lengthened, lengthened);
+    let e = max(f.a * square_1 + power_minus_one(dj, -0.6666667, f.a), 0.0);
     let exponential = capped_exponential(fibres[number].k2 * e * e);
     let slope = fibres[number].k1 * e * exponential.y;
     let along = stretched * (2.0 * f.a * slope);
-    let across = f.da * square * slope;
+    let across = -0.6666667 * f.a_fall * square * slope;
     let curvature = fibres[number].k1 * (exponential.y + 2.0 * fibres[number].k2 * e * e * exponential.z);
     return FibreStress(
         mat3x3<f32>(along * n.x + cof[0] * across, along * n.y + cof[1] * across, along * n.z + cof[2] * across),

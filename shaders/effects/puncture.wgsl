@@ -9,7 +9,7 @@ struct PunctureParams {
     tip_stiffness: f32,
     // Elastic stiffness left in a softened cell.
     residual_stiffness: f32,
-    // Normal stiffness of the shaft contact [N/m], fraction of critical damping, fading length of an overlap [m].
+    // Normal stiffness of the contact with a face that separates [N/m], fraction of critical damping, fading length of an overlap [m].
     contact_stiffness: f32,
     contact_damping: f32,
     entry_fade: f32,
@@ -31,7 +31,8 @@ struct PunctureParams {
     // Contact at the points of a slit: stiffness per area [Pa/m], damping over stiffness [s].
     face_stiffness: f32,
     face_damping: f32,
-    _pad2: u32,
+    // Stiffness of the ring around an opened path per rest volume [N/m^4].
+    ring_stiffness: f32,
     _pad3: u32,
     _pad4: u32,
     // Of a free path: direction of the needle before the run, to which `shift` belongs; first cell and cells per axis of
@@ -90,10 +91,10 @@ struct TipState {
     _pad1: f32,
 }
 
-// Cell that the path passes: fraction of its volume that opens, s0 range of that part [m].
+// Cell that the path passes: part of its stiffness that is left then, s0 range of the part that opens [m].
 struct PathCell {
     cell: u32,
-    fraction: f32,
+    left: f32,
     axial_start: f32,
     axial_end: f32,
     // Energy that softening took in this frame [J].
@@ -148,6 +149,13 @@ fn membrane_share(a: f32) -> f32 {
         segment = select(segment, i, puncture.segments[i].x <= a);
     }
     return f32(extractBits(puncture.membranes, segment, 1u));
+}
+
+// Weight of a node of the ring around the opened path.
+fn ring_weight(rest_radius: f32) -> f32 {
+    let a0 = puncture.softened_radius;
+    let outer = puncture.ring_radius;
+    return smoothstep(a0, 2.0 * a0, rest_radius) * (1.0 - smoothstep(0.75 * outer, outer, rest_radius));
 }
 
 // How deep a point lies inside the needle [m] and the gradient of that depth (src/needle/gap.rs).

@@ -7,7 +7,8 @@ const SMALLEST_EIGENVALUE: f32 = 0.01;
 // x^p for x >= low, its second-order Taylor polynomial at `low` below: value, first and second derivative.
 fn continued_power(x: f32, p: f32, low: f32) -> vec3<f32> {
     let at = max(x, low);
-    let value = exp2(p * log2(at));
+    // Exact at 1, so that tissue at rest stays there.
+    let value = select(exp2(p * log2(at)), 1.0, at == 1.0);
     let slope = p * value / at;
     let curvature = (p - 1.0) * slope / at;
     let d = min(x - low, 0.0);
@@ -52,13 +53,15 @@ fn ogden_stress(c: vec4<f32>, H: mat3x3<f32>) -> IsochoricStress {
     let scaled = mat3x3<f32>(n[0] * s.slope.x, n[1] * s.slope.y, n[2] * s.slope.z);
     let factor = 2.0 * c.x / (c.y * c.y);
     let sum = s.phi.x + s.phi.y + s.phi.z;
-    out.P = (F * (scaled * transpose(n)) * (2.0 * s.a.x) + out.cof * (s.a.y * sum)) * factor;
+    // a' sum phi, in a form that cancels to the last bit at F = I, where a' = -alpha/3 and the sum is 3.
+    let along = (s.a.y / (c.y * -0.33333333)) * (c.y * (sum * 0.33333333));
+    out.P = (F * (scaled * transpose(n)) * (2.0 * s.a.x) - out.cof * along) * factor;
     // Bound of the tangent modulus: the largest second derivative by one principal stretch.
     let c_i = s.eigenvalues;
     let others = c_i.yzx * c_i.zxy;
-    let along = s.a.x * (2.0 * s.slope + 4.0 * c_i * s.curvature)
+    let rise = s.a.x * (2.0 * s.slope + 4.0 * c_i * s.curvature)
         + 4.0 * s.a.y * (1.0 + out.dj) * s.slope + s.a.z * sum * others;
-    out.tangent = factor * max(max(along.x, along.y), max(along.z, 0.0));
+    out.tangent = factor * max(max(rise.x, rise.y), max(rise.z, 0.0));
     return out;
 }
 

@@ -20,10 +20,11 @@ struct ContactNode {
     rest_axial: f32,
     // Nodal mass [kg].
     mass: f32,
-    // On a slit: faces around the node (bits: lower and higher along the first way, those again higher along the second), a quarter
-    // of their areas [m^2], and the contact nodes around, row by row without the node itself.
+    // On a slit: faces around the node (bits: lower and higher along the first way, those again higher along the second), and the
+    // contact nodes around, row by row without the node itself.
     faces: u32,
-    area: f32,
+    // What the node stands for: on a slit a quarter of the areas of its faces [m^2], else its rest volume [m^3].
+    share: f32,
     ring_low: vec4<u32>,
     ring_high: vec4<u32>,
 }

@@ -119,7 +119,8 @@ fn invariant_stress(material: Material, H: mat3x3<f32>) -> IsochoricStress {
     let s = isochoric_slopes(material, f.a * i1 - 3.0);
     let first = 2.0 * s.w1 * f.a;
     let second = 2.0 * s.w2 * f.b;
-    let along = s.w1 * f.da * i1 + s.w2 * f.db * i2;
+    // w1 a' I1 + w2 b' I2; in this form what must cancel at F = I cancels to the last bit, and tissue at rest stays there.
+    let along = -2.0 * s.w1 * (f.a_fall * (i1 * 0.33333333)) - 2.0 * s.w2 * (f.b_fall * (i2 * 0.6666667));
     // Columns of 2 w1 a F + 2 w2 b (I1 F - F C) + (...) cof F.
     out.P = mat3x3<f32>(
         x * (first + second * (yy + zz)) - (y * xy + z * zx) * second + cof[0] * along,

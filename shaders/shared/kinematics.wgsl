@@ -10,22 +10,23 @@ const B0: f32 = 4.9793386;
 const B1: f32 = -22.130394;
 const B2: f32 = 172.12529;
 
-// J^(-1/3) for J >= 0.3: first guess from the exponent bits (3 % off), three Newton steps.
+// J^(-1/3) for J >= 0.3: first guess from the exponent bits (3 % off), three Newton steps. The last one corrects, so that
+// J = 1 gives exactly 1.
 fn inverse_cube_root(J: f32) -> f32 {
     let bits = 1419967785.0 - f32(bitcast<i32>(J)) * 0.33333333;
     var r = bitcast<f32>(i32(bits));
     r = r * (1.3333333 - 0.33333333 * J * r * r * r);
     r = r * (1.3333333 - 0.33333333 * J * r * r * r);
-    r = r * (1.3333333 - 0.33333333 * J * r * r * r);
+    r += 0.33333333 * r * (1.0 - J * r * r * r);
     return r;
 }
 
 struct IsochoricFactors {
-    // J^(-2/3) and its derivative, J^(-4/3) and its derivative.
+    // a = J^(-2/3), b = J^(-4/3), and -3/2 da/dJ, -3/4 db/dJ: at J = 1 all four are exactly 1.
     a: f32,
-    da: f32,
+    a_fall: f32,
     b: f32,
-    db: f32,
+    b_fall: f32,
 }
 
 fn isochoric_factors(J: f32) -> IsochoricFactors {
@@ -37,9 +38,9 @@ fn isochoric_factors(J: f32) -> IsochoricFactors {
     let below = J < J_CONTINUATION;
     var f: IsochoricFactors;
     f.a = select(r2, A0 + d * (A1 + 0.5 * d * A2), below);
-    f.da = select(-0.6666667 * r2 * r3, A1 + d * A2, below);
+    f.a_fall = select(r2 * r3, -1.5 * (A1 + d * A2), below);
     f.b = select(r4, B0 + d * (B1 + 0.5 * d * B2), below);
-    f.db = select(-1.3333334 * r4 * r3, B1 + d * B2, below);
+    f.b_fall = select(r4 * r3, -0.75 * (B1 + d * B2), below);
     return f;
 }
 

@@ -39,9 +39,11 @@ fn tip_share(grid: vec3<u32>, rest: vec3<f32>) -> vec3<f32> {
 }
 
 struct FreeContact {
-    // Whether the node is to be kept out of the needle, its r0 and the front end of what it touches [m].
+    // Whether the node is to be kept out of the needle, its r0 [m], the weight of its contact stiffness, and the front end of
+    // what it touches [m].
     touches: bool,
     rest_radius: f32,
+    weight: f32,
     end: f32,
 }
 
@@ -67,7 +69,8 @@ fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> FreeCo
     let reach = WATCHED * puncture.needle_radius;
     let met = free_tip.inside == 1.0 && !passed && s > puncture.tip_length && dot(lever, lever) - s * s < reach * reach;
     let in_ring = passed && s > 0.0 && rest_radius > puncture.softened_radius;
-    return FreeContact(met || in_ring, rest_radius, select(0.0, puncture.tip_length, met));
+    let weight = select(ring_weight(rest_radius), 1.0, met);
+    return FreeContact(met || in_ring, rest_radius, weight, select(0.0, puncture.tip_length, met));
 }
 #else
 // Share of the tip springs that acts on a grid node, along the insertion direction [N]. The loop is empty for nodes
@@ -138,7 +141,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     var normal = vec3<f32>(0.0);
     var tangential = vec3<f32>(0.0);
     var stored = 0.0;
-    // Stiffness that a separated face adds at its node [N/m]: it has half the mass of the others.
+    // Stiffness that contact adds at the node [N/m].
     var bound = 0.0;
     // Torque about the tip beyond that of forces at the node [N m].
     var turn = vec3<f32>(0.0);
@@ -160,7 +163,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let pressing = length(normal);
         let n = normal * select(0.0, 1.0 / pressing, pressing > 0.0);
         let vn = dot(v, n);
-        let k = puncture.face_stiffness * contact.area;
+        let k = puncture.face_stiffness * contact.share;
         let rubbing = points.rubbing;
         memory.touching = select(0.0, 1.0, pressing > 0.0);
         memory.on_shaft = select(0.0, 1.0, dot(points.on_shaft, points.on_shaft) > 0.0 && s >= puncture.tip_length);
@@ -188,7 +191,15 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         v -= cross(angular_velocity(), lever);
 #endif
         let vn = dot(v, n);
+#ifdef COHESIVE
         let k = puncture.contact_stiffness;
+#else
+#ifdef FREE_PATH
+        let k = puncture.ring_stiffness * contact.share * met.weight;
+#else
+        let k = puncture.ring_stiffness * contact.share * ring_weight(rest_radius);
+#endif
+#endif
         let elastic = k * depth * steep;
         let damping = 2.0 * puncture.contact_damping * sqrt(k * contact.mass);
         let pressure = select(0.0, max(0.0, elastic - damping * vn), depth > 0.0);
@@ -198,8 +209,8 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
             select(0.0, dot(normal, step_input.direction.xyz) * params.dt, s >= puncture.tip_length);
         contact_sums[index].damping_dissipation +=
             select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
-#ifdef COHESIVE
         bound = select(0.0, 2.0 * k * steep * steep, depth > 0.0);
+#ifdef COHESIVE
         memory.on_shaft = select(0.0, 1.0, depth > 0.0 && s >= puncture.tip_length);
 #endif
 #ifdef FRICTION

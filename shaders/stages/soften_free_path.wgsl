@@ -1,5 +1,5 @@
 // Stage soften_free_path: sample points that the tip of a free path has passed are marked; a cell keeps
-// max(residual, 1 - marked/64) of its stiffness, and the energy that it loses is booked. One thread per cell of the box.
+// residual^(marked/64) of its stiffness, and the energy that it loses is booked. One thread per cell of the box.
 #import shared/params
 #import shared/thread_index
 #import shared/displacement
@@ -50,7 +50,7 @@ fn soften_free_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
         let old = cell_stiffness[number];
         // A plane of samples is passed at once; the stiffness follows at a bounded rate.
         let slowly = old - SOFTENING_RATE * free_tip.advance / min(size.x, min(size.y, size.z));
-        let remaining = max(max(1.0 - fraction, puncture.residual_stiffness), slowly);
+        let remaining = max(pow(puncture.residual_stiffness, fraction), slowly);
         for (var again = select(1u, 0u, remaining < old); again == 0u; again++) {
             let layer = params.cells_x * params.cells_y;
             let k = quotient(number, layer);

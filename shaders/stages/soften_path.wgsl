@@ -1,5 +1,5 @@
-// Stage soften_path: a cell that the tip passes keeps max(residual, 1 - phi ramp(a)) of its stiffness; the energy
-// that it loses is booked. One thread per path cell.
+// Stage soften_path: a cell that the tip passes keeps 1 - ramp(a) (1 - left) of its stiffness; the energy that
+// it loses is booked. One thread per path cell.
 #import shared/params
 #import shared/thread_index
 #ifdef BORE
@@ -27,7 +27,7 @@ fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
     let here = tip_state.coordinate >= path.axial_start && tip_state.coordinate < path.axial_end;
     let remaining = select(old, 0.0, here && dot(step_input.velocity.xyz, step_input.direction.xyz) < 0.0);
 #else
-    let remaining = max(1.0 - path.fraction * ramp, puncture.residual_stiffness);
+    let remaining = 1.0 - ramp * (1.0 - path.left);
 #endif
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
     for (var once = select(1u, 0u, remaining < old); once == 0u; once++) {

@@ -18,16 +18,20 @@
 //! `l = min(l_p, thickness of the layer along the path)`: `F_pun = F_cut + 2 W/l`, so that `int (F_c - F_cut) da = W`. From a toughness
 //! G: `W = G 2R thickness`, a slit as wide as the needle.
 //!
-//! Path. A cell with the volume fraction `phi` within a0 of the axis keeps `max(residual, 1 - phi ramp(a))` of its
-//! stiffness; the energy that it loses is dissipated. A node with rest distance a0 < r0 < ring radius that the tip has passed
-//! (rest coordinate s0 < a) stays outside the radius at which no volume is lost,
+//! Path. A cell with the volume fraction `phi` within a0 of the axis keeps `1 - ramp(a) (1 - residual^phi)` of its
+//! stiffness: between softened and intact part in parallel, which is too stiff, and in series, which is too soft. The energy
+//! that it loses is dissipated. A node with rest distance a0 < r0 < r_r (ring radius) that the tip has passed (rest coordinate
+//! s0 < a) is pushed out towards the radius at which no volume is lost,
 //! ```text
-//! r >= r_e(s) = sqrt(r0^2 + rc(s)^2) - overlap fade(s),  rc = R min(1, s/Lc)
+//! r_e(s) = sqrt(r0^2 + rc(s)^2) - overlap fade(s),  rc = R min(1, s/Lc),  depth = r_e - r
 //! normal = (e - m d)/sqrt(1 + m^2),  m = d r_e/ds,  f = k depth - 2 zeta sqrt(k m_node) v_n, never tensile
+//! k = factor (K + 4/3 mu)/l^2 V w(r0),  w = S((r0 - a0)/a0) (1 - S((r0 - 3/4 r_r)/(r_r/4))),  S(x) = x^2 (3 - 2x)
 //! ```
+//! with the rest volume V of the node and l = 0.6 mm: the nodes are the integration points of a pressure over the ring, and
+//! the smooth weight w makes the sum nearly independent of where they lie.
 //! `s`: distance behind the tip, `d`: from tip to hub, `e`: radial. An overlap found when the tip passes fades over
 //! `entry_fade` of travel, so that the needle does that work. A motion that leaves one straight line has a free path
-//! (src/needle/free_path.rs). Range of validity: needle radius of one to two cells. Source: this project; F_cut = G_c w with the toughness of liver under needles, 76 to 185 J/m^2 [Azar2008],
+//! (src/needle/free_path.rs). Source: this project; F_cut = G_c w with the toughness of liver under needles, 76 to 185 J/m^2 [Azar2008],
 //! 164 J/m^2 [Gokgol2012].
 
 use super::Effect;
@@ -56,9 +60,10 @@ pub struct Params {
     pub softened_radius: f64,
     /// Elastic stiffness left in a fully softened cell (fraction).
     pub residual_stiffness: f64,
-    /// Outer radius of the ring of nodes that the shaft pushes [m] [calibration].
+    /// Outer radius r_r of the ring of nodes that the shaft pushes [m] [calibration].
     pub ring_radius: f64,
-    /// Contact stiffness factor: k = factor (K + 4/3 mu) l^2/h, l = 0.6 mm [calibration].
+    /// Contact stiffness factor: factor (K + 4/3 mu)/l^2 per volume of the ring, factor (K + 4/3 mu)/h per area of a slit,
+    /// l = 0.6 mm [calibration].
     pub contact_stiffness_factor: f64,
     /// Fraction of critical damping in the contact normal.
     pub contact_damping: f64,
@@ -72,7 +77,24 @@ pub struct Params {
     pub reference_speed: f64,
 }
 
+/// Smooth step from 0 at x <= 0 to 1 at x >= 1.
+fn smooth_step(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
 impl Params {
+    /// Weight w of a node of the ring with the rest distance `r0` [m] from the path, 0 to 1.
+    pub fn ring_weight(&self, r0: f64) -> f64 {
+        let (inner, outer) = (self.softened_radius, self.ring_radius);
+        smooth_step((r0 - inner) / inner) * (1.0 - smooth_step((r0 - 0.75 * outer) / (0.25 * outer)))
+    }
+
+    /// Part of its stiffness that a cell with the fraction `inside` of its volume within a0 of the path keeps.
+    pub fn stiffness_left(&self, inside: f64) -> f64 {
+        self.residual_stiffness.powf(inside)
+    }
+
     /// Factor on the tip forces at a speed of the needle [m/s].
     pub fn rate_factor(&self, speed: f64) -> f64 {
         (speed.max(self.reference_speed) / self.reference_speed).powf(self.rate_exponent)
@@ -86,7 +108,7 @@ impl Default for Params {
             cutting_force: 0.3,
             transition_length: 0.5e-3,
             tip_stiffness: 2.0e3,
-            softened_radius: 0.72e-3,
+            softened_radius: 0.55e-3,
             residual_stiffness: 0.02,
             ring_radius: 2.0e-3,
             contact_stiffness_factor: 2.35,

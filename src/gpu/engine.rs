@@ -719,7 +719,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
                 .iter()
                 .map(|c| PathCell {
                     cell: c.cell,
-                    fraction: c.fraction as f32,
+                    left: c.left as f32,
                     axial_start: c.axial_start as f32,
                     axial_end: c.axial_end as f32,
                     material: model.material_index(c.cell as usize) as u32,
@@ -1021,6 +1021,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             bore_grip: plan.needle.bore.map_or(0.0, |b| b.friction as f32),
             face_stiffness: plan.face_stiffness() as f32,
             face_damping: plan.face_damping as f32,
+            ring_stiffness: plan.ring_stiffness_per_volume as f32,
             reference: vec4(plan.path.direction),
             free_low,
             free_count,
@@ -1196,7 +1197,7 @@ fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
                 rest_axial: c.rest_axial as f32,
                 mass: model.node_mass[node] as f32,
                 faces: c.faces.map_or(0, |f| f.present),
-                area: c.area as f32,
+                share: c.share as f32,
                 ring_low,
                 ring_high,
             }

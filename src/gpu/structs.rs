@@ -183,7 +183,7 @@ shared_structs! {
         bore_grip: f32,
         face_stiffness: f32,
         face_damping: f32,
-        _pad2: u32,
+        ring_stiffness: f32,
         _pad3: u32,
         _pad4: u32,
         reference: [f32; 4],
@@ -235,7 +235,7 @@ shared_structs! {
     /// shaders/effects/puncture.wgsl
     struct PathCell {
         cell: u32,
-        fraction: f32,
+        left: f32,
         axial_start: f32,
         axial_end: f32,
         dissipation: f32,
@@ -355,7 +355,7 @@ shared_structs! {
         rest_axial: f32,
         mass: f32,
         faces: u32,
-        area: f32,
+        share: f32,
         ring_low: [u32; 4],
         ring_high: [u32; 4],
     }

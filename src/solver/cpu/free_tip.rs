@@ -210,7 +210,7 @@ impl CpuEngine {
         self.state.tip = tip;
     }
 
-    /// Stage `soften_free_path`: factor `max(residual, 1 - marked/64)`; the energy that a cell loses is dissipated.
+    /// Stage `soften_free_path`: factor `residual^(marked/64)`; the energy that a cell loses is dissipated.
     pub(super) fn soften_free_path(&mut self, plan: &PuncturePlan, free: &FreePlan) {
         let tip = self.state.tip;
         if tip.advance == 0.0 {
@@ -242,7 +242,7 @@ impl CpuEngine {
             self.state.cut_samples[index] = marked;
             let fraction = f64::from(marked.count_ones()) / SAMPLES.pow(3) as f64;
             let slowly = self.state.stiffness[cell] - SOFTENING_RATE * tip.advance / size.min_element();
-            self.soften_cell(cell, (1.0 - fraction).max(plan.params.residual_stiffness).max(slowly));
+            self.soften_cell(cell, plan.params.stiffness_left(fraction).max(slowly));
         }
     }
 }

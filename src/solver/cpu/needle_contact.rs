@@ -17,7 +17,6 @@ impl CpuEngine {
     pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
         let d = -pose.direction;
-        let k = plan.contact_stiffness;
         let a = self.state.tip_coordinate;
         let turned = swing(plan.path.direction, pose.direction, plan.profile.shift);
         let profile = Profile { shift: turned, ..plan.profile };
@@ -53,9 +52,18 @@ impl CpuEngine {
             let s = relative.dot(d);
             let bend = line.map_or(Bend::default(), |l| l.at(s, (step - l.first_step) as f64 * self.dt));
             let from_axis = relative - bend.offset;
-            let (touches, rest_radius, end) = match &plan.free {
-                None => (contact.pushed && contact.rest_axial < a && s > 0.0, contact.rest_radius, 0.0),
+            let Touch { touches, rest_radius, weight, end } = match &plan.free {
+                None => Touch {
+                    touches: contact.pushed && contact.rest_axial < a && s > 0.0,
+                    rest_radius: contact.rest_radius,
+                    weight: plan.params.ring_weight(contact.rest_radius),
+                    end: 0.0,
+                },
                 Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, from_axis, s, d),
+            };
+            let k = match contact.surface {
+                ContactSurface::OpenedPath => plan.ring_stiffness(contact, weight),
+                _ => plan.contact_stiffness,
             };
             let mut bend_power = sums.tip.dot(bend.rate);
             // Where it rubs: normal, velocity past the needle [m/s], largest friction [N] and stiffness [N/m].
@@ -78,7 +86,7 @@ impl CpuEngine {
                 memory.on_shaft = force.on_shaft != DVec3::ZERO && s >= cone;
                 let n = force.normal.normalize_or_zero();
                 let v = velocity[node] - pose.velocity - bend.rate;
-                grip = Some((n, v, coefficient * force.rubbing, plan.face_stiffness() * contact.area));
+                grip = Some((n, v, coefficient * force.rubbing, plan.face_stiffness() * contact.share));
             } else if !touches {
                 *memory =
                     ContactState { rest_radius: memory.rest_radius, passed: memory.passed, ..ContactState::default() };
@@ -121,8 +129,8 @@ impl CpuEngine {
                     sums.stored = 0.5 * k * depth * depth;
                     sums.damping_power = (elastic - normal) * vn;
                 }
-                if depth > 0.0 && contact.surface != ContactSurface::OpenedPath {
-                    // A separated face has half the mass of other nodes.
+                if depth > 0.0 {
+                    // On a fine mesh, and where a separated face has half the mass of other nodes, contact limits the step.
                     self.added_bound[node] += 2.0 * k * steep * steep;
                 }
                 memory.on_shaft = depth > 0.0 && s >= cone;
@@ -169,8 +177,19 @@ impl CpuEngine {
     }
 }
 
-/// On a free path: brings what the node knows of the tip to this step, and tells whether it is to be kept out of the
-/// needle, with which r0 [m], and the front end [m] of what it touches. `lever` from the tip, `s` behind it along `d`.
+/// How a node meets the needle.
+struct Touch {
+    /// Whether it is to be kept out.
+    touches: bool,
+    /// Its r0 [m], and the weight of its contact stiffness.
+    rest_radius: f64,
+    weight: f64,
+    /// Front end of what it touches, behind the tip [m].
+    end: f64,
+}
+
+/// On a free path: brings what the node knows of the tip to this step, and tells how it meets the needle. `lever` from the
+/// tip, `s` behind it along `d`.
 fn free_contact(
     plan: &PuncturePlan,
     tip: &FreeTip,
@@ -179,7 +198,7 @@ fn free_contact(
     lever: DVec3,
     s: f64,
     d: DVec3,
-) -> (bool, f64, f64) {
+) -> Touch {
     let ring = plan.params.ring_radius;
     let relative = rest - tip.place;
     let ahead = relative.dot(tip.along);
@@ -195,5 +214,10 @@ fn free_contact(
     let reach = WATCHED * needle.radius;
     let met = tip.inside && !passed && s > needle.tip_length && (lever - d * s).length_squared() < reach * reach;
     let in_ring = passed && s > 0.0 && memory.rest_radius > plan.params.softened_radius;
-    (met || in_ring, memory.rest_radius, if met { needle.tip_length } else { 0.0 })
+    Touch {
+        touches: met || in_ring,
+        rest_radius: memory.rest_radius,
+        weight: if met { 1.0 } else { plan.params.ring_weight(memory.rest_radius) },
+        end: if met { needle.tip_length } else { 0.0 },
+    }
 }

@@ -123,7 +123,7 @@ impl CpuEngine {
         p.stiffness * stretch
     }
 
-    /// Stage `soften_path`: factor `max(residual, 1 - phi ramp(a))`; the energy that a cell loses is dissipated.
+    /// Stage `soften_path`: factor `1 - ramp(a) (1 - left)`; the energy that a cell loses is dissipated.
     pub(super) fn soften_path(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
         let a = self.state.tip_coordinate;
         for path_cell in &plan.cells {
@@ -136,7 +136,7 @@ impl CpuEngine {
                     let here = (path_cell.axial_start..path_cell.axial_end).contains(&a);
                     if here && pose.velocity.dot(pose.direction) < 0.0 { 0.0 } else { 1.0 }
                 }
-                None => (1.0 - path_cell.fraction * ramp).max(plan.params.residual_stiffness),
+                None => 1.0 - ramp * (1.0 - path_cell.left),
             };
             self.soften_cell(cell, factor);
         }
