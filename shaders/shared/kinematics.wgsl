@@ -52,6 +52,11 @@ fn jacobian_minus_one(H: mat3x3<f32>) -> f32 {
     return H[0].x + H[1].y + H[2].z + minors + dot(H[0], cross(H[1], H[2]));
 }
 
+// min(0, J - 0.3): how far a cell is on its way to being flat or inside out.
+fn flatness(dj: f32) -> f32 {
+    return min(1.0 + dj - J_CONTINUATION, 0.0);
+}
+
 // F = I + H.
 fn deformation_gradient(H: mat3x3<f32>) -> mat3x3<f32> {
     return mat3x3<f32>(

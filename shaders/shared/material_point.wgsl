@@ -43,7 +43,8 @@ struct PointAnswer {
 // Volumetric energy of the undamaged point [J/m^3].
 fn volumetric_energy(place: PointPlace, dj: f32) -> f32 {
 #ifdef TETRAHEDRA
-    return place.averaged_energy;
+    let flat = flatness(dj);
+    return place.averaged_energy + 0.5 * materials[place.material].bulk_modulus * flat * flat;
 #else
     return 0.5 * materials[place.material].bulk_modulus * dj * dj;
 #endif

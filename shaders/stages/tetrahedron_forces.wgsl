@@ -1,7 +1,8 @@
 // Stage tetrahedron_forces: four-node tetrahedra with averaged nodal pressure, total Lagrangian.
 //
 // f_i = V (w P_iso + p cof F) B_i with the mean p of the pressures of the four nodes. The pressure carries over from
-// neighbours that may be intact, so it is not weakened with the cell. Equations: src/solver/elements.rs.
+// neighbours that may be intact, so it is not weakened with the cell; a flat cell adds its own. Equations:
+// src/solver/elements.rs.
 #import shared/params
 #import shared/thread_index
 #import shared/displacement
@@ -65,7 +66,8 @@ fn tetrahedron_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num
     let gb = tet.gradient_b_and_volume.xyz;
     let gc = tet.gradient_c_and_edge.xyz;
     let gd = tet.gradient_d_and_material.xyz;
-    let stress = point.P * (-volume * point.intact) + point.cof * (-volume * pressure);
+    let own = materials[number].bulk_modulus * flatness(point.dj);
+    let stress = point.P * (-volume * point.intact) + point.cof * (-volume * (pressure + point.intact * own));
     let fb = stress * gb;
     let fc = stress * gc;
     let fd = stress * gd;
