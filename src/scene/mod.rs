@@ -22,6 +22,13 @@ use crate::material::ElasticLaw;
 use crate::mesh::tets::TetMesh;
 use crate::{Error, Result};
 
+/// Most steps of a frame: input and commands of a step take about 3 kB, and three frames may be under way.
+pub const MOST_STEPS_PER_FRAME: u64 = 50_000;
+
+/// Upper estimate of the memory of a frame's record, and of a target's in it [B].
+pub const RECORD_BYTES: usize = 1024;
+pub const RECORD_BYTES_PER_TARGET: usize = 128;
+
 /// One simulation: what is there, what moves, what is simulated and what is written.
 #[derive(Debug, Clone)]
 pub struct Scene {
