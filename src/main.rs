@@ -219,8 +219,18 @@ struct AdviseArgs {
 /// Prints to standard output; a closed pipe (`| head`) is no failure.
 fn print(text: &str) {
     let mut out = std::io::stdout().lock();
-    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        // Whoever reads has enough, as `head` does.
+        Err(reason) if reason.kind() != std::io::ErrorKind::BrokenPipe => {
+            eprintln!("error: standard output: {reason}\n  way out: write to another disk, or free space on this one");
+            OUTPUT_LOST.store(true, Ordering::Relaxed);
+        }
+        _ => {}
+    }
 }
+
+/// True once standard output has lost something.
+static OUTPUT_LOST: AtomicBool = AtomicBool::new(false);
 
 /// Becomes true with Ctrl-C; a second Ctrl-C ends the program at once.
 fn until_interrupted() -> Arc<AtomicBool> {
@@ -448,6 +458,7 @@ fn main() -> ExitCode {
     }
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error,wgpu_hal=off")).init();
     match dispatch(Cli::parse(), start) {
+        Ok(0) if OUTPUT_LOST.load(Ordering::Relaxed) => ExitCode::from(1),
         Ok(code) => ExitCode::from(code),
         Err(error) => {
             match &error {
