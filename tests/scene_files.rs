@@ -381,6 +381,14 @@ fn absurd_numbers_of_steps_and_frames() {
     assert!(size_of::<TargetRecord>() <= stylet::scene::RECORD_BYTES_PER_TARGET);
 }
 
+/// A device never ends; nobody waits for it.
+#[cfg(unix)]
+#[test]
+fn a_device_is_no_library() {
+    let message = refusal(&main_scene(), &["material.library=\"/dev/zero\""]);
+    assert!(message.contains("/dev/zero is a device or a pipe"), "{message}");
+}
+
 #[test]
 fn several_problems_come_in_the_order_of_the_file() {
     let message = refusal(&main_scene(), &["tissue.growth=9"]);

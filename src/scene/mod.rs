@@ -68,6 +68,11 @@ impl Scene {
         convert::load(path, overrides).map_err(Error::Scene)
     }
 
+    /// The same with the text of the file in memory; `path` stands for it in messages, and files that it names start from there.
+    pub fn parse(path: &Path, source: &str, overrides: &[String]) -> Result<Scene> {
+        convert::parse(path, source, overrides).map_err(Error::Scene)
+    }
+
     /// The needle, if the tool is one.
     pub fn needle(&self) -> Option<&NeedleShape> {
         match &self.tool {

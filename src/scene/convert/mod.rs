@@ -44,7 +44,12 @@ const HIGHEST_FRAME_RATE: f64 = 1e5;
 /// document, keys, numbers, geometry, memory.
 pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, String> {
     let source = std::fs::read_to_string(path).map_err(|error| unreadable(path, &error))?;
-    let document = Document::parse(path, &source, overrides)?;
+    parse(path, &source, overrides)
+}
+
+/// The same with the text in memory.
+pub fn parse(path: &Path, source: &str, overrides: &[String]) -> std::result::Result<Scene, String> {
+    let document = Document::parse(path, source, overrides)?;
     let mut check = Check::new(&document, path);
     check.finite_numbers(&document)?;
     let file: SceneFile = document.deserialize()?;
