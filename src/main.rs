@@ -9,6 +9,7 @@ use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
 use stylet::commands::advise::AdviseOptions;
+use stylet::commands::compare_adapters::CompareOptions;
 use stylet::commands::fit::{FitOptions, Volumetric};
 use stylet::commands::report::{ReportOptions, ReportOutcome};
 use stylet::commands::study::{StudyOptions, StudyOutcome};
@@ -54,6 +55,8 @@ enum Command {
     Advise(AdviseArgs),
     /// List the GPU adapters
     Adapters,
+    /// Run a scene on every adapter and on the CPU engine, and compare forces, displacements and energies
+    CompareAdapters(CompareArgs),
     /// Print the JSON schema of scene files
     Schema,
     /// One step of the bench block: milliseconds since the start of the program (called by `bench`)
@@ -99,6 +102,19 @@ struct RunArgs {
 struct CheckArgs {
     #[command(flatten)]
     scene: SceneArgs,
+}
+
+#[derive(Args)]
+struct CompareArgs {
+    /// Scene file
+    #[arg(default_value = DEFAULT_SCENE)]
+    scene: PathBuf,
+    /// Override a key of the scene, e.g. --set tissue.cell_size_mm=0.8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Args)]
@@ -440,6 +456,12 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
         Some(Command::Adapters) => {
             print(commands::adapters()?.trim_end());
             Ok(0)
+        }
+        Some(Command::CompareAdapters(args)) => {
+            let options = CompareOptions { scene: args.scene, overrides: args.overrides };
+            let table = commands::compare_adapters::compare_adapters(&options)?;
+            print(if args.json { table.json() } else { table.table() }.trim_end());
+            Ok(u8::from(table.is_broken()))
         }
         Some(Command::Schema) => {
             let text = serde_json::to_string_pretty(&Scene::schema());
