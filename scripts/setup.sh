@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Brings what a Debian or Ubuntu machine with Rust lacks to build Stylet and to run it on a GPU adapter:
 # a linker, the Vulkan loader, and a software Vulkan driver where no driver is there at all.
+# Arguments name further programs that are wanted, each in the Debian package of its name: `scripts/setup.sh parallel`.
 # Installs nothing when all is there; says what it installs; without apt or the right to use it, it says what is missing
 # and goes on (Stylet then runs on its CPU engine).
 set -euo pipefail
@@ -11,6 +12,9 @@ if ! command -v cargo >/dev/null; then
 fi
 
 missing=()
+for program in "$@"; do
+    command -v "$program" >/dev/null || missing+=("$program")
+done
 command -v cc >/dev/null || missing+=(gcc libc6-dev)
 if [ "$(uname -s)" = Linux ]; then
     # The loader: any directory that the linker cache knows.

@@ -28,8 +28,23 @@ pub enum Error {
     #[error("run stopped in frame {frame} (step {step}, t = {time_s:.6} s): {message}")]
     Diverged { frame: u64, step: u64, time_s: f64, message: String },
     /// A file could not be written or read.
-    #[error("{path}: {source}")]
+    #[error("{path}: {source}\n  way out: {}", way_out_of(source))]
     File { path: PathBuf, source: std::io::Error },
+}
+
+/// What to do about a file that cannot be written or read.
+fn way_out_of(source: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind::*;
+    match source.kind() {
+        StorageFull | QuotaExceeded => "free space on that disk, or write to another one with --out",
+        FileTooLarge => "raise the limit on the size of files (`ulimit -f`), or write to another disk with --out",
+        PermissionDenied | ReadOnlyFilesystem => "give yourself the right to it, or take another folder with --out",
+        AlreadyExists | NotADirectory | IsADirectory => {
+            "a file stands where a folder should be, or a folder where a file should be: move it away, or take another folder"
+        }
+        NotFound => "check the name; a folder that was there may have been removed",
+        _ => "check the disk and the path, then call again",
+    }
 }
 
 impl Error {

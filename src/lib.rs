@@ -3,7 +3,7 @@
 //! Reading order, which is also the straight line that data takes:
 //! [`scene`] -> [`mesh`] -> [`effects`] -> [`separation`] and [`model`] -> [`solver`] (engines [`solver::cpu`] and
 //! [`gpu`]) -> [`observables`] -> [`output`] and [`render`]. [`stability`] runs that line on the hard cases, [`study`] many
-//! times over.
+//! times over. [`untrusted`] lists the readers of files.
 
 pub mod commands;
 pub mod effects;
@@ -24,5 +24,6 @@ pub mod separation;
 pub mod solver;
 pub mod stability;
 pub mod study;
+pub mod untrusted;
 
 pub use error::{Error, Result};

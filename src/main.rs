@@ -9,6 +9,7 @@ use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
 use stylet::commands::advise::AdviseOptions;
+use stylet::commands::compare_adapters::CompareOptions;
 use stylet::commands::fit::{FitOptions, Volumetric};
 use stylet::commands::report::{ReportOptions, ReportOutcome};
 use stylet::commands::study::{StudyOptions, StudyOutcome};
@@ -54,6 +55,8 @@ enum Command {
     Advise(AdviseArgs),
     /// List the GPU adapters
     Adapters,
+    /// Run a scene on every adapter and on the CPU engine, and compare forces, displacements and energies
+    CompareAdapters(CompareArgs),
     /// Print the JSON schema of scene files
     Schema,
     /// One step of the bench block: milliseconds since the start of the program (called by `bench`)
@@ -99,6 +102,19 @@ struct RunArgs {
 struct CheckArgs {
     #[command(flatten)]
     scene: SceneArgs,
+}
+
+#[derive(Args)]
+struct CompareArgs {
+    /// Scene file
+    #[arg(default_value = DEFAULT_SCENE)]
+    scene: PathBuf,
+    /// Override a key of the scene, e.g. --set tissue.cell_size_mm=0.8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Args)]
@@ -219,8 +235,18 @@ struct AdviseArgs {
 /// Prints to standard output; a closed pipe (`| head`) is no failure.
 fn print(text: &str) {
     let mut out = std::io::stdout().lock();
-    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        // Whoever reads has enough, as `head` does.
+        Err(reason) if reason.kind() != std::io::ErrorKind::BrokenPipe => {
+            eprintln!("error: standard output: {reason}\n  way out: write to another disk, or free space on this one");
+            OUTPUT_LOST.store(true, Ordering::Relaxed);
+        }
+        _ => {}
+    }
 }
+
+/// True once standard output has lost something.
+static OUTPUT_LOST: AtomicBool = AtomicBool::new(false);
 
 /// Becomes true with Ctrl-C; a second Ctrl-C ends the program at once.
 fn until_interrupted() -> Arc<AtomicBool> {
@@ -431,6 +457,12 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
             print(commands::adapters()?.trim_end());
             Ok(0)
         }
+        Some(Command::CompareAdapters(args)) => {
+            let options = CompareOptions { scene: args.scene, overrides: args.overrides };
+            let table = commands::compare_adapters::compare_adapters(&options)?;
+            print(if args.json { table.json() } else { table.table() }.trim_end());
+            Ok(u8::from(table.is_broken()))
+        }
         Some(Command::Schema) => {
             let text = serde_json::to_string_pretty(&Scene::schema());
             print(&text.map_err(|e| Error::input(e.to_string(), "report this as a defect"))?);
@@ -448,6 +480,7 @@ fn main() -> ExitCode {
     }
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error,wgpu_hal=off")).init();
     match dispatch(Cli::parse(), start) {
+        Ok(0) if OUTPUT_LOST.load(Ordering::Relaxed) => ExitCode::from(1),
         Ok(code) => ExitCode::from(code),
         Err(error) => {
             match &error {

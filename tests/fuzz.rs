@@ -1,6 +1,9 @@
-//! Scenes, overrides and checkpoints that were damaged at random: a clear message or a sane run, never a panic, a hang or a
-//! greedy allocation. `FUZZ_CASES` sets the number of scenes (default 10,000). Meshes: tests/mesh_import/damage.rs.
+//! Files that were damaged at random: a clear message or a sane run, never a panic, a hang or a greedy allocation. Scenes go on to
+//! their mesh and first frames, every other reader of `stylet::untrusted` as far as the fuzz targets in `fuzz/` go, whose bodies
+//! are the same. `FUZZ_CASES` sets the number of scenes (default 10,000); each reader gets a quarter as many files. More on meshes: tests/mesh_import/damage.rs.
 
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -10,6 +13,10 @@ use stylet::mesh::BlockMesh;
 use stylet::output::checkpoint::RunCheckpoint;
 use stylet::scene::Scene;
 use stylet::solver::simulation::{EngineChoice, Simulation};
+use stylet::study::plan::{Basis, Costs, MeshSize, Plan, choose};
+use stylet::study::store::RunRecord;
+use stylet::study::{Axis, Engine, Settings};
+use stylet::untrusted::{READERS, Reader};
 
 /// Longest time for reading one scene and laying its mesh.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -19,6 +26,68 @@ const MEMORY: u64 = 3 << 30;
 
 /// Scenes with at most this many cells are run for a few frames.
 const FEW_CELLS: usize = 2500;
+
+thread_local! {
+    /// Memory that this thread has taken and not given back, and the most of it since the last reset [B].
+    static TAKEN: Cell<isize> = const { Cell::new(0) };
+    static MOST: Cell<isize> = const { Cell::new(0) };
+}
+
+/// The allocator of the system, which counts what each thread takes.
+struct Counting;
+
+fn count(bytes: isize) {
+    // A thread that ends has no counters any more.
+    let _ = TAKEN.try_with(|taken| {
+        taken.set(taken.get() + bytes);
+        MOST.try_with(|most| most.set(most.get().max(taken.get())))
+    });
+}
+
+// SAFETY: every call goes to the allocator of the system unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count(layout.size() as isize);
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        count(layout.size() as isize);
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        count(-(layout.size() as isize));
+        unsafe { System.dealloc(block, layout) }
+    }
+
+    unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // Both blocks are there while it is copied.
+        count(size as isize);
+        count(-(layout.size() as isize));
+        unsafe { System.realloc(block, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// What `work` gives, and the most memory that this thread took meanwhile [B].
+fn measured<T>(work: impl FnOnce() -> T) -> (T, usize) {
+    let before = TAKEN.get();
+    MOST.set(before);
+    let done = work();
+    (done, (MOST.get() - before).max(0) as usize)
+}
+
+/// Number of cases.
+fn cases() -> u64 {
+    std::env::var("FUZZ_CASES").ok().and_then(|v| v.parse().ok()).unwrap_or(10_000)
+}
+
+fn repository() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
 
 /// xorshift64*: the same cases everywhere.
 struct Random(u64);
@@ -130,9 +199,9 @@ fn assert_clear(error: &Error, case: &str) {
 
 #[test]
 fn damaged_scenes_load_or_say_why() {
-    let cases: u64 = std::env::var("FUZZ_CASES").ok().and_then(|v| v.parse().ok()).unwrap_or(10_000);
+    let cases = cases();
     let mut paths = Vec::new();
-    scenes(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes"), &mut paths);
+    scenes(&repository().join("scenes"), &mut paths);
     let texts: Vec<String> = paths.iter().map(|p| std::fs::read_to_string(p).unwrap()).collect();
     assert!(texts.len() > 30);
     let folder = tempfile::tempdir().unwrap();
@@ -202,7 +271,7 @@ fn damaged_scenes_load_or_say_why() {
 
 #[test]
 fn damaged_overrides_are_refused_or_taken() {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes/muscle_biopsy.toml");
+    let path = repository().join("scenes/muscle_biopsy.toml");
     let keys = [
         "tissue.cell_size_mm",
         "motion.phase.0.depth_mm",
@@ -230,14 +299,278 @@ fn damaged_overrides_are_refused_or_taken() {
     }
 }
 
-#[test]
-fn damaged_checkpoints_are_refused() {
+/// Sample files of every reader, whole ones.
+fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
+    let files = |folder: &str, extension: &str| -> Vec<Vec<u8>> {
+        let entries = std::fs::read_dir(repository().join(folder)).unwrap().map(|e| e.unwrap().path());
+        let mut paths: Vec<PathBuf> = entries.filter(|p| p.extension().is_some_and(|e| e == extension)).collect();
+        paths.sort();
+        paths.iter().map(|p| std::fs::read(p).unwrap()).collect()
+    };
+    let settings = Settings {
+        cell_size_mm: 0.6,
+        mass_scaling: 4000.0,
+        safety: 0.8,
+        engine: Engine::Gpu,
+        effects: ["mass_scaling", "puncture"].map(String::from).to_vec(),
+        repetition: 0,
+    };
+    match reader.name {
+        "scene" => ["scenes", "scenes/hard", "scenes/effects"].iter().flat_map(|f| files(f, "toml")).collect(),
+        "overrides" => vec![
+            b"tissue.cell_size_mm=0.8\nneedle.gauge=18G\nmotion.phase.0.depth_mm=5".to_vec(),
+            b"outputs.pictures_at_depth_mm=[1.0, 2.0]\nsolver.frame_rate_hz=30".to_vec(),
+            b"effects=[\"puncture\"]\nmotion.phase.3={kind=\"hold\",duration_s=1}".to_vec(),
+        ],
+        "materials" => vec![std::fs::read(repository().join("assets/materials.toml")).unwrap()],
+        "gmsh" => files("tests/meshes", "msh"),
+        "vtk" => files("tests/meshes", "vtk"),
+        "vtu" => files("tests/meshes", "vtu"),
+        "abaqus" => files("tests/meshes", "inp"),
+        "checkpoint" => vec![checkpoint.0.clone()],
+        "checkpoint_message" => vec![checkpoint.1.clone()],
+        "curves" => files("assets/curves", "csv"),
+        "run_table" => vec![
+            b"time_s,depth_m,phase,axial_force_n\n0.1,0.001,0,0.2\n0.2,0.002,0,0.4\n0.3,0.0015,1,-0.1\n".to_vec(),
+            b"depth_m,axial_force_n\n1e-3,\n2e-3,0.5\n".to_vec(),
+        ],
+        "study_plan" => {
+            let basis = Basis { base: &settings, duration_s: 6.0, frame_rate: 60.0, has_block: true, variants: &[] };
+            let mut size = |edge: f64| Ok(MeshSize { cells: (7000.0 / edge) as u64, unit_step_s: 8e-6 * edge });
+            let choice = choose(&basis, &Axis::ALL, 600.0, &Costs::assumed(), &mut size).unwrap();
+            let plan = Plan {
+                scene: "s".into(),
+                title: "t".into(),
+                scene_hash: "0".into(),
+                overrides: vec!["a=1".into()],
+                version: "1".into(),
+                axes: Axis::ALL.to_vec(),
+                budget_s: 600.0,
+                base: settings.clone(),
+                costs: Costs::assumed(),
+                runs: choice.runs,
+                spare: choice.spare,
+                left_out: choice.left_out,
+                asked_finest_mm: 0.0,
+                finest_mm: 0.0,
+                unfit: Vec::new(),
+                given_up: Vec::new(),
+                skipped: Vec::new(),
+                changes: Vec::new(),
+            };
+            vec![serde_json::to_vec_pretty(&plan).unwrap()]
+        }
+        "study_run" => {
+            let run = RunRecord {
+                settings: Some(settings),
+                cells: 10,
+                steps: 20,
+                cpu_s: Some(1.0),
+                depth_m: vec![0.0, 1e-3],
+                force_n: vec![0.0, 0.5],
+                displacement_m: vec![[0.0, 1e-6, 0.0]; 3],
+                ..Default::default()
+            };
+            vec![serde_json::to_vec_pretty(&run).unwrap()]
+        }
+        other => panic!("no sample for the reader {other}"),
+    }
+}
+
+/// Changes bytes at one to four places, as `damage` does text: single bytes, pieces, numbers of two, four and eight bytes.
+fn damage_bytes(whole: &[u8], other: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bytes = whole.to_vec();
+    for _ in 0..1 + random.below(4) {
+        if bytes.is_empty() {
+            return bytes;
+        }
+        // Counts and kinds stand at the beginning.
+        let reach = if random.below(2) == 0 { bytes.len().min(600) } else { bytes.len() };
+        let at = random.below(reach);
+        match random.below(7) {
+            0 => bytes[at] = random.next() as u8,
+            1 => bytes[at] ^= 1 << random.below(8),
+            2 => bytes.truncate(at),
+            3 => drop(bytes.drain(at..(at + 1 + random.below(40)).min(bytes.len()))),
+            4 => {
+                let source = if random.below(2) == 0 { whole } else { other };
+                let from = random.below(source.len());
+                let piece = source[from..(from + 1 + random.below(300)).min(source.len())].to_vec();
+                bytes.splice(at..at, piece);
+            }
+            5 => {
+                let value = *random.of(&[0, 1, 0x7f, 0xff, 0x7fff_ffff, 0xffff_ffff, 1 << 40, u64::MAX >> 1, u64::MAX]);
+                let width = *random.of(&[2, 4, 8]);
+                let word = if random.below(2) == 0 { value.to_le_bytes() } else { value.rotate_left(32).to_be_bytes() };
+                for (slot, byte) in bytes[at..].iter_mut().zip(&word[..width]) {
+                    *slot = *byte;
+                }
+            }
+            _ => {
+                // A number in text becomes another one.
+                let number = |b: &u8| b.is_ascii_digit() || *b == b'.' || *b == b'-';
+                let Some(from) = bytes[at..].iter().position(number).map(|n| at + n) else { continue };
+                let to = bytes[from..].iter().position(|b| !number(b)).map_or(bytes.len(), |n| from + n);
+                bytes.splice(from..to, random.of(&VALUES).bytes());
+            }
+        }
+    }
+    bytes
+}
+
+/// The file of a checkpoint after one frame, and the message in it.
+fn sample_checkpoint() -> (Vec<u8>, Vec<u8>) {
     let folder = tempfile::tempdir().unwrap();
-    let scene = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes/effects/gravity.toml");
+    let path = folder.path().join("checkpoint.stylet");
+    let whole = first_checkpoint();
+    whole.write(&path).unwrap();
+    (std::fs::read(&path).unwrap(), postcard::to_allocvec(&whole).unwrap())
+}
+
+#[test]
+fn every_reader_keeps_its_promises() {
+    let checkpoint = sample_checkpoint();
+    let each = cases().div_ceil(4);
+    for (number, reader) in READERS.iter().enumerate() {
+        let (begin, seeds) = (Instant::now(), seeds(reader, &checkpoint));
+        let mut random = Random(0x5717_1e57 + number as u64);
+        let (mut most, mut taken, mut slowest) = (0.0_f64, 0, Duration::ZERO);
+        for (n, seed) in seeds.iter().enumerate() {
+            let (meant, bytes) = measured(|| reader.survives(seed));
+            // A scene may name a mesh beside itself, which is not there.
+            assert!(meant || reader.name == "scene", "{}: whole sample {n} is refused", reader.name);
+            assert!(bytes <= reader.memory(seed.len()), "{}: {bytes} B for sample {n}", reader.name);
+        }
+        for case in 0..each {
+            let (whole, other) = (random.of(&seeds).clone(), random.of(&seeds).clone());
+            let bytes = damage_bytes(&whole, &other, &mut random);
+            let start = Instant::now();
+            let outcome = catch_unwind(|| measured(|| reader.survives(&bytes)));
+            let Ok((meant, memory)) = outcome else {
+                panic!(
+                    "{}, case {case}: panic for {}",
+                    reader.name,
+                    String::from_utf8_lossy(&bytes[..bytes.len().min(4000)])
+                );
+            };
+            taken += u64::from(meant);
+            slowest = slowest.max(start.elapsed());
+            assert!(slowest < PATIENCE, "{}, case {case}: {:.1} s", reader.name, slowest.as_secs_f64());
+            let bound = reader.memory(bytes.len());
+            assert!(memory <= bound, "{}, case {case}: {memory} B of {bound} B for {} B", reader.name, bytes.len());
+            most = most.max(memory as f64 / bound as f64);
+        }
+        println!(
+            "{}: {each} cases of {} samples, {taken} taken, at most {:.0} % of the memory bound, slowest {:.0} ms, {:.1} s",
+            reader.name,
+            seeds.len(),
+            100.0 * most,
+            slowest.as_secs_f64() * 1e3,
+            begin.elapsed().as_secs_f64()
+        );
+        assert!(taken < each, "{}: no damage is ever found", reader.name);
+    }
+}
+
+/// The counter counts: a bound that is too small would be noticed.
+#[test]
+fn memory_is_measured() {
+    let (block, bytes) = measured(|| vec![1_u8; 1 << 20]);
+    assert!((1 << 20..(1 << 20) + 4096).contains(&bytes), "{bytes}");
+    let ((), bytes) = measured(|| drop(block));
+    assert_eq!(bytes, 0);
+    // A vector that grows is there twice.
+    let (_, bytes) = measured(|| {
+        let mut block = vec![0_u8; 1 << 20];
+        block.reserve_exact(1 << 20);
+    });
+    assert!(bytes >= 3 << 20, "{bytes}");
+}
+
+/// Files whose few bytes ask for much: sets that name everything again and again, and streams that unpack to a thousandfold.
+#[test]
+fn short_files_cannot_ask_for_much() {
+    let named = |name: &str| Reader::named(name).unwrap();
+    let mut inp = String::from("*NODE\n");
+    for n in 1..=2000 {
+        inp += &format!("{n}, {}, {}, {}\n", n % 10, n / 10 % 10, n / 100);
+    }
+    inp += "*ELEMENT, TYPE=C3D4\n1, 1, 2, 11, 101\n";
+    for n in 0..2000 {
+        inp += &format!("*NSET, NSET=s{n}, GENERATE\n1, 2000, 1\n");
+    }
+    let mut msh = String::from("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 0\n1 0 0 0 1 1 1 3000 ");
+    msh += &(1..=3000).map(|n| format!("{n} ")).collect::<String>();
+    msh += "0\n$EndEntities\n$Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n0 0 0\n1 0 0\n0 1 0\n$EndNodes\n$Elements\n1 3000 1 3000\n2 1 2 3000\n";
+    msh += &(1..=3000).map(|n| format!("{n} 1 2 3\n")).collect::<String>();
+    msh += "$EndElements\n";
+    for (name, text) in [("abaqus", inp), ("gmsh", msh)] {
+        let (meant, bytes) = measured(|| named(name).survives(text.as_bytes()));
+        assert!(!meant && bytes <= named(name).memory(text.len()), "{name}: {bytes} B for {} B", text.len());
+    }
+    // The finest cells in the largest block: refused, and the lines of its grid are all that was ever there.
+    let text = std::fs::read_to_string(repository().join("scenes/effects/gravity.toml")).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    for line in &mut lines {
+        match line.split('=').next().unwrap().trim() {
+            "size_mm" => *line = "size_mm = [1000.0, 1000.0, 1000.0]",
+            "cell_size_mm" => *line = "cell_size_mm = 0.001",
+            _ => {}
+        }
+    }
+    let text = lines.join("\n");
+    let (meant, bytes) = measured(|| named("scene").survives(text.as_bytes()));
+    assert!(!meant && bytes > 20 << 20 && bytes <= named("scene").memory(text.len()), "{bytes} B");
+    let mut bomb = b"stylet checkpoint 1\n".to_vec();
+    let mut encoder = flate2::write::ZlibEncoder::new(&mut bomb, flate2::Compression::best());
+    std::io::Write::write_all(&mut encoder, &vec![0xff; 64 << 20]).unwrap();
+    encoder.finish().unwrap();
+    let (meant, bytes) = measured(|| named("checkpoint").survives(&bomb));
+    assert!(!meant && bytes <= named("checkpoint").memory(bomb.len()), "{bytes} B for {} B", bomb.len());
+}
+
+/// A damaged checkpoint that can be read all the same does not bring down the run that goes on from it.
+#[test]
+fn damaged_checkpoints_are_resumed_or_refused() {
+    let whole = postcard::to_allocvec(&first_checkpoint()).unwrap();
+    let scene = || Scene::load(&repository().join("scenes/effects/gravity.toml"), &[]).unwrap();
+    let mut random = Random(31);
+    let (mut read, mut resumed) = (0, 0);
+    for case in 0..2000 {
+        let bytes = damage_bytes(&whole, &whole, &mut random);
+        let Ok(found) = RunCheckpoint::from_message(Path::new("checkpoint.stylet"), &bytes) else { continue };
+        read += 1;
+        if read > 40 {
+            break;
+        }
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            let mut simulation = Simulation::new(scene(), EngineChoice::Cpu).unwrap();
+            match simulation.resume(&found.simulation) {
+                Err(error) => {
+                    assert_clear(&error, &format!("case {case}"));
+                    false
+                }
+                Ok(()) => {
+                    if let Err(error) = simulation.next_frame() {
+                        assert_clear(&error, &format!("case {case}"));
+                    }
+                    true
+                }
+            }
+        }));
+        resumed += usize::from(outcome.unwrap_or_else(|_| panic!("case {case}: panic")));
+    }
+    println!("{read} damaged checkpoints read, {resumed} resumed");
+    assert!(read > 10, "{read}");
+}
+
+/// The scene `gravity` on the CPU engine after its first frame.
+fn first_checkpoint() -> RunCheckpoint {
+    let scene = repository().join("scenes/effects/gravity.toml");
     let mut simulation = Simulation::new(Scene::load(&scene, &[]).unwrap(), EngineChoice::Cpu).unwrap();
     simulation.stop_after(0);
     let records = vec![simulation.next_frame().unwrap().unwrap()];
-    let whole = RunCheckpoint {
+    RunCheckpoint {
         version: env!("CARGO_PKG_VERSION").into(),
         scene,
         overrides: Vec::new(),
@@ -249,7 +582,13 @@ fn damaged_checkpoints_are_refused() {
         wall: 0.0,
         cpu: None,
         simulation: simulation.checkpoint().unwrap(),
-    };
+    }
+}
+
+#[test]
+fn damaged_checkpoints_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = first_checkpoint();
     let path = folder.path().join("checkpoint.stylet");
     whole.write(&path).unwrap();
     assert!(RunCheckpoint::read(&path).is_ok());

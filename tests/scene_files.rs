@@ -6,7 +6,9 @@ use proptest::prelude::*;
 use stylet::Error;
 use stylet::material::{Isochoric, Verdict};
 use stylet::mesh::BlockMesh;
+use stylet::observables::{FrameRecord, TargetRecord};
 use stylet::scene::{FaceDrive, RegionShape, Scene, presets};
+use stylet::solver::simulation::{EngineChoice, Simulation};
 
 fn repository() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -316,6 +318,75 @@ fn the_cell_size_that_a_refusal_offers_is_accepted() {
     let message = refusal(&main_scene(), &["tissue.cell_size_mm=0.02"]);
     let offered = message.split("cell_size_mm of ").nth(1).unwrap().split_whitespace().next().unwrap();
     Scene::load(&main_scene(), &[format!("tissue.cell_size_mm={offered}")]).unwrap();
+}
+
+/// What would be kept in memory has a bound: the steps of a frame and the records of all frames.
+#[test]
+fn absurd_numbers_of_steps_and_frames() {
+    let block = |solver: &str| {
+        let text = BLOCK.replace("duration_s = 1.0", solver);
+        load_text(&format!("{text}\n{MATERIAL}"), &[])
+    };
+    let refused = |solver: &str, marker: &str, expected: &[&str]| {
+        let text = BLOCK.replace("duration_s = 1.0", solver);
+        let line = 1 + text.lines().position(|l| l.contains(marker)).expect("marker is in the text");
+        let message = block(solver).expect_err(solver);
+        assert!(message.contains(&format!("scene.toml:{line}:")), "no scene.toml:{line} in\n{message}");
+        for expected in expected {
+            assert!(message.contains(expected), "no `{expected}` in\n{message}");
+        }
+        message
+    };
+    refused(
+        "duration_s = 1.0\ntime_step_us = 1e-9",
+        "time_step_us",
+        &["1.667e13 steps", "at most 50000", "leave time_step_us away"],
+    );
+    refused("duration_s = 1.0\ntime_step_us = 1e-300", "time_step_us", &["steps", "way out"]);
+    // What the message offers is accepted, what is a little less is not.
+    let message =
+        refused("duration_s = 9.0\ntime_step_us = 8.0\nframe_rate_hz = 0.1", "time_step_us", &["1.250e6 steps"]);
+    let offered = |mark: &str| -> f64 {
+        let word = message.split(mark).nth(1).unwrap().split_whitespace().next().unwrap();
+        word.trim_end_matches(',').parse().unwrap()
+    };
+    let (step, rate) = (offered("write at least "), offered("frame_rate_hz of at least "));
+    block(&format!("duration_s = 9.0\ntime_step_us = {step}\nframe_rate_hz = 0.1")).unwrap();
+    block(&format!("duration_s = 9.0\ntime_step_us = 8.0\nframe_rate_hz = {rate}")).unwrap();
+    refused(&format!("duration_s = 9.0\ntime_step_us = 8.0\nframe_rate_hz = {}", 0.99 * rate), "time_step_us", &[]);
+    // An hour at 100 kHz are 3.6e8 records.
+    let message = refused("duration_s = 3600\nframe_rate_hz = 1e5", "duration_s", &["3.600e8 frames", "343.3 GiB"]);
+    let rate = message.split("frame_rate_hz of at most ").nth(1).unwrap().split([',', ' ']).next().unwrap();
+    block(&format!("duration_s = 3600\nframe_rate_hz = {rate}")).unwrap();
+    // With a tool the phases make the length of the run.
+    assert_refused(
+        &[("speed_mm_s = 2.0", "speed_mm_s = 1e-6")],
+        "[[motion.phase]]",
+        &["frames", "faster or shorter phases"],
+    );
+    // The step that is computed instead.
+    let scene =
+        Scene::load(&main_scene(), &["solver.frame_rate_hz=0.1".into(), "solver.mass_scaling=1".into()]).unwrap();
+    let error = Simulation::new(scene, EngineChoice::Cpu).map(drop).unwrap_err();
+    let message = error.to_string();
+    assert!(
+        error.exit_code() == 2 && message.contains("muscle_biopsy.toml") && message.contains("at most 50000"),
+        "{message}"
+    );
+    let rate = message.split("frame_rate_hz to ").nth(1).unwrap().split_whitespace().next().unwrap();
+    let scene =
+        Scene::load(&main_scene(), &[format!("solver.frame_rate_hz={rate}"), "solver.mass_scaling=1".into()]).unwrap();
+    Simulation::new(scene, EngineChoice::Cpu).unwrap();
+    assert!(size_of::<FrameRecord>() <= stylet::scene::RECORD_BYTES);
+    assert!(size_of::<TargetRecord>() <= stylet::scene::RECORD_BYTES_PER_TARGET);
+}
+
+/// A device never ends; nobody waits for it.
+#[cfg(unix)]
+#[test]
+fn a_device_is_no_library() {
+    let message = refusal(&main_scene(), &["material.library=\"/dev/zero\""]);
+    assert!(message.contains("/dev/zero is a device or a pipe"), "{message}");
 }
 
 #[test]

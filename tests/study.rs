@@ -388,22 +388,39 @@ fn a_killed_study_goes_on_from_its_finished_runs() {
     }
 }
 
+/// Whether `parallel` is GNU parallel; moreutils has another program of that name.
+///
+/// Panics with `REQUIRE_PARALLEL=1` where it is not.
+fn has_parallel() -> bool {
+    let version = Command::new("parallel").arg("--version").stdin(Stdio::null()).output();
+    let found = version.is_ok_and(|v| String::from_utf8_lossy(&v.stdout).contains("GNU parallel"));
+    let required = std::env::var("REQUIRE_PARALLEL").is_ok_and(|v| v == "1");
+    assert!(found || !required, "REQUIRE_PARALLEL=1, but GNU parallel is not installed (scripts/setup.sh parallel)");
+    found
+}
+
 /// Parts by GNU parallel where it is installed, else one after the other.
 fn run_parts(place: &Place, of: usize) {
-    let program = Command::cargo_bin("stylet").unwrap().get_program().to_owned();
-    let version = Command::new("parallel").arg("--version").stdin(Stdio::null()).output();
     let numbers: Vec<String> = (1..=of).map(|k| k.to_string()).collect();
-    if version.is_ok_and(|v| String::from_utf8_lossy(&v.stdout).contains("GNU parallel")) {
-        let line =
-            format!("{} study tiny.toml {} --shard {{}}/{of} --out part_{{}}", program.display(), SHORT.join(" "));
+    if has_parallel() {
+        // The way of the README: one word after another, which parallel puts together to a line for the shell.
+        let program = Command::cargo_bin("stylet").unwrap().get_program().to_owned();
         let output = Command::new("parallel")
             .current_dir(place.folder.path())
-            .args(["-j", "2", &line, ":::"])
+            .args(["--quote", "--joblog", "jobs.tsv", "-j", "2"])
+            .arg(program)
+            .args(["study", "tiny.toml"])
+            .args(SHORT)
+            .args(["--shard", &format!("{{}}/{of}"), "--out", "part_{}", ":::"])
             .args(&numbers)
             .stdin(Stdio::null())
             .output()
             .unwrap();
         succeeded(&output);
+        // Every part was a job of its own that ended well: column 7 is the exit code.
+        let log = std::fs::read_to_string(place.path("jobs.tsv")).unwrap();
+        let codes: Vec<&str> = log.lines().skip(1).filter_map(|line| line.split('\t').nth(6)).collect();
+        assert_eq!(codes, vec!["0"; of], "{log}");
     } else {
         println!("GNU parallel is not installed: the parts run one after the other");
         for k in &numbers {

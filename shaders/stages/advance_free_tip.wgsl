@@ -163,7 +163,7 @@ fn move_tip() {
     let known = free_index(here.cell) < puncture.path_cell_count && index < puncture.path_cell_count;
     let cell = min(index, puncture.path_cell_count - 1u);
     let word = select(free_cells[cell].marked_low, free_cells[cell].marked_high, bit >= 32u);
-    let open = known && (word >> (bit & 31u) & 1u) == 1u;
+    let open = known && ((word >> (bit & 31u)) & 1u) == 1u;
     let material = select(free_tip.material, free_cells[cell].material, known);
     var entry = select(free_tip.entry, free_tip.coordinate, material != free_tip.material);
     let forces = puncture.segments[material];

@@ -162,14 +162,30 @@ pub fn read_curves(files: &[PathBuf]) -> Result<Curves> {
                 "check the name; a curve is a CSV file, see `stylet fit --help`",
             )
         })?;
-        let text = String::from_utf8(bytes).map_err(|_| {
-            Error::input(
-                format!("{}: is not text in UTF-8", path.display()),
-                "export the table as CSV in UTF-8 (a spreadsheet file such as .xlsx is none)",
-            )
-        })?;
-        read_table(path, &text, &mut curves)?;
+        read_bytes(path, bytes, &mut curves)?;
     }
+    enough(curves, files)
+}
+
+/// Reads the points of one file from its bytes; `path` stands for it in messages.
+pub fn parse_curves(path: &Path, bytes: Vec<u8>) -> Result<Curves> {
+    let mut curves = Curves::default();
+    read_bytes(path, bytes, &mut curves)?;
+    enough(curves, &[path.to_path_buf()])
+}
+
+fn read_bytes(path: &Path, bytes: Vec<u8>, curves: &mut Curves) -> Result<()> {
+    let text = String::from_utf8(bytes).map_err(|_| {
+        Error::input(
+            format!("{}: is not text in UTF-8", path.display()),
+            "export the table as CSV in UTF-8 (a spreadsheet file such as .xlsx is none)",
+        )
+    })?;
+    read_table(path, &text, curves)
+}
+
+/// The points, if they are enough for a fit.
+fn enough(curves: Curves, files: &[PathBuf]) -> Result<Curves> {
     let away = curves.points.iter().filter(|p| p.x != p.mode.at_rest());
     if away.clone().count() < FEWEST_POINTS {
         return Err(Error::input(

@@ -187,11 +187,19 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         eprintln!("note: {notice}");
     }
     let folder = run.output.path().to_path_buf();
-    if status == Status::Interrupted && run.output.file(folder::CHECKPOINT).exists() {
+    let interrupted = status == Status::Interrupted;
+    let checkpoint = run.output.file(folder::CHECKPOINT);
+    let (summary, missing) = run.finish(status, first_step_ms);
+    // What stopped the run comes first, then what of its results could not be written.
+    let mut errors = failure.into_iter().chain(missing);
+    let first = errors.next();
+    for error in errors {
+        eprintln!("warning: {error}");
+    }
+    if (interrupted || matches!(first, Some(Error::File { .. }))) && checkpoint.exists() {
         eprintln!("go on with: stylet run --resume {}", folder.display());
     }
-    let summary = run.finish(status, first_step_ms)?;
-    match failure {
+    match first {
         Some(error) => {
             eprintln!("results up to the failure are in {}", folder.display());
             Err(error)
@@ -216,13 +224,14 @@ impl<'a> Run<'a> {
         let info = simulation.engine().info().clone();
         eprintln!("{}: {} on {} ({})", scene.name, info.engine, info.adapter, info.driver);
         let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
-        let tables = Tables::create(&output, &driven, simulation.model.has_bore(), &scene.targets)?;
+        let records = resumed.map_or(&[][..], |(checkpoint, _)| &checkpoint.records);
+        let tables = Tables::with_records(&output, &driven, simulation.model.has_bore(), &scene.targets, records)?;
         let mut run = Run {
             moments: moments(&simulation),
             fields: FieldFiles::new(&output),
             device: simulation.device().cloned(),
             clock: Clock::start((0.0, Some(0.0))),
-            records: Vec::new(),
+            records: records.to_vec(),
             cells_in_needle: None,
             images: VecDeque::new(),
             halvings: 0,
@@ -245,7 +254,6 @@ impl<'a> Run<'a> {
             run.fields = FieldFiles::resumed(&run.output, checkpoint.fields.clone());
             run.cells_in_needle = checkpoint.cells_in_needle;
             run.clock = Clock::start((checkpoint.wall, checkpoint.cpu));
-            run.keep_records(checkpoint.records.clone())?;
         }
         run.plan_stops();
         run.keep_image()?;
@@ -254,10 +262,10 @@ impl<'a> Run<'a> {
 
     /// Starts the tables anew with these records.
     fn keep_records(&mut self, records: Vec<FrameRecord>) -> Result<()> {
-        self.tables =
-            Tables::create(&self.output, &self.driven, self.simulation.model.has_bore(), &self.scene.targets)?;
+        let hollow = self.simulation.model.has_bore();
+        self.tables = Tables::with_records(&self.output, &self.driven, hollow, &self.scene.targets, &records)?;
         self.records = records;
-        self.records.iter().try_for_each(|record| self.tables.append(record))
+        Ok(())
     }
 
     /// Tells the simulation after which frames its state will be read.
@@ -349,17 +357,30 @@ impl<'a> Run<'a> {
         if self.output.path().ends_with(FORENSICS) {
             return Err(error);
         }
-        let finding = self.simulation.investigate(&image, frame)?;
+        let finding = match self.simulation.investigate(&image, frame) {
+            Ok(finding) => finding,
+            Err(reason) => {
+                eprintln!("warning: no forensics, the steps before the failure could not be repeated: {reason}");
+                return Err(error);
+            }
+        };
         let (checkpoint, model) = (self.checkpoint(image), self.simulation.model.clone());
         match write_forensics(&self.output, &model, &finding, &text, &checkpoint, self.device.as_ref()) {
-            Ok(folder) => eprintln!("where it began, and how to see it again: {}", folder.display()),
+            Ok((folder, missing)) if missing.is_empty() => {
+                eprintln!("where it began, and how to see it again: {}", folder.display());
+            }
+            Ok((folder, missing)) => {
+                eprintln!("warning: the forensics in {} are not complete", folder.display());
+                missing.iter().for_each(|reason| eprintln!("warning: {reason}"));
+            }
             Err(reason) => eprintln!("warning: no forensics: {reason}"),
         }
         Err(error)
     }
 
-    /// Writes charts and summary.
-    fn finish(self, status: Status, first_step_ms: Option<f64>) -> Result<Summary> {
+    /// Writes charts and summary; returns what could not be written. The checkpoint of a run that has ended well is removed once
+    /// all is written.
+    fn finish(self, status: Status, first_step_ms: Option<f64>) -> (Summary, Vec<Error>) {
         let (wall, cpu) = (self.clock.wall(), self.clock.cpu());
         let mesh = &self.simulation.model.mesh;
         let steps = self.records.last().map_or(0, |r| r.step);
@@ -395,21 +416,28 @@ impl<'a> Run<'a> {
         summary.take_frames(records);
         summary.take_sample(&self.driven, records);
         summary.targets = TargetFigures::of_run(&scene.targets, records);
+        let mut written = Vec::new();
         if !records.is_empty() {
             let figures = CurveFigures::from_records(records);
-            write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, records, &figures)?;
+            written.push(write_force_chart(&output.file(folder::FORCE_CHART), &scene.title, records, &figures));
             if scene.tool.is_some() {
-                write_parts_chart(&output.file(folder::FORCE_PARTS_CHART), &scene.title, records)?;
+                written.push(write_parts_chart(&output.file(folder::FORCE_PARTS_CHART), &scene.title, records));
             }
             if !self.driven.is_empty() {
-                write_sample_chart(&output.file(folder::SAMPLE_CHART), &scene.title, &self.driven, records)?;
+                let chart = output.file(folder::SAMPLE_CHART);
+                written.push(write_sample_chart(&chart, &scene.title, &self.driven, records));
             }
         }
-        summary.write(&output.file(folder::SUMMARY))?;
+        written.push(summary.write(&output.file(folder::SUMMARY)));
+        let mut missing: Vec<Error> = written.into_iter().filter_map(Result::err).collect();
         let checkpoint = output.file(folder::CHECKPOINT);
         // A replay of a failure may be wanted again.
-        if summary.status == Status::Ok && checkpoint.exists() && !output.path().ends_with(FORENSICS) {
-            std::fs::remove_file(&checkpoint).map_err(|source| Error::file(&checkpoint, source))?;
+        let done = summary.status == Status::Ok && missing.is_empty() && !output.path().ends_with(FORENSICS);
+        if done
+            && checkpoint.exists()
+            && let Err(source) = std::fs::remove_file(&checkpoint)
+        {
+            missing.push(Error::file(&checkpoint, source));
         }
         if summary.raised_mass_share > 0.2 {
             eprintln!(
@@ -426,7 +454,7 @@ impl<'a> Run<'a> {
                 folder::ENERGY_TABLE
             );
         }
-        Ok(summary)
+        (summary, missing)
     }
 }
 

@@ -92,6 +92,14 @@ impl Gpu {
                 },
             });
         };
+        Self::of_adapter(adapter)
+    }
+
+    /// Opens this adapter.
+    ///
+    /// # Errors
+    /// `Error::Adapter` where it does not offer what the engine needs.
+    pub fn of_adapter(adapter: &wgpu::Adapter) -> Result<Self> {
         let info = adapter.get_info();
         // Exactly the default limits: what a software adapter offers beyond them must not be relied on.
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {

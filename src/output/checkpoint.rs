@@ -47,6 +47,13 @@ pub fn fingerprint(scene: &Scene) -> u64 {
     hasher.finish()
 }
 
+fn damaged(path: &Path, reason: impl std::fmt::Display) -> Error {
+    Error::input(
+        format!("{} is no checkpoint of this program: {reason}", path.display()),
+        "start the run anew with --force",
+    )
+}
+
 impl RunCheckpoint {
     /// Writes the file, whole or not at all.
     ///
@@ -64,27 +71,34 @@ impl RunCheckpoint {
     /// # Errors
     /// `Error::Input` for a file that is missing, damaged or of another version.
     pub fn read(path: &Path) -> Result<Self> {
-        let place = path.display();
         let bytes = std::fs::read(path).map_err(|reason| {
             Error::input(
-                format!("there is no checkpoint {place}: {reason}"),
+                format!("there is no checkpoint {}: {reason}", path.display()),
                 "name the folder of a run that was stopped; a run that has ended keeps none",
             )
         })?;
-        let damaged = |reason: String| {
-            Error::input(
-                format!("{place} is no checkpoint of this program: {reason}"),
-                "start the run anew with --force",
-            )
-        };
+        Self::from_bytes(path, &bytes)
+    }
+
+    /// The same from the bytes of a file; `path` stands for it in messages.
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
         let Some(packed) = bytes.strip_prefix(MAGIC) else {
-            return Err(damaged("it does not begin like one".into()));
+            return Err(damaged(path, "it does not begin like one"));
         };
         let mut message = Vec::new();
-        ZlibDecoder::new(packed).read_to_end(&mut message).map_err(|e| damaged(e.to_string()))?;
-        let found: Self = postcard::from_bytes(&message).map_err(|e| damaged(e.to_string()))?;
+        ZlibDecoder::new(packed).read_to_end(&mut message).map_err(|e| damaged(path, e))?;
+        Self::from_message(path, &message)
+    }
+
+    /// The same from the unpacked message.
+    pub fn from_message(path: &Path, message: &[u8]) -> Result<Self> {
+        let (found, rest) = postcard::take_from_bytes::<Self>(message).map_err(|e| damaged(path, e))?;
         if found.version != env!("CARGO_PKG_VERSION") {
-            return Err(damaged(format!("version {} wrote it, this is {}", found.version, env!("CARGO_PKG_VERSION"))));
+            let (wrote, this) = (&found.version, env!("CARGO_PKG_VERSION"));
+            return Err(damaged(path, format!("version {wrote:.40} wrote it, this is {this}")));
+        }
+        if !rest.is_empty() || found.records.len() as u64 != found.simulation.frames {
+            return Err(damaged(path, "its parts do not fit together"));
         }
         Ok(found)
     }

@@ -173,10 +173,22 @@ fn not_usable(path: &Path, reason: &io::Error) -> Error {
     )
 }
 
-/// Creates and removes an empty file: permission bits alone do not tell whether a file system can be written to.
+/// What must fit on the disk before a run begins [B]: less than the tables and charts of the shortest run.
+const LEAST_SPACE: usize = 16 << 10;
+
+/// Writes and removes a small file: permission bits alone do not tell whether a file system can be written to, nor an empty file
+/// whether it is full.
 fn probe_writable(path: &Path) -> Result<()> {
     let probe = path.join(format!(".write_test_{}{UNFINISHED}", std::process::id()));
-    fs::write(&probe, b"").and_then(|()| fs::remove_file(&probe)).map_err(|reason| not_usable(path, &reason))
+    let written = fs::write(&probe, [0; LEAST_SPACE]);
+    let removed = if probe.exists() { fs::remove_file(&probe) } else { Ok(()) };
+    written.and(removed).map_err(|reason| match reason.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => Error::input(
+            format!("no room for results in {}: {reason}", path.display()),
+            "free space on that disk, raise the limit (`ulimit -f`), or give a folder on another disk with --out",
+        ),
+        _ => not_usable(path, &reason),
+    })
 }
 
 fn is_empty_folder(path: &Path) -> bool {

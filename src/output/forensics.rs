@@ -59,10 +59,11 @@ struct Told<'a> {
     replay: String,
 }
 
-/// Writes the folder and returns its path. `error`: what the run said when it stopped; `checkpoint`: where the replay begins.
+/// Writes the folder; returns its path and what could not be written, file by file. `error`: what the run said when it
+/// stopped; `checkpoint`: where the replay begins.
 ///
 /// # Errors
-/// `Error::File` where it cannot be written.
+/// `Error::File` where there can be no such folder.
 pub fn write_forensics(
     output: &OutputFolder,
     model: &Model,
@@ -70,7 +71,7 @@ pub fn write_forensics(
     error: &str,
     checkpoint: &RunCheckpoint,
     device: Option<&Gpu>,
-) -> Result<PathBuf> {
+) -> Result<(PathBuf, Vec<Error>)> {
     let folder = output.file(FORENSICS);
     fs::create_dir_all(&folder).map_err(|source| Error::file(&folder, source))?;
     let at = finding.steps.last().copied().unwrap_or_default();
@@ -91,14 +92,18 @@ pub fn write_forensics(
     };
     let json =
         serde_json::to_string_pretty(&told).map_err(|source| Error::file(folder.join(FINDING), source.into()))?;
-    checkpoint.write(&folder.join(CHECKPOINT))?;
-    whole_file::write(&folder.join(FINDING), (json + "\n").as_bytes())?;
-    whole_file::write(&folder.join(STEPS), steps_table(&finding.steps).as_bytes())?;
     let records = &checkpoint.records;
-    write_energy_table(&folder.join(ENERGIES), &records[records.len().saturating_sub(LAST_FRAMES)..])?;
-    whole_file::write(&folder.join(REPORT), report(&told, finding, checkpoint).as_bytes())?;
-    draw(&folder.join(PICTURE), model, finding, device)?;
-    Ok(folder)
+    let last = &records[records.len().saturating_sub(LAST_FRAMES)..];
+    // The small ones first: they may still fit on a disk that is almost full.
+    let written = [
+        whole_file::write(&folder.join(REPORT), report(&told, finding, checkpoint).as_bytes()),
+        whole_file::write(&folder.join(FINDING), (json + "\n").as_bytes()),
+        whole_file::write(&folder.join(STEPS), steps_table(&finding.steps).as_bytes()),
+        write_energy_table(&folder.join(ENERGIES), last),
+        draw(&folder.join(PICTURE), model, finding, device),
+        checkpoint.write(&folder.join(CHECKPOINT)),
+    ];
+    Ok((folder, written.into_iter().filter_map(Result::err).collect()))
 }
 
 fn sign_text(sign: Option<Sign>) -> &'static str {

@@ -1,14 +1,17 @@
 //! `force.csv` and `energy.csv`: one row per display frame, `sample.csv`: one per frame and driven face, `targets.csv`: one
 //! per frame and target; units in the column names.
 //!
-//! All are flushed after every row: whatever stops the program, the rows of all finished frames are on the disk.
+//! All are written to after every frame: whatever stops the program, the rows of all finished frames are on the disk. A frame
+//! that does not fit on the disk is taken back from all of them, so that they end with the same whole row.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE, TARGET_TABLE};
 use super::sample::{DrivenFace, SAMPLE_COLUMNS, SamplePoint};
 use super::target::{TARGET_COLUMNS, target_row};
+use super::whole_file;
 use crate::observables::{EnergyAccount, ForceParts, FrameRecord};
 use crate::scene::Target;
 use crate::{Error, Result};
@@ -99,23 +102,55 @@ pub struct Tables {
 #[derive(Debug)]
 struct Table {
     path: PathBuf,
-    writer: csv::Writer<File>,
+    /// Rows that are not in the file yet.
+    rows: Vec<u8>,
+    /// The file and its length [B]; `None` before it is made.
+    file: Option<(File, u64)>,
 }
 
 impl Table {
-    fn create(path: PathBuf, columns: &[&str]) -> Result<Self> {
-        let file = File::create(&path).map_err(|source| Error::file(&path, source))?;
-        let mut table = Self { path, writer: csv::Writer::from_writer(file) };
-        table.write_row(columns)?;
+    fn new<T: AsRef<[u8]>>(path: PathBuf, columns: &[T]) -> Result<Self> {
+        let mut table = Self { path, rows: Vec::new(), file: None };
+        table.row(columns)?;
         Ok(table)
     }
 
-    fn write_row<T: AsRef<[u8]>>(&mut self, fields: &[T]) -> Result<()> {
-        self.writer
-            .write_record(fields)
-            .map_err(std::io::Error::from)
-            .and_then(|()| self.writer.flush())
-            .map_err(|source| Error::file(&self.path, source))
+    /// Adds a row to those that the next call of `make` or `write` writes.
+    fn row<T: AsRef<[u8]>>(&mut self, fields: &[T]) -> Result<()> {
+        let mut writer = csv::Writer::from_writer(&mut self.rows);
+        let written = writer.write_record(fields).map_err(std::io::Error::from).and_then(|()| writer.flush());
+        written.map_err(|source| Error::file(&self.path, source))
+    }
+
+    /// Makes the file with the rows so far, whole or not at all; another one of this name stays until then.
+    fn make(&mut self) -> Result<()> {
+        whole_file::write(&self.path, &self.rows)?;
+        let file = OpenOptions::new().append(true).open(&self.path);
+        self.file = Some((file.map_err(|source| Error::file(&self.path, source))?, self.rows.len() as u64));
+        self.rows.clear();
+        Ok(())
+    }
+
+    /// Appends the rows to the file; its length grows with `keep` only.
+    fn write(&mut self) -> Result<()> {
+        let (file, _) = self.file.as_mut().expect("`make` comes first");
+        file.write_all(&self.rows).map_err(|source| Error::file(&self.path, source))
+    }
+
+    fn keep(&mut self) {
+        if let Some((_, length)) = &mut self.file {
+            *length += self.rows.len() as u64;
+        }
+        self.rows.clear();
+    }
+
+    /// Takes back what `write` wrote, a part of a row among it.
+    fn take_back(&mut self) {
+        if let Some((file, length)) = &mut self.file {
+            // The error that led here is the one to report; shortening needs no space.
+            let _ = file.set_len(*length);
+        }
+        self.rows.clear();
     }
 }
 
@@ -123,34 +158,62 @@ impl Tables {
     /// Creates the files with their header rows; that of the sample only where faces are driven, that of the core only with a
     /// hollow needle, that of the targets only where there are any.
     pub fn create(folder: &OutputFolder, driven: &[DrivenFace], hollow: bool, targets: &[Target]) -> Result<Self> {
+        Self::with_records(folder, driven, hollow, targets, &[])
+    }
+
+    /// The same with the rows of these records. A file of an earlier run is replaced in one step.
+    pub fn with_records(
+        folder: &OutputFolder,
+        driven: &[DrivenFace],
+        hollow: bool,
+        targets: &[Target],
+        records: &[FrameRecord],
+    ) -> Result<Self> {
         let sample = match driven {
             [] => None,
-            driven => Some((driven.to_vec(), Table::create(folder.file(SAMPLE_TABLE), &SAMPLE_COLUMNS)?)),
+            driven => Some((driven.to_vec(), Table::new(folder.file(SAMPLE_TABLE), &SAMPLE_COLUMNS)?)),
         };
-        let core = hollow.then(|| Table::create(folder.file(CORE_TABLE), &CORE_COLUMNS)).transpose()?;
+        let core = hollow.then(|| Table::new(folder.file(CORE_TABLE), &CORE_COLUMNS)).transpose()?;
         let targets = match targets {
             [] => None,
             targets => {
                 let names = targets.iter().map(|target| target.name.clone()).collect();
-                Some((names, Table::create(folder.file(TARGET_TABLE), &TARGET_COLUMNS)?))
+                Some((names, Table::new(folder.file(TARGET_TABLE), &TARGET_COLUMNS)?))
             }
         };
-        Ok(Self {
+        let mut tables = Self {
             core,
             sample,
             targets,
-            force: Table::create(folder.file(FORCE_TABLE), &force_columns())?,
-            energy: Table::create(folder.file(ENERGY_TABLE), &ENERGY_COLUMNS)?,
-        })
+            force: Table::new(folder.file(FORCE_TABLE), &force_columns())?,
+            energy: Table::new(folder.file(ENERGY_TABLE), &ENERGY_COLUMNS)?,
+        };
+        records.iter().try_for_each(|record| tables.rows(record))?;
+        tables.all().try_for_each(Table::make)?;
+        Ok(tables)
     }
 
-    /// Appends one row to each file, to that of the sample one per driven face, to that of the targets one per
-    /// target, and flushes them.
+    fn all(&mut self) -> impl Iterator<Item = &mut Table> {
+        let sample = self.sample.as_mut().map(|(_, table)| table);
+        let targets = self.targets.as_mut().map(|(_, table)| table);
+        [&mut self.force, &mut self.energy].into_iter().chain(self.core.as_mut()).chain(sample).chain(targets)
+    }
+
+    /// Appends one row to each file, to that of the sample one per driven face, to that of the targets one per target.
+    ///
+    /// # Errors
+    /// `Error::File` where one cannot be written; then none holds anything of this record.
     pub fn append(&mut self, record: &FrameRecord) -> Result<()> {
-        self.force.write_row(&force_row(record))?;
-        self.energy.write_row(&energy_row(record))?;
+        let written = self.rows(record).and_then(|()| self.all().try_for_each(Table::write));
+        self.all().for_each(if written.is_ok() { Table::keep } else { Table::take_back });
+        written
+    }
+
+    fn rows(&mut self, record: &FrameRecord) -> Result<()> {
+        self.force.row(&force_row(record))?;
+        self.energy.row(&energy_row(record))?;
         if let (Some(table), Some(core)) = (&mut self.core, &record.core) {
-            table.write_row(&[
+            table.row(&[
                 number(record.time),
                 number(record.depth),
                 number(record.tip_coordinate),
@@ -163,12 +226,12 @@ impl Tables {
         }
         if let Some((faces, table)) = &mut self.sample {
             for face in faces {
-                table.write_row(&sample_row(face, &face.point(record)))?;
+                table.row(&sample_row(face, &face.point(record)))?;
             }
         }
         if let Some((names, table)) = &mut self.targets {
             for (name, target) in names.iter().zip(&record.targets) {
-                table.write_row(&target_row(name, record, target))?;
+                table.row(&target_row(name, record, target))?;
             }
         }
         Ok(())
@@ -189,8 +252,9 @@ fn force_row(record: &FrameRecord) -> Vec<String> {
 /// # Errors
 /// `Error::File` where it cannot be written.
 pub fn write_energy_table(path: &Path, records: &[FrameRecord]) -> Result<()> {
-    let mut table = Table::create(path.to_path_buf(), &ENERGY_COLUMNS)?;
-    records.iter().try_for_each(|record| table.write_row(&energy_row(record)))
+    let mut table = Table::new(path.to_path_buf(), &ENERGY_COLUMNS)?;
+    records.iter().try_for_each(|record| table.row(&energy_row(record)))?;
+    table.make()
 }
 
 fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {

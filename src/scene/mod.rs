@@ -22,6 +22,13 @@ use crate::material::ElasticLaw;
 use crate::mesh::tets::TetMesh;
 use crate::{Error, Result};
 
+/// Most steps of a frame: input and commands of a step take about 3 kB, and three frames may be under way.
+pub const MOST_STEPS_PER_FRAME: u64 = 50_000;
+
+/// Upper estimate of the memory of a frame's record, and of a target's in it [B].
+pub const RECORD_BYTES: usize = 1024;
+pub const RECORD_BYTES_PER_TARGET: usize = 128;
+
 /// One simulation: what is there, what moves, what is simulated and what is written.
 #[derive(Debug, Clone)]
 pub struct Scene {
@@ -59,6 +66,11 @@ impl Scene {
     /// replace values of the file. Every error is an [`Error::Scene`] with file, line, excerpt and way out.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
         convert::load(path, overrides).map_err(Error::Scene)
+    }
+
+    /// The same with the text of the file in memory; `path` stands for it in messages, and files that it names start from there.
+    pub fn parse(path: &Path, source: &str, overrides: &[String]) -> Result<Scene> {
+        convert::parse(path, source, overrides).map_err(Error::Scene)
     }
 
     /// The needle, if the tool is one.

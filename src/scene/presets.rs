@@ -121,6 +121,14 @@ pub fn law_from_youngs_modulus(youngs_modulus: f64, poisson_ratio: f64, share: f
 
 static NEEDLES: LazyLock<(Vec<NeedlePreset>, Vec<NeedleMaterial>)> = LazyLock::new(read_needles);
 
+/// Materials of a library; `path` stands for its file in messages.
+///
+/// # Errors
+/// `Error::Scene` with all problems.
+pub fn parse_library(path: &Path, source: &str) -> crate::Result<Vec<TissuePreset>> {
+    library::read(path, source).map_err(crate::Error::Scene)
+}
+
 fn read_tissues() -> Vec<TissuePreset> {
     library::read(Path::new("assets/materials.toml"), include_str!("../../assets/materials.toml"))
         .unwrap_or_else(|text| panic!("assets/materials.toml is part of the program and tested:\n{text}"))

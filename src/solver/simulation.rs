@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuEngine};
 use crate::material::{Verdict, von_mises};
 use crate::material_point::PointState;
-use crate::mesh::{BlockMesh, Mesh};
+use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::needle::ToolPose;
 use crate::needle::centre_line::CentreLine;
@@ -22,7 +22,7 @@ use crate::needle::flexible::FlexibleNeedle;
 use crate::observables::{
     CoreSample, FieldSnapshot, FrameRecord, NeedleRecord, Recorder, TargetRecord, cells_in_needle,
 };
-use crate::scene::Scene;
+use crate::scene::{MOST_STEPS_PER_FRAME, Scene};
 
 /// Which engine the user wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -121,15 +121,24 @@ impl Simulation {
     /// # Errors
     /// `Error::Adapter` where the wanted engine is not to be had, `Error::Input` where the mesh does not fit the device.
     pub fn new(scene: Scene, choice: EngineChoice) -> Result<Self> {
-        let mesh = match &scene.mesh {
-            Some(tets) => Mesh::Tets(tets.clone()),
-            None => Mesh::Block(BlockMesh::for_scene(&scene)),
-        };
+        let mesh = Mesh::of_scene(&scene);
         Self::with_mesh(scene, mesh, choice)
     }
 
     /// The same on a given mesh.
     pub fn with_mesh(scene: Scene, mesh: impl Into<Mesh>, choice: EngineChoice) -> Result<Self> {
+        let (device, notices) = Self::choose_device(choice)?;
+        Self::prepare(scene, mesh.into(), device, notices, MOST_STEPS_PER_FRAME)
+    }
+
+    /// The same on this device, without one on the CPU engine.
+    pub fn on(scene: Scene, device: Option<Gpu>) -> Result<Self> {
+        let mesh = Mesh::of_scene(&scene);
+        Self::prepare(scene, mesh, device, Vec::new(), MOST_STEPS_PER_FRAME)
+    }
+
+    /// The device of a choice, and what is to be said about it; no device: the CPU engine.
+    fn choose_device(choice: EngineChoice) -> Result<(Option<Gpu>, Vec<String>)> {
         let mut notices = Vec::new();
         let device = match choice {
             EngineChoice::Cpu => None,
@@ -144,9 +153,23 @@ impl Simulation {
                 }
             },
         };
+        Ok((device, notices))
+    }
+
+    /// Model, step and engine, with at most `most_steps` steps per frame.
+    fn prepare(
+        scene: Scene,
+        mesh: Mesh,
+        device: Option<Gpu>,
+        mut notices: Vec<String>,
+        most_steps: u64,
+    ) -> Result<Self> {
         let model = Arc::new(Model::new(scene, mesh));
         let stable_dt = wave_speed_bound(&model);
         let (dt, steps_per_frame) = choose_step(&model, stable_dt);
+        if steps_per_frame > most_steps {
+            return Err(too_many_steps(&model.scene, stable_dt, steps_per_frame));
+        }
         if dt > stable_dt {
             let limit = power_iteration(&model);
             let verdict = match dt > limit {
@@ -290,8 +313,8 @@ impl Simulation {
         let state = self.engine.read_state()?;
         let mut scene = self.model.scene.clone();
         scene.solver.time_step = Some(0.5 * self.dt);
-        let choice = if self.device.is_some() { EngineChoice::Gpu } else { EngineChoice::Cpu };
-        let mut next = Simulation::with_mesh(scene, self.model.mesh.clone(), choice)?;
+        let (mesh, most_steps) = (self.model.mesh.clone(), 2 * self.steps_per_frame);
+        let mut next = Simulation::prepare(scene, mesh, self.device.clone(), Vec::new(), most_steps)?;
         next.engine.write_state(&state)?;
         if let (Some(needle), Some(image)) = (&mut next.needle, &checkpoint.needle) {
             needle.restore(image);
@@ -470,6 +493,25 @@ impl Simulation {
         let line = self.needle.as_ref().map(|needle| needle.centre_line());
         Ok(snapshot(&self.model, record, state, line))
     }
+}
+
+/// The stable step of the model is too short for the frames of the scene.
+fn too_many_steps(scene: &Scene, stable_dt: f64, steps: u64) -> Error {
+    let per_step = steps as f64 / MOST_STEPS_PER_FRAME as f64;
+    Error::input(
+        format!(
+            "{}: a frame of {:.4} s needs {steps} steps of {:.3e} s (the stable step is {stable_dt:.3e} s), at most {MOST_STEPS_PER_FRAME} \
+             are kept in memory",
+            scene.path.display(),
+            1.0 / scene.solver.frame_rate,
+            1.0 / scene.solver.frame_rate / steps as f64
+        ),
+        format!(
+            "raise solver.frame_rate_hz to {:.0} or more, or lengthen the step: larger cells (tissue.cell_size_mm), softer or \
+             denser material, mass_scaling",
+            (scene.solver.frame_rate * per_step).ceil()
+        ),
+    )
 }
 
 fn too_many_return_failures(failures: u64, cell_steps: f64) -> bool {

@@ -97,7 +97,7 @@ impl RunRecord {
 
     /// Processor time per cell and step [ns].
     pub fn cpu_ns_per_cell_step(&self) -> Option<f64> {
-        let cell_steps = (self.cells * self.steps) as f64;
+        let cell_steps = self.cells as f64 * self.steps as f64;
         self.cpu_s.filter(|_| cell_steps > 0.0).map(|cpu| cpu * 1e9 / cell_steps)
     }
 }
@@ -180,12 +180,7 @@ impl Store {
     pub fn plan(&self) -> Result<Option<Plan>> {
         let path = self.file(PLAN);
         match fs::read_to_string(&path) {
-            Ok(text) => serde_json::from_str(&text).map(Some).map_err(|reason| {
-                Error::input(
-                    format!("{} is no plan of a study of this version: {reason}", path.display()),
-                    "give another folder with --out, or start anew with --force",
-                )
-            }),
+            Ok(text) => parse_plan(&path, &text).map(Some),
             Err(reason) if reason.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(reason) => Err(Error::file(path, reason)),
         }
@@ -201,8 +196,8 @@ impl Store {
 
     /// A finished run; `None` where it is missing or broken, which a new run mends.
     pub fn run(&self, id: &str) -> Option<RunRecord> {
-        let text = fs::read_to_string(self.run_file(id)).ok()?;
-        serde_json::from_str(&text).ok()
+        let path = self.run_file(id);
+        parse_run(&path, &fs::read_to_string(&path).ok()?).ok()
     }
 
     pub fn write_run(&self, run: &RunRecord) -> Result<()> {
@@ -230,6 +225,29 @@ impl Store {
         }
         Ok(())
     }
+}
+
+/// The plan in a text; `path` stands for its file in messages.
+///
+/// # Errors
+/// `Error::Input` where it is no plan of this version.
+pub fn parse_plan(path: &Path, text: &str) -> Result<Plan> {
+    serde_json::from_str(text).map_err(|reason| {
+        Error::input(
+            format!("{} is no plan of a study of this version: {reason}", path.display()),
+            "give another folder with --out, or start anew with --force",
+        )
+    })
+}
+
+/// A finished run in a text; `path` stands for its file in messages.
+///
+/// # Errors
+/// `Error::Input` where it is no run of this version.
+pub fn parse_run(path: &Path, text: &str) -> Result<RunRecord> {
+    serde_json::from_str(text).map_err(|reason| {
+        Error::input(format!("{} is no run of a study of this version: {reason}", path.display()), "remove the file")
+    })
 }
 
 /// Writes a value as JSON, whole or not at all.

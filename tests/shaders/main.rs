@@ -1,5 +1,7 @@
 //! Every combination of effects composes and validates; layouts, bindings and budget. No adapter needed.
 
+mod second_compiler;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 

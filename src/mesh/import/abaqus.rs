@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use glam::DVec3;
 
-use super::raw::{ElementClass, RawMesh, RawNode, RawTet, Words};
+use super::raw::{ElementClass, MOST_SETS, RawMesh, RawNode, RawTet, Words};
 use super::source::{Source, excerpt};
 use crate::{Error, Result};
 
@@ -57,6 +57,9 @@ struct AbaqusFile<'a> {
     instances: u32,
 }
 
+/// Nodes or elements that a small file counts as having more, so that sets of sets fit.
+const FEW: usize = 100;
+
 struct Element {
     id: u64,
     nodes: [u64; 4],
@@ -100,8 +103,15 @@ impl Sets {
         set
     }
 
-    /// Ids of a set, with those of the sets that it names.
-    fn resolve(&self, source: &Source, key: &str, known: &BTreeSet<u64>, what: &str) -> Result<BTreeSet<u64>> {
+    /// Ids of a set, with those of the sets that it names. `left`: how many ids may still be named in all sets together.
+    fn resolve(
+        &self,
+        source: &Source,
+        key: &str,
+        known: &BTreeSet<u64>,
+        what: &str,
+        left: &mut usize,
+    ) -> Result<BTreeSet<u64>> {
         let mut ids = BTreeSet::new();
         let mut open = vec![key.to_string()];
         let mut seen: HashSet<String> = open.iter().cloned().collect();
@@ -112,6 +122,17 @@ impl Sets {
                     let message = format!("set {} names {what} {id}, which is not in the file", set.name);
                     source.fail(member.at, message, "correct the set or write the input file again")
                 };
+                let mut named = || {
+                    *left = left.checked_sub(1).ok_or_else(|| {
+                        source.fail(
+                            member.at,
+                            format!("the sets name the {what}s more than {MOST_SETS} times each on average"),
+                            "remove sets that say the same",
+                        )
+                    })?;
+                    Ok(())
+                };
+                named()?;
                 match &member.what {
                     Members::Id(id) if known.contains(id) => {
                         ids.insert(*id);
@@ -123,6 +144,7 @@ impl Sets {
                             if !known.contains(&id) {
                                 return Err(missing(id));
                             }
+                            named()?;
                             ids.insert(id);
                         }
                     }
@@ -455,11 +477,12 @@ impl AbaqusFile<'_> {
         known.extend(&self.other_elements);
         let mut order: Vec<(&String, &Set)> = self.element_sets.sets.iter().collect();
         order.sort_by_key(|(_, set)| set.listed);
+        let mut left = MOST_SETS * (known.len() + FEW);
         let mut shared = 0;
         let mut in_several = vec![false; self.elements.len()];
         for (key, set) in order {
             let region = self.raw.region(&set.name);
-            for id in self.element_sets.resolve(&self.source, key, &known, "element")? {
+            for id in self.element_sets.resolve(&self.source, key, &known, "element", &mut left)? {
                 let Some(&index) = self.element_index.get(&id) else { continue };
                 let tet = &mut self.raw.tets[index];
                 if tet.region != u32::MAX && !std::mem::replace(&mut in_several[index], true) {
@@ -484,8 +507,9 @@ impl AbaqusFile<'_> {
 
     fn add_node_sets(&mut self) -> Result<()> {
         let known: BTreeSet<u64> = self.raw.nodes.iter().map(|n| n.id).collect();
+        let mut left = MOST_SETS * (known.len() + FEW);
         for (key, set) in &self.node_sets.sets {
-            let ids = self.node_sets.resolve(&self.source, key, &known, "node")?;
+            let ids = self.node_sets.resolve(&self.source, key, &known, "node", &mut left)?;
             let nodes = ids.iter().map(|id| self.node_index[id]).collect();
             self.raw.node_sets.insert(set.name.clone(), nodes);
         }

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::DVec3;
 
-use super::raw::{ElementClass, RawMesh, RawNode, RawTet, Words};
+use super::raw::{ElementClass, MOST_SETS, RawMesh, RawNode, RawTet, Words};
 use super::source::{Source, WRITE_AGAIN, excerpt};
 use crate::{Error, Result};
 
@@ -310,7 +310,16 @@ impl GmshFile<'_> {
                     records.float("the bounds of an entity")?;
                 }
                 let mut groups = Vec::new();
-                for _ in 0..records.size("the number of physical groups")? {
+                let at = records.source.at();
+                let count = records.size("the number of physical groups")?;
+                if count > MOST_SETS as u64 {
+                    return Err(records.source.fail(
+                        at,
+                        format!("an entity is in {count} physical groups, at most {MOST_SETS} are read"),
+                        "name the parts of the body by few physical groups and save again",
+                    ));
+                }
+                for _ in 0..count {
                     let group = records.int("the tag of a physical group")?.unsigned_abs();
                     if group != 0 {
                         groups.push(group);

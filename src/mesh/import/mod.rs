@@ -107,8 +107,17 @@ pub fn read(path: &Path, unit: LengthUnit) -> Result<Imported> {
 /// Reads a mesh file.
 pub fn read_with(path: &Path, options: ImportOptions) -> Result<Imported> {
     let format = Format::of_name(path)?;
+    if is_endless(path) {
+        let name = path.display();
+        return Err(Error::input(format!("{name}: a device or a pipe is no mesh file"), "name the file itself"));
+    }
     let bytes = std::fs::read(path).map_err(|source| Error::file(path, source))?;
     parse_as(format, &path.display().to_string(), &bytes, options)
+}
+
+/// True for a device or a pipe, which may never end.
+pub(crate) fn is_endless(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
 /// Reads a mesh from memory; `name` stands for the file in messages, its extension tells the format.

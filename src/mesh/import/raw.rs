@@ -60,6 +60,9 @@ pub(super) enum ElementClass {
     Lower,
 }
 
+/// Most sets that a node or element may be in on average: a short file could otherwise name all of them again and again.
+pub(super) const MOST_SETS: usize = 64;
+
 impl RawMesh {
     pub fn new(name: &str, words: Words) -> Self {
         RawMesh {

@@ -35,7 +35,15 @@ pub struct Columns(BTreeMap<String, Vec<f64>>);
 
 impl Columns {
     fn read(path: &Path) -> Result<Self> {
-        let mut reader = csv::Reader::from_path(path).map_err(|reason| Error::file(path, reason.into()))?;
+        Self::parse(path, &std::fs::read(path).map_err(|reason| Error::file(path, reason))?)
+    }
+
+    /// Reads a table from the bytes of a file; `path` stands for it in messages.
+    ///
+    /// # Errors
+    /// `Error::Input` where it is no table of numbers.
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let mut reader = csv::Reader::from_reader(bytes);
         let names: Vec<String> =
             reader.headers().map_err(|reason| broken(path, &reason))?.iter().map(str::to_string).collect();
         let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
@@ -75,7 +83,10 @@ impl Columns {
 }
 
 fn broken(path: &Path, reason: &dyn std::fmt::Display) -> Error {
-    Error::file(path, std::io::Error::other(format!("not what a run of this version writes: {reason}")))
+    Error::input(
+        format!("{} is not what a run of this version writes: {reason}", path.display()),
+        "make the run again, for a report with --force",
+    )
 }
 
 impl CaseResults {

@@ -7,6 +7,7 @@ use super::{Check, KPA, MM, Within, library};
 use crate::material::{
     Demiray, ElasticLaw, Isochoric, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict, four_digits, ripple_growth_time,
 };
+use crate::mesh::import::is_endless;
 
 /// Young's modulus above which a material is no soft tissue [Pa].
 const LARGEST_TISSUE_MODULUS: f64 = 10.0e6;
@@ -156,6 +157,15 @@ impl Check<'_> {
         };
         let path = self.folder.join(library);
         let place = format!("{at}.library");
+        if is_endless(&path) {
+            self.problems.report(
+                &place,
+                format!("the material library {} is a device or a pipe", path.display()),
+                "no file",
+                "name the file itself, e.g. library = \"my_materials.toml\"",
+            );
+            return None;
+        }
         let source = match std::fs::read_to_string(&path) {
             Ok(source) => source,
             Err(error) => {

@@ -4,6 +4,7 @@
 //! number is in range.
 
 mod effects;
+mod frames;
 pub(super) mod library;
 mod material;
 mod mesh;
@@ -35,12 +36,20 @@ const BYTES_PER_NODE: f64 = 60.0;
 /// Largest array per cell, and the largest storage binding that every device offers [B].
 const BINDING_BYTES_PER_CELL: f64 = 160.0;
 const LARGEST_BINDING: f64 = 128.0 * 1024.0 * 1024.0;
+/// Range of solver.frame_rate_hz [Hz].
+const LOWEST_FRAME_RATE: f64 = 0.1;
+const HIGHEST_FRAME_RATE: f64 = 1e5;
 
 /// Reads, checks and converts; the error is the rendered text of all problems of the first stage that finds any:
 /// document, keys, numbers, geometry, memory.
 pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, String> {
     let source = std::fs::read_to_string(path).map_err(|error| unreadable(path, &error))?;
-    let document = Document::parse(path, &source, overrides)?;
+    parse(path, &source, overrides)
+}
+
+/// The same with the text in memory.
+pub fn parse(path: &Path, source: &str, overrides: &[String]) -> std::result::Result<Scene, String> {
+    let document = Document::parse(path, source, overrides)?;
     let mut check = Check::new(&document, path);
     check.finite_numbers(&document)?;
     let file: SceneFile = document.deserialize()?;
@@ -147,6 +156,8 @@ impl Check<'_> {
         let outputs = self.outputs(&file.outputs, &motion, tool.is_some(), solver.duration);
         let targets = self.targets(file);
         self.problems.check()?;
+        self.steps(&solver);
+        self.frames(&solver, &motion, targets.len());
         for (index, material) in parameters::all_materials(&material, &regions) {
             self.snap_back(file, index, material, tissue.cell_size, &effects);
         }
@@ -489,7 +500,7 @@ impl Check<'_> {
                 table.frame_rate_hz,
                 1.0,
                 60.0,
-                Within::Between(0.1, 1e5),
+                Within::Between(LOWEST_FRAME_RATE, HIGHEST_FRAME_RATE),
             ),
             duration: if has_tool { None } else { duration },
         }

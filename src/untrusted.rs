@@ -1,0 +1,170 @@
+//! Every reader of what others wrote, one function from bytes in memory each: what fuzzers call.
+//!
+//! A reader takes any bytes and gives a value or a message with the way out; it never panics, and never allocates more than
+//! [`Reader::memory`] says. The targets in `fuzz/` and `tests/fuzz.rs` call [`Reader::survives`], nothing else.
+
+use std::path::Path;
+
+use crate::commands::fit;
+use crate::error::{Error, Result};
+use crate::mesh::import::{self, ImportOptions, LengthUnit};
+use crate::output::checkpoint::RunCheckpoint;
+use crate::output::report::Columns;
+use crate::scene::{Scene, presets};
+use crate::study::store;
+
+/// One kind of input.
+#[derive(Debug, Clone, Copy)]
+pub struct Reader {
+    /// Name of the fuzz target.
+    pub name: &'static str,
+    read: fn(&[u8]) -> Result<()>,
+    /// Most memory at once: fixed part [B], and part per byte of the input.
+    memory: (usize, usize),
+}
+
+/// What any reader may take for messages and buffers [B].
+const FEW: usize = 256 << 10;
+
+/// The grid lines of the finest block along three axes of a metre, several times over [B].
+const GRID_LINES: usize = 192 << 20;
+
+/// Deflate makes at most 1032 bytes of one; the values in a message take at most four times its bytes, and a vector that grows is
+/// there three times over.
+const UNPACKED: usize = 1032 * 4 * 3;
+
+/// A vector whose damaged length promises much is given up to 1 MiB before its values are read; a few are open at once [B].
+const PROMISED: usize = 4 << 20;
+
+/// All readers.
+pub const READERS: [Reader; 13] = [
+    Reader { name: "scene", read: scene, memory: (GRID_LINES, 1024) },
+    Reader { name: "overrides", read: overrides, memory: (GRID_LINES, 1024) },
+    Reader { name: "materials", read: materials, memory: (FEW, 256) },
+    Reader { name: "gmsh", read: gmsh, memory: (FEW, 128) },
+    Reader { name: "vtk", read: vtk, memory: (FEW, 128) },
+    // Arrays may be compressed; what they unpack to must agree with the counts of the file.
+    Reader { name: "vtu", read: vtu, memory: (FEW, UNPACKED) },
+    Reader { name: "abaqus", read: abaqus, memory: (FEW, 128) },
+    Reader { name: "checkpoint", read: checkpoint, memory: (PROMISED, UNPACKED) },
+    Reader { name: "checkpoint_message", read: checkpoint_message, memory: (PROMISED, 32) },
+    Reader { name: "curves", read: curves, memory: (FEW, 128) },
+    Reader { name: "run_table", read: run_table, memory: (FEW, 128) },
+    Reader { name: "study_plan", read: study_plan, memory: (FEW, 128) },
+    Reader { name: "study_run", read: study_run, memory: (FEW, 128) },
+];
+
+impl Reader {
+    /// The reader of this name.
+    pub fn named(name: &str) -> Option<&'static Reader> {
+        READERS.iter().find(|reader| reader.name == name)
+    }
+
+    /// Most memory that reading `length` bytes may take at once [B].
+    pub fn memory(&self, length: usize) -> usize {
+        self.memory.0 + self.memory.1 * length
+    }
+
+    /// Reads the bytes; true where they mean something.
+    ///
+    /// # Panics
+    /// Where a refusal is not one that helps: wrong input without a way out, or a message longer than it is read.
+    pub fn survives(&self, bytes: &[u8]) -> bool {
+        match (self.read)(bytes) {
+            Ok(()) => true,
+            Err(error) => {
+                let text = error.to_string();
+                assert!(text.contains("way out"), "{}: no way out in: {text}", self.name);
+                assert!(text.len() < 200_000, "{}: {} bytes of message", self.name, text.len());
+                assert!(
+                    matches!(error, Error::Scene(_) | Error::Input { .. }),
+                    "{}: not told as wrong input: {text}",
+                    self.name
+                );
+                false
+            }
+        }
+    }
+}
+
+/// The folder of files that others wrote does not exist: what a scene names beside itself is not there.
+fn place(name: &str) -> std::path::PathBuf {
+    Path::new("no-such-folder").join(name)
+}
+
+fn text(bytes: &[u8]) -> Result<&str> {
+    std::str::from_utf8(bytes).map_err(|reason| Error::input(format!("no text: {reason}"), "save the file as UTF-8"))
+}
+
+fn scene(bytes: &[u8]) -> Result<()> {
+    Scene::parse(&place("scene.toml"), text(bytes)?, &[]).map(drop)
+}
+
+/// One `--set` per line, for a scene with a needle.
+fn overrides(bytes: &[u8]) -> Result<()> {
+    const SCENE: &str = include_str!("../scenes/muscle_biopsy.toml");
+    let overrides: Vec<String> = text(bytes)?.lines().map(str::to_string).collect();
+    Scene::parse(&place("scene.toml"), SCENE, &overrides).map(drop)
+}
+
+fn materials(bytes: &[u8]) -> Result<()> {
+    presets::parse_library(&place("materials.toml"), text(bytes)?).map(drop)
+}
+
+fn mesh(name: &str, bytes: &[u8]) -> Result<()> {
+    let options = ImportOptions { unit: LengthUnit::Millimetre, accept_size: false };
+    let mesh = import::parse(name, bytes, options)?.mesh;
+    let nodes = mesh.positions.len();
+    assert!(mesh.tets.iter().flatten().all(|n| (*n as usize) < nodes), "a corner is no node");
+    assert!(mesh.tags.iter().all(|t| (*t as usize) < mesh.regions.len()), "a tag is no region");
+    assert!((0..mesh.tets.len()).all(|t| mesh.volume(t) > 0.0), "a tetrahedron has no volume");
+    Ok(())
+}
+
+fn gmsh(bytes: &[u8]) -> Result<()> {
+    mesh("mesh.msh", bytes)
+}
+
+fn vtk(bytes: &[u8]) -> Result<()> {
+    mesh("mesh.vtk", bytes)
+}
+
+fn vtu(bytes: &[u8]) -> Result<()> {
+    mesh("mesh.vtu", bytes)
+}
+
+fn abaqus(bytes: &[u8]) -> Result<()> {
+    mesh("mesh.inp", bytes)
+}
+
+fn checkpoint(bytes: &[u8]) -> Result<()> {
+    RunCheckpoint::from_bytes(&place("checkpoint.stylet"), bytes).map(drop)
+}
+
+/// What a checkpoint holds once it is unpacked: its checksum keeps damage from getting here.
+fn checkpoint_message(bytes: &[u8]) -> Result<()> {
+    RunCheckpoint::from_message(&place("checkpoint.stylet"), bytes).map(drop)
+}
+
+fn curves(bytes: &[u8]) -> Result<()> {
+    fit::parse_curves(&place("curve.csv"), bytes.to_vec()).map(drop)
+}
+
+fn run_table(bytes: &[u8]) -> Result<()> {
+    let table = Columns::parse(&place("force.csv"), bytes)?;
+    let way_in = table.curve("axial_force_n");
+    assert!(way_in.is_sorted_by(|a, b| a.0 < b.0), "the way in goes back");
+    Ok(())
+}
+
+fn study_plan(bytes: &[u8]) -> Result<()> {
+    store::parse_plan(&place("plan.json"), text(bytes)?).map(drop)
+}
+
+fn study_run(bytes: &[u8]) -> Result<()> {
+    let run = store::parse_run(&place("run.json"), text(bytes)?)?;
+    run.unfit();
+    run.cpu_ns_per_cell_step();
+    run.curve();
+    Ok(())
+}

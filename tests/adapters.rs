@@ -1,0 +1,70 @@
+//! The same scene on every adapter of this machine and on the CPU engine.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+/// `compare-adapters` of a scene of the repository; the table as JSON.
+fn compared(scene: &str, overrides: &[&str]) -> Value {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).args(["compare-adapters", scene, "--json"]);
+    for text in overrides {
+        command.args(["--set", text]);
+    }
+    let output = command.output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    let table: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}\n{told}"));
+    println!("{table:#}");
+    assert!(output.status.success(), "{table:#}\n{told}");
+    table
+}
+
+/// Checks the numbers against bounds of this test, tighter than those of the command; returns the adapters that were compared.
+fn assert_alike(table: &Value, bounds: [(&str, f64); 3]) -> usize {
+    let rows = table["rows"].as_array().unwrap();
+    assert_eq!(rows[0]["verdict"], "reference");
+    assert_eq!(rows[0]["backend"], "cpu");
+    let mut found = 0;
+    for row in rows.iter().filter(|row| row["differences"].is_object()) {
+        assert_eq!(row["verdict"], "within", "{row}");
+        for (quantity, bound) in bounds {
+            let value = row["differences"][quantity].as_f64().unwrap_or_else(|| panic!("no {quantity}: {row}"));
+            // An adapter in f32 that agrees to the last digit of f64 has computed nothing.
+            assert!(value > 0.0 && value < bound, "{quantity} differs by {value} %: {row}");
+        }
+        assert!(row["wall_s"].as_f64().unwrap() > 0.0);
+        found += 1;
+    }
+    let required = std::env::var("REQUIRE_GPU").is_ok_and(|v| v == "1");
+    assert!(found > 0 || !required, "REQUIRE_GPU=1, and no adapter was compared: {table:#}");
+    if found == 0 {
+        println!("skipped: no adapter");
+    }
+    found
+}
+
+#[test]
+fn a_needle_is_the_same_on_every_adapter() {
+    let table = compared(
+        "scenes/muscle_biopsy.toml",
+        &["tissue.cell_size_mm=1.2", "motion.phase.0.depth_mm=4.0", "motion.phase.2.depth_mm=3.0"],
+    );
+    assert_alike(&table, [("force", 0.005), ("displacement", 0.005), ("energy", 0.005)]);
+}
+
+#[test]
+fn a_sheared_block_with_histories_is_the_same_on_every_adapter() {
+    let table = compared("scenes/effects/plasticity.toml", &[]);
+    assert_alike(&table, [("force", 0.05), ("displacement", 0.05), ("energy", 0.05)]);
+}
+
+#[test]
+fn wrong_scenes_are_refused() {
+    let output = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(["compare-adapters", "nowhere.toml"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(output.stdout.is_empty() && String::from_utf8_lossy(&output.stderr).contains("way out"));
+}
