@@ -439,6 +439,15 @@ impl<'a> Run<'a> {
         {
             missing.push(Error::file(&checkpoint, source));
         }
+        if summary.energy_imbalance > 0.02 && summary.raised_mass_share > 0.01 {
+            eprintln!(
+                "note: {:.1} % of the energy are missing or too much, and {:.1} % of all node steps had their mass raised: the step \
+                 is too long for the squeezed cells; way out: solver.safety = {}",
+                100.0 * summary.energy_imbalance,
+                100.0 * summary.raised_mass_share,
+                0.5 * scene.solver.safety
+            );
+        }
         if summary.raised_mass_share > 0.2 {
             eprintln!(
                 "note: {:.0} % of all node steps had their mass raised to keep the step stable: inertia is not what \

@@ -673,7 +673,7 @@ pub struct SolverTable {
     pub mass_damping_per_s: Option<f64>,
     /// Hourglass stiffness; default 0.1.
     pub hourglass_stiffness: Option<f64>,
-    /// Quartic hourglass factor; default 15000 with the effect `puncture`, else 1000.
+    /// Quartic hourglass factor; default 15000 with the effect `puncture`, more below cells of 0.4 mm (like h^-4), else 1000.
     pub hourglass_quartic: Option<f64>,
     /// Display frames per simulated second [Hz]; default 60.
     pub frame_rate_hz: Option<f64>,

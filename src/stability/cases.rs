@@ -253,7 +253,7 @@ pub const CASES: &[Case] = &[
         ],
         parts: &[TOOL],
         spread: None,
-        cure: Cure::Fixed("the speed limit of the nodes, which takes energy"),
+        cure: Cure::Switch { what: "half the usual step", overrides: &["solver.safety=0.8"] },
     },
     Case {
         name: "step_0_9",
