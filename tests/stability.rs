@@ -44,22 +44,21 @@ fn short_form(engine: EngineChoice, without_cure: bool) -> EngineReport {
     report
 }
 
-/// `known`: cases that fail on this engine; the README says why. One that is mended must leave the list.
-fn every_case_comes_out_as_it_must(engine: EngineChoice, known: &[&str]) {
+fn every_case_comes_out_as_it_must(engine: EngineChoice) {
     let report = short_form(engine, false);
     assert_eq!(report.cases.len(), CASES.len());
-    assert_eq!(report.surprises(), known);
+    assert_eq!(report.surprises(), [""; 0]);
 }
 
 #[test]
 fn the_suite_holds_in_f64() {
-    every_case_comes_out_as_it_must(EngineChoice::Cpu, &["inverted_tets", "drag"]);
+    every_case_comes_out_as_it_must(EngineChoice::Cpu);
 }
 
 #[test]
 fn the_suite_holds_on_the_gpu() {
     if has_gpu() {
-        every_case_comes_out_as_it_must(EngineChoice::Gpu, &["inverted_tets", "drag", "rest"]);
+        every_case_comes_out_as_it_must(EngineChoice::Gpu);
     }
 }
 

@@ -330,8 +330,25 @@ impl<'a> Run<'a> {
         self.clock.aside(|| checkpoint.write(&path))
     }
 
+    /// After the device is lost: writes the newest image as checkpoint, and tells how to go on from there.
+    fn leave_checkpoint(&self, text: &str) -> Error {
+        let Some(image) = self.images.back().cloned() else { return Error::Device(text.into()) };
+        let checkpoint = self.checkpoint(image);
+        let time = checkpoint.records.last().map_or(0.0, |r| r.time);
+        match checkpoint.write(&self.output.file(folder::CHECKPOINT)) {
+            Ok(()) => Error::Device(format!(
+                "{text}\n  way out: the run is kept up to {time:.3} s; go on with: stylet run --resume {}",
+                self.output.path().display()
+            )),
+            Err(error) => Error::Device(format!("{text}\n  and the run up to {time:.3} s could not be kept: {error}")),
+        }
+    }
+
     /// What can be done after a failure: half the step, if the scene wants that, else the folder `forensics` and the error.
     fn recover(&mut self, error: Error) -> Result<()> {
+        if let Error::Device(text) = &error {
+            return Err(self.leave_checkpoint(text));
+        }
         let Error::Diverged { frame, .. } = &error else { return Err(error) };
         let (frame, text) = (*frame, error.to_string());
         let early = self.images.iter().rposition(|image| image.frames + BEFORE_FAILURE <= frame).unwrap_or(0);

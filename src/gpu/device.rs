@@ -125,7 +125,7 @@ impl Gpu {
         let note = keep(failure.clone());
         device.set_device_lost_callback(move |reason, text| {
             if reason != wgpu::DeviceLostReason::Destroyed {
-                note(format!("device lost ({reason:?}): {text}"));
+                note(format!("lost ({reason:?}): {text}"));
             }
         });
         Ok(Gpu { device, queue, info, failure })
@@ -134,6 +134,14 @@ impl Gpu {
     /// True for a software adapter.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Destroys the device, as a driver that resets it does.
+    pub fn lose(&self) {
+        if let Ok(mut first) = self.failure.lock() {
+            first.get_or_insert("lost (given away)".into());
+        }
+        self.device.destroy();
     }
 
     /// Fails when the device has reported an error since it was opened.

@@ -1509,6 +1509,10 @@ impl Engine for GpuEngine {
         Ok(())
     }
 
+    fn lose_device(&mut self) {
+        self.gpu.lose();
+    }
+
     fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
         while self.collect_oldest(true)? {}
         // The stage also brings histories to its step; they are put back afterwards.

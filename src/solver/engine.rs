@@ -239,6 +239,9 @@ pub trait Engine {
     /// # Errors
     /// `Error::Input` where the image is that of another engine or model.
     fn restore(&mut self, image: &EngineImage) -> Result<()>;
+    /// Loses the device, as when a driver resets it, to see what follows: every later call fails with `Error::Device`. Nothing on
+    /// an engine without one.
+    fn lose_device(&mut self) {}
     /// Internal nodal forces of the present displacement, `f_int` [N] (the tissue pushes the node with -f_int).
     fn internal_forces(&mut self) -> Result<Vec<DVec3>>;
 }

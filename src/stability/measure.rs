@@ -3,7 +3,7 @@
 use super::Trace;
 use crate::Result;
 use crate::scene::Face;
-use crate::solver::simulation::Simulation;
+use crate::solver::simulation::{EngineChoice, Simulation};
 
 /// Largest displacement of a node [nm]: zero of a body at rest.
 pub fn largest_displacement(simulation: &mut Simulation, _: &Trace) -> Result<f64> {
@@ -18,6 +18,19 @@ pub fn top_force(simulation: &mut Simulation, trace: &Trace) -> Result<f64> {
     let force = last.iter().map(|r| r.reactions[Face::ZMax as usize].z).sum::<f64>() / tenth as f64;
     let scene = &simulation.model.scene;
     Ok(-force / (scene.material.law.shear_modulus() * scene.tissue.size.x * scene.tissue.size.y))
+}
+
+/// Number of frames whose records differ in any bit from those of the same run without an interruption.
+pub fn unlike_frames(simulation: &mut Simulation, trace: &Trace) -> Result<f64> {
+    let engine = if simulation.engine().info().engine == "gpu" { EngineChoice::Gpu } else { EngineChoice::Cpu };
+    let (scene, mesh) = (simulation.model.scene.clone(), simulation.model.mesh.clone());
+    let mut whole = Simulation::with_mesh(scene, mesh, engine)?;
+    let (mut frames, mut unlike) = (0, 0);
+    while let Some(record) = whole.next_frame()? {
+        unlike += usize::from(trace.records.get(frames) != Some(&record));
+        frames += 1;
+    }
+    Ok((unlike + trace.records.len().saturating_sub(frames)) as f64)
 }
 
 /// Mean axial force over the last half millimetre of the way in [N].

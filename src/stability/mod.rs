@@ -54,10 +54,23 @@ pub struct Part {
     pub label: &'static str,
     pub overrides: &'static [&'static str],
     pub setup: Setup,
+    /// What happens to the program in the middle of the run.
+    pub interruption: Option<Interruption>,
     /// How the energy of its frames is compared.
     pub balance: Balance,
     pub expected: Expected,
     pub answer: Option<Answer>,
+}
+
+/// What happens to the program in the middle of a run. It goes on from a checkpoint, and must give the records of a run
+/// without it, bit for bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interruption {
+    /// Stopped, written as bytes, and resumed by a new simulation.
+    Paused,
+    /// The device is lost some frames after the checkpoint; the engine must say so. On the CPU engine there is none, and the
+    /// simulation is thrown away.
+    DeviceLost,
 }
 
 /// How the energy of a run is compared.

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::report::{CaseReport, RunReport};
-use super::{Balance, Case, Cure, Expected, Options, Part};
+use super::{Balance, Case, Cure, Expected, Interruption, Options, Part};
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
 use crate::observables::FrameRecord;
@@ -109,10 +109,18 @@ fn part(
         }
         Err(error) => return Err(error),
     };
-    let (mut simulation, start_energy) = prepared(scene, part, engine)?;
+    let (mut simulation, start_energy) = prepared(scene.clone(), part, engine)?;
     let mut trace = Trace { records: Vec::new(), start_energy };
     let mut stopped_at = None;
+    let mut unnoticed = None;
+    if let Some(interruption) = part.interruption {
+        let fresh = || prepared(scene.clone(), part, engine).map(|(simulation, _)| simulation);
+        unnoticed = interrupt(&mut simulation, &mut trace, interruption, fresh)?;
+    }
     let end = loop {
+        if let Some(text) = unnoticed.take() {
+            break End::Stopped(text);
+        }
         if interrupted.load(Ordering::Relaxed) {
             return Ok(None);
         }
@@ -134,6 +142,38 @@ fn part(
     report.wall_s = begin.elapsed().as_secs_f64();
     report.judge(part, end);
     Ok(Some((report, Some(simulation.engine().info().clone()))))
+}
+
+/// Runs a third of the frames, keeps a checkpoint as bytes, interrupts the simulation and puts one in its place that goes on from
+/// the checkpoint. What should have been noticed and was not, as text.
+fn interrupt(
+    simulation: &mut Simulation,
+    trace: &mut Trace,
+    interruption: Interruption,
+    fresh: impl Fn() -> Result<Simulation>,
+) -> Result<Option<String>> {
+    let kept = simulation.frame_count() / 3;
+    simulation.stop_after(kept);
+    while let Some(record) = simulation.next_frame()? {
+        trace.records.push(record);
+        if trace.records.len() as u64 > kept {
+            break;
+        }
+    }
+    let broken = |error: postcard::Error| Error::Device(format!("a checkpoint could not be kept: {error}"));
+    let bytes = postcard::to_allocvec(&simulation.checkpoint()?).map_err(broken)?;
+    if interruption == Interruption::DeviceLost && simulation.engine().info().engine == "gpu" {
+        simulation.next_frame()?;
+        simulation.engine().lose_device();
+        match simulation.next_frame() {
+            Err(Error::Device(_)) => {}
+            Err(error) => return Ok(Some(format!("the lost device was told as: {error}"))),
+            Ok(_) => return Ok(Some("the device was lost and nothing told it".into())),
+        }
+    }
+    *simulation = fresh()?;
+    simulation.resume(&postcard::from_bytes(&bytes).map_err(broken)?)?;
+    Ok(None)
 }
 
 /// The simulation before its first step, and the energy of the state that it starts from [J].
