@@ -191,7 +191,8 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         v -= cross(angular_velocity(), lever);
 #endif
         let vn = dot(v, n);
-#ifdef COHESIVE
+#ifdef BORE
+        // Only the walls of the tube are pushed.
         let k = puncture.contact_stiffness;
 #else
 #ifdef FREE_PATH

@@ -89,6 +89,29 @@ fn a_straight_motion_gives_the_force_of_the_planned_path() {
     free.assert_sound();
 }
 
+/// Planes that may part beside a free path change nothing about how the ring is pushed.
+#[test]
+fn both_engines_pass_planes_on_a_free_path() {
+    let on = |engine| {
+        let planes = [
+            COARSE,
+            FREE,
+            "effects=[\"puncture\", \"friction\", \"cohesive\", \"mass_scaling\"]",
+            "cohesive={strength_kpa = 200.0, energy_j_m2 = 20.0, plane = [{axis = \"z\", at_mm = -3.0}]}",
+            "motion.phase=[{kind = \"insert\", speed_mm_s = 5.0, depth_mm = 5.0}]",
+        ];
+        let run = run("free_hand/stop_and_go.toml", &planes, engine);
+        check("planes", &run, 0.02);
+        run
+    };
+    if best_engine() == EngineChoice::Cpu {
+        return;
+    }
+    let (gpu, cpu) = (on(EngineChoice::Gpu), on(EngineChoice::Cpu));
+    assert!(gpu.simulation.model.puncture.as_ref().unwrap().free.is_some() && gpu.simulation.model.cohesion.is_some());
+    assert_near("force at 5 mm [N]", gpu.force_at_depth(), cpu.force_at_depth(), 1e-3);
+}
+
 #[test]
 fn a_motion_decides_how_its_path_is_found() {
     let scene = load("free_hand/sideways.toml", &[COARSE]);
