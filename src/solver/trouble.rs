@@ -109,7 +109,7 @@ impl Simulation {
             time_s: record.time,
             message: format!(
                 "stage integrate_nodes: {:.0} % of the nodes would move faster than the limit of {limit:.4} m/s (a \
-                 twentieth of a cell edge per step); {place}\n  way out: {way_out}",
+                 tenth of a cell edge per step); {place}\n  way out: {way_out}",
                 100.0 * part
             ),
         }
