@@ -40,7 +40,7 @@ fn free_motions_stay_finite_and_in_balance() {
         ("two_tracks", &["motion.phase.0.depth_mm=4.0", "motion.phase.3.depth_mm=5.0"], 0.02),
         ("sideways", &[], 0.02),
         // The tissue snaps back off the tip, faster than the speed limit of the usual step lets it.
-        ("sideways", &[DRAWN_OUT, "solver.safety=0.2"], 0.05),
+        ("sideways", &[DRAWN_OUT, "solver.safety=0.2"], 0.02),
         ("stab", &[FREE], 0.02),
         ("stab", &["motion.phase.0.depth_mm=8.0"], 0.02),
         ("creep", &[FREE, "motion.phase.0.depth_mm=3.0", "motion.phase.1.depth_mm=3.1"], 0.02),
