@@ -62,8 +62,8 @@ pub struct Params {
     pub residual_stiffness: f64,
     /// Outer radius r_r of the ring of nodes that the shaft pushes [m] [calibration].
     pub ring_radius: f64,
-    /// Contact stiffness factor: factor (K + 4/3 mu)/l^2 per volume of the ring, factor (K + 4/3 mu)/h per area of a slit,
-    /// l = 0.6 mm [calibration].
+    /// Contact stiffness factor: factor (K + 4/3 mu)/l^2 per volume of the ring, factor (K + 4/3 mu) l^2/h per node of a
+    /// separated face, factor (K + 4/3 mu)/h per area of a slit, l = 0.6 mm [calibration].
     pub contact_stiffness_factor: f64,
     /// Fraction of critical damping in the contact normal.
     pub contact_damping: f64,

@@ -492,7 +492,8 @@ pub struct PunctureTable {
     pub residual_stiffness: Option<f64>,
     /// Outer radius of the ring of nodes that the shaft pushes [mm] (calibration); larger than `softened_radius_mm`.
     pub ring_radius_mm: Option<f64>,
-    /// Contact stiffness over (K + 4/3 mu) h (calibration).
+    /// Factor of the contact stiffness (calibration): of (K + 4/3 mu)/l^2 per volume of the ring around the path, of
+    /// (K + 4/3 mu) l^2/h per node of a separated face, l = 0.6 mm.
     pub contact_stiffness_factor: Option<f64>,
     /// Fraction of critical damping in the contact normal, 0 to 1.
     pub contact_damping: Option<f64>,

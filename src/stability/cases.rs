@@ -24,6 +24,16 @@ const TOOL: Part = Part { expected: BALANCED_WITH_TOOL, ..PLAIN };
 /// A small block for a needle, in the short form.
 const SMALL: &str = "tissue.size_mm=[12.0, 12.0, 7.0]";
 
+/// The sudden reversals on that block.
+const SHORT_REVERSALS: &[&str] = &[
+    SMALL,
+    "motion.phase.0.depth_mm=3.0",
+    "motion.phase.1.depth_mm=2.0",
+    "motion.phase.2.depth_mm=4.0",
+    "motion.phase.4.depth_mm=4.0",
+    "solver.mass_scaling=1000",
+];
+
 /// Removes the only hourglass term that holds a cell which a needle folds.
 const NO_QUARTIC: Cure = Cure::Switch { what: "quartic hourglass term", overrides: &["solver.hourglass_quartic=0"] };
 /// Lets squeezed cells outrun the step.
@@ -209,14 +219,7 @@ pub const CASES: &[Case] = &[
         name: "reversal",
         hard: "sudden reversals",
         scene: "hard/reversal.toml",
-        short: &[
-            SMALL,
-            "motion.phase.0.depth_mm=3.0",
-            "motion.phase.1.depth_mm=2.0",
-            "motion.phase.2.depth_mm=4.0",
-            "motion.phase.4.depth_mm=4.0",
-            "solver.mass_scaling=1000",
-        ],
+        short: SHORT_REVERSALS,
         parts: &[TOOL],
         spread: None,
         cure: NO_QUARTIC,
@@ -225,14 +228,7 @@ pub const CASES: &[Case] = &[
         name: "resumed",
         hard: "paused; device lost",
         scene: "hard/reversal.toml",
-        short: &[
-            SMALL,
-            "motion.phase.0.depth_mm=3.0",
-            "motion.phase.1.depth_mm=2.0",
-            "motion.phase.2.depth_mm=4.0",
-            "motion.phase.4.depth_mm=4.0",
-            "solver.mass_scaling=1000",
-        ],
+        short: SHORT_REVERSALS,
         parts: &[
             Part { label: "paused", interruption: Some(Interruption::Paused), answer: Some(SAME_RECORDS), ..TOOL },
             Part { label: "lost", interruption: Some(Interruption::DeviceLost), answer: Some(SAME_RECORDS), ..TOOL },
