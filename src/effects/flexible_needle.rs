@@ -9,13 +9,18 @@
 //! Staggered coupling: frame n moves the centre-line linearly from x_n to x_(n+1); its mean loads f_n, which belong to the mean
 //! line (x_n + x_(n+1))/2, and the springs `k_r` about that line (a Robin condition: the tissue's answer to a further move;
 //! along the axis the line goes on with the hub, and the tip adds its springs in series with the tissue around a disc, `16 mu R`)
-//! give x_(n+2). Stable where `k_r` is at least half the true stiffness per length; it is estimated as that of a rigid circle
-//! in an incompressible ring,
+//! give x_(n+2). With a tissue of stiffness k, damping c and mass m per length, force -(k x + c x' + m x''), and a needle that
+//! is soft against it, the roots of the recursion lie in the unit circle where the spring is at least `k/2` about the mean line,
+//! and at least `0.8 c/T` and `1.6 m/T^2`, T the frame, about a line that goes on with half its drift. Scaled mass counts more
+//! than stiffness. So
 //! ```text
-//! k_r = 4 pi mu / (ln(b/R) - (b^2 - R^2)/(b^2 + R^2))                                      [N/m^2]
+//! k_r = k + 2 c/T + 3 m/T^2                                                                [N/m^2]
+//! k   = 4 pi mu / (ln(b/R) - (b^2 - R^2)/(b^2 + R^2))         a rigid circle in an incompressible ring
+//! c   = 4 R rho (v_P + v_S)                                   waves from its front, back and sides [Berger1977]
+//! m   = pi r_r^2 rho                                          the ring that the path holds
 //! ```
-//! with the stiffest tissue and b half the smaller width of the block; softened path and contact springs make the true one
-//! smaller. Source: this project; beam [Crisfield1991].
+//! with the stiffest and densest tissue, the scaled density rho, and b half the smaller width of the block; softened path and
+//! contact springs make the true k smaller. Source: this project; beam [Crisfield1991].
 //! Assumptions: the path is cut along the planned line of the material, so that needle and tissue bend together, and no curved
 //! path is cut. Range of validity: the centre-line leaves the axis by less than the free length permits small slopes in the
 //! tissue (0.3 rad).
@@ -29,7 +34,7 @@ pub const EFFECT: Effect = Effect {
     key: "flexible_needle",
     define: "FLEXIBLE_NEEDLE",
     summary: "the needle is a beam clamped in its hub: it bends, and buckles where it is too thin",
-    source: "Crisfield1991; coupling: this project",
+    source: "Crisfield1991; Berger1977; coupling: this project",
     cost: "1.5 KiB; one beam solution per display frame, which waits for the frame before",
 };
 

@@ -7,6 +7,7 @@ use super::beam::{Beam, HubPose, Loads, NodeSpring, TimeRule};
 use super::centre_line::{CentreLine, ENTRY_COUNT};
 use super::{Kinematics, ToolPose};
 use crate::effects::flexible_needle::Params;
+use crate::material_point::Material;
 use crate::model::Model;
 use crate::observables::NeedleRecord;
 use crate::solver::engine::{FramePlan, FrameSums};
@@ -47,8 +48,9 @@ pub struct FlexibleNeedle {
     kinematics: Kinematics,
     /// Distance between the entries of the table [m].
     spacing: f64,
-    /// Estimate of what the tissue opposes to a move, k_r [N/m^2], and to one of the tip along the axis [N/m].
-    tissue_stiffness: f64,
+    /// What the tissue is taken to oppose to a lateral move of the needle.
+    tissue: LateralTissue,
+    /// Estimate of what it opposes to a move of the tip along the axis [N/m].
     tip_stiffness: f64,
     start: Shape,
     end: Shape,
@@ -111,7 +113,7 @@ impl FlexibleNeedle {
         let mut needle = FlexibleNeedle {
             params,
             spacing: reach / (ENTRY_COUNT - 1) as f64,
-            tissue_stiffness: ring_stiffness(stiffest, plan.needle.radius, width),
+            tissue: LateralTissue::new(model, plan.needle.radius, plan.params.ring_radius, width),
             tip_stiffness: 1.0 / (1.0 / plan.params.tip_stiffness + 1.0 / (16.0 * stiffest * plan.needle.radius)),
             start: Shape {
                 offset: [DVec3::ZERO; ENTRY_COUNT],
@@ -225,6 +227,8 @@ impl FlexibleNeedle {
             self.beam.add_force(&mut loads, arc, force);
         }
         let h = self.beam.element_length();
+        let dynamic = self.tissue.dynamic_stiffness(length);
+        let stiffness = self.tissue.stiffness + dynamic;
         let count = self.beam.node_count();
         // The loads belong to the middle of the frame. A needle that keeps its shape goes on with the hub and finds the same
         // loads there (cutting goes on); one whose tip stays behind finds less. Of a tip that already stays behind, half of
@@ -239,8 +243,11 @@ impl FlexibleNeedle {
                 continue;
             }
             let last = n == count - 1;
-            let k = self.tissue_stiffness * if last { 0.5 * h } else { h };
-            let mut spring = NodeSpring::lateral(k, axis, mean + axis * ahead);
+            // What goes on as it went meets no inertia; half of it, for the same reason as above.
+            let aside = (self.end.nodes[n] - self.start.nodes[n]).reject_from_normalized(axis);
+            let drift = aside * (0.5 * 1.5 * dynamic / stiffness);
+            let k = stiffness * if last { 0.5 * h } else { h };
+            let mut spring = NodeSpring::lateral(k, axis, mean + axis * ahead + drift);
             if last {
                 spring.stiffness += DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z) * self.tip_stiffness;
             }
@@ -287,6 +294,43 @@ fn hub(params: &Params, pose: &ToolPose) -> HubPose {
         position: pose.tip - pose.direction * params.beam.length,
         direction: pose.direction,
         velocity: pose.velocity,
+    }
+}
+
+/// Estimate of what the tissue opposes to a needle that moves aside, per length of the needle.
+#[derive(Debug, Clone, Copy)]
+struct LateralTissue {
+    /// At rest [N/m^2].
+    stiffness: f64,
+    /// To its speed, by waves that are sent away [N s/m^2].
+    damping: f64,
+    /// To its acceleration, by the tissue that it takes along [kg/m].
+    mass: f64,
+}
+
+/// Parts of damping and mass in the Robin stiffness; below 0.8 and 1.6 the coupling would be unstable.
+const DAMPING_FACTOR: f64 = 2.0;
+const MASS_FACTOR: f64 = 3.0;
+
+impl LateralTissue {
+    /// For a needle of `radius` that holds the tissue within `ring_radius`, in a block of the half width `width` [m]; the largest
+    /// of all materials.
+    fn new(model: &Model, radius: f64, ring_radius: f64, width: f64) -> Self {
+        let largest = |of: &dyn Fn(&Material) -> f64| model.materials.iter().map(of).fold(0.0, f64::max);
+        let density = |m: &Material| m.density * model.mass_scaling();
+        let impedance = |m: &Material, modulus: f64| (density(m) * modulus).sqrt();
+        LateralTissue {
+            stiffness: ring_stiffness(largest(&|m| m.law.shear_modulus()), radius, width),
+            damping: 4.0
+                * radius
+                * largest(&|m| impedance(m, m.law.p_wave_modulus()) + impedance(m, m.law.shear_modulus())),
+            mass: std::f64::consts::PI * ring_radius.max(radius).powi(2) * largest(&density),
+        }
+    }
+
+    /// What damping and mass oppose to a move within a frame that lasts `duration` [s]; in N/m^2.
+    fn dynamic_stiffness(&self, duration: f64) -> f64 {
+        (DAMPING_FACTOR * self.damping + MASS_FACTOR * self.mass / duration) / duration
     }
 }
 

@@ -68,13 +68,13 @@ pub const CASES: &[Case] = &[
         short: &["boundaries.z_max.duration_s=0.08", "solver.duration_s=0.1"],
         parts: &[PLAIN],
         spread: None,
-        cure: Cure::Switch { what: "hourglass stiffness 1", overrides: &["solver.hourglass_stiffness=0.1"] },
+        cure: Cure::Switch { what: "hourglass stiffness 2", overrides: &["solver.hourglass_stiffness=0.1"] },
     },
     Case {
         name: "inverted",
         hard: "every cell inverted",
         scene: "hard/inverted.toml",
-        short: &["tissue.size_mm=[3.0, 3.0, 3.0]"],
+        short: &["tissue.size_mm=[3.0, 3.0, 3.0]", "solver.duration_s=0.01"],
         parts: &[
             Part { label: "mirrored", setup: Setup { state: Some(prepare::mirrored), ..Setup::NONE }, ..PLAIN },
             Part { label: "scattered", setup: Setup { state: Some(prepare::scattered), ..Setup::NONE }, ..PLAIN },
@@ -86,7 +86,7 @@ pub const CASES: &[Case] = &[
         name: "inverted_tets",
         hard: "the same, tetrahedra",
         scene: "hard/inverted_tets.toml",
-        short: &["tissue.size_mm=[3.0, 3.0, 3.0]", "solver.duration_s=0.02"],
+        short: &["tissue.size_mm=[3.0, 3.0, 3.0]", "solver.duration_s=0.01"],
         parts: &[Part {
             setup: Setup { mesh: Some(prepare::tetrahedra), state: Some(prepare::mirrored), ..Setup::NONE },
             ..PLAIN

@@ -257,9 +257,14 @@ impl Plan {
             has_block: subject.has_block(),
             variants: &subject.variants,
         };
-        let mut size_of = |edge: f64| match edge < finest.1 {
-            true => Err(format!("finer than {} mm is not planned", trimmed(round4(finest.1)))),
-            false => subject.mesh_size(edge),
+        let coarsest = subject.coarsest_mm();
+        let mut size_of = |edge: f64| match edge {
+            _ if edge < finest.1 => Err(format!("finer than {} mm is not planned", trimmed(round4(finest.1)))),
+            _ if edge > coarsest => Err(format!(
+                "wider than the path of the needle, {} mm: what such cells give does not converge",
+                trimmed(round4(coarsest))
+            )),
+            _ => subject.mesh_size(edge),
         };
         let choice = choose(&basis, axes, budget.1, &costs, &mut size_of)?;
         let skipped = if axes.contains(&Axis::Effects) { &subject.skipped[..] } else { &[] };

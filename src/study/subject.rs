@@ -132,6 +132,13 @@ impl Subject {
         })
     }
 
+    /// Edge beyond which coarser meshes than the base tell nothing [mm]: a needle's path is softened within a tube, and cells wider
+    /// than that answer with their own width.
+    pub fn coarsest_mm(&self) -> f64 {
+        let path = self.scene.effects.puncture.as_ref().map_or(f64::INFINITY, |p| 2e3 * p.softened_radius);
+        path.max(self.base.cell_size_mm)
+    }
+
     /// True where the cells have an edge that can be chosen.
     pub fn has_block(&self) -> bool {
         self.scene.mesh.is_none()

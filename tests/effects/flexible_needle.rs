@@ -243,3 +243,23 @@ fn vibrating_insertions_keep_the_account() {
         at_most("imbalance", imbalance(&records), 0.02);
     }
 }
+
+/// Scaled mass opposes a needle that moves aside within a frame more than the stiffness of the tissue does: coupled by the
+/// stiffness alone, the needle swings up within twenty frames and the run is stopped at 3.6 mm.
+#[test]
+fn heavy_tissue_does_not_shake_the_needle() {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/muscle_biopsy.toml");
+    let overrides = [
+        r#"effects=["puncture", "friction", "mass_scaling", "flexible_needle"]"#,
+        "solver.mass_scaling=12000",
+        "tissue.cell_size_mm=0.8",
+        "motion.phase.0.depth_mm=5.0",
+        "motion.phase.2.depth_mm=3.0",
+    ]
+    .map(String::from);
+    let (records, _) = run(Scene::load(&file, &overrides).unwrap(), EngineChoice::Auto);
+    at_most("energy", imbalance(&records), 0.005);
+    let aside = records.iter().map(|r| r.force.lateral.length()).fold(0.0, f64::max);
+    let along = records.iter().map(|r| r.force.axial.abs()).fold(0.0, f64::max);
+    at_most("lateral force over axial force", aside / along, 0.05);
+}
