@@ -21,9 +21,12 @@ pub mod process;
 pub mod render;
 pub mod scene;
 pub mod separation;
+pub mod session;
 pub mod solver;
 pub mod stability;
 pub mod study;
 pub mod untrusted;
+#[cfg(feature = "window")]
+pub mod window;
 
 pub use error::{Error, Result};

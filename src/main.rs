@@ -37,6 +37,10 @@ struct Cli {
 enum Command {
     /// Simulate a scene and write forces, energies, fields and pictures
     Run(RunArgs),
+    /// Open a window: lead the needle by hand, or watch, while the tissue is solved (build with --features window)
+    View(ViewArgs),
+    /// Compute a recorded session again: the same forces, without a window
+    Replay(ReplayArgs),
     /// Check a scene and tell what it means, without running it
     Check(CheckArgs),
     /// Stretch and shear a homogeneous sample of a material: stresses as a table, JSON, CSV or figure
@@ -102,6 +106,55 @@ struct RunArgs {
 struct CheckArgs {
     #[command(flatten)]
     scene: SceneArgs,
+}
+
+#[derive(Args)]
+struct ViewArgs {
+    /// Scene file
+    #[arg(default_value = DEFAULT_SCENE)]
+    scene: PathBuf,
+    /// Override a key of the scene, e.g. --set tissue.cell_size_mm=0.8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// The motion of the scene leads the needle, from the start on
+    #[arg(long)]
+    script: bool,
+    /// A recorded session leads the needle; scene and overrides are those of the session
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["script", "overrides"])]
+    session: Option<PathBuf>,
+    /// Folder of force.csv, energy.csv and session.json [default: nothing is written]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Replace the results that the folder holds
+    #[arg(long)]
+    force: bool,
+    /// Folder of a run whose force curve lies behind the live one
+    #[arg(long, value_name = "FOLDER")]
+    reference: Option<PathBuf>,
+    /// Size of the window in points
+    #[arg(long, value_names = ["WIDTH", "HEIGHT"], num_args = 2)]
+    size: Option<Vec<u32>>,
+    /// Start at once and close after so many pictures
+    #[arg(long)]
+    frames: Option<u64>,
+    /// Write the last picture to this PNG file
+    #[arg(long, value_name = "FILE")]
+    screenshot: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct ReplayArgs {
+    /// A session.json that `stylet view` has written
+    session: PathBuf,
+    /// gpu or cpu; auto: the kind of engine that recorded it
+    #[arg(long, default_value = "auto")]
+    engine: EngineChoice,
+    /// Folder of the results [default: the next out/<scene>/001, 002, ...]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Replace the results that the folder holds
+    #[arg(long)]
+    force: bool,
 }
 
 #[derive(Args)]
@@ -444,6 +497,14 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
             print(&text);
             Ok(code)
         }
+        Some(Command::View(args)) => {
+            print(&view(args, start)?);
+            Ok(0)
+        }
+        Some(Command::Replay(args)) => {
+            print(&replay(args)?);
+            Ok(0)
+        }
         Some(Command::Study(args)) => study(args),
         Some(Command::Advise(args)) => {
             print(&advise(args)?);
@@ -469,6 +530,68 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
             Ok(0)
         }
     }
+}
+
+#[cfg(feature = "window")]
+fn view(args: ViewArgs, start: Instant) -> Result<String> {
+    let options = stylet::window::ViewOptions {
+        scene: args.scene,
+        overrides: args.overrides,
+        script: args.script,
+        session: args.session.map(|path| commands::replay::session_file(&path)),
+        out: args.out,
+        force: args.force,
+        frames: args.frames,
+        screenshot: args.screenshot,
+        reference: args.reference,
+        size: args.size.and_then(|size| Some([*size.first()?, *size.get(1)?])),
+    };
+    let seen = stylet::window::view(&options, start)?;
+    if let Some(reason) = seen.stopped {
+        return Err(Error::Device(reason));
+    }
+    Ok(format!(
+        "{} pictures, {:.1} a second; first one after {:.2} s\n{} frames of tissue, real-time factor {:.2}; {:.3} N at {:.2} mm",
+        seen.pictures,
+        seen.frames_per_second,
+        seen.first_picture,
+        seen.frames,
+        seen.real_time_factor,
+        seen.force,
+        seen.depth * 1e3
+    ))
+}
+
+#[cfg(not(feature = "window"))]
+fn view(_: ViewArgs, _: Instant) -> Result<String> {
+    Err(Error::input(
+        "this stylet was built without its window",
+        "build it with the window: cargo run --release --features window -- view",
+    ))
+}
+
+fn replay(args: ReplayArgs) -> Result<String> {
+    let options = commands::replay::ReplayOptions {
+        session: commands::replay::session_file(&args.session),
+        engine: args.engine,
+        out: args.out,
+        force: args.force,
+    };
+    let done = commands::replay::replay(&options)?;
+    let same = match done.same_place {
+        true => "the same bit for bit as recorded".to_string(),
+        false => format!("recorded by {}, so within what adapters differ by", done.recorded_by),
+    };
+    Ok(format!(
+        "{} frames, {:.2} s simulated in {:.2} s by {}: {same}\nlargest force {:.3} N; energy imbalance {:.2} %\n{}",
+        done.frames,
+        done.simulated,
+        done.wall,
+        done.adapter,
+        done.largest_force,
+        100.0 * done.imbalance.abs(),
+        done.folder.display()
+    ))
 }
 
 fn main() -> ExitCode {

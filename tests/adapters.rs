@@ -4,10 +4,11 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// `compare-adapters` of a scene of the repository; the table as JSON.
-fn compared(scene: &str, overrides: &[&str]) -> Value {
+/// `compare-adapters` of a scene of the repository with these variables of the environment; the table as JSON.
+fn compared(scene: &str, overrides: &[&str], variables: &[(&str, &str)]) -> Value {
     let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
     command.current_dir(env!("CARGO_MANIFEST_DIR")).args(["compare-adapters", scene, "--json"]);
+    command.envs(variables.iter().copied());
     for text in overrides {
         command.args(["--set", text]);
     }
@@ -48,14 +49,41 @@ fn a_needle_is_the_same_on_every_adapter() {
     let table = compared(
         "scenes/muscle_biopsy.toml",
         &["tissue.cell_size_mm=1.2", "motion.phase.0.depth_mm=4.0", "motion.phase.2.depth_mm=3.0"],
+        &[],
     );
     assert_alike(&table, [("force", 0.005), ("displacement", 0.005), ("energy", 0.005)]);
 }
 
 #[test]
 fn a_sheared_block_with_histories_is_the_same_on_every_adapter() {
-    let table = compared("scenes/effects/plasticity.toml", &[]);
+    let table = compared("scenes/effects/plasticity.toml", &[], &[]);
     assert_alike(&table, [("force", 0.05), ("displacement", 0.05), ("energy", 0.05)]);
+}
+
+/// SwiftShader, a Vulkan driver that shares no code with Mesa: another compiler, another width of its groups. Debian has it in the
+/// package `chromium`; `REQUIRE_SWIFTSHADER=1` turns its absence into a failure.
+#[test]
+fn a_second_vulkan_driver_computes_the_same() {
+    let manifest = std::env::var("SWIFTSHADER_ICD").unwrap_or("/usr/lib/chromium/vk_swiftshader_icd.json".into());
+    if !std::path::Path::new(&manifest).is_file() {
+        let required = std::env::var("REQUIRE_SWIFTSHADER").is_ok_and(|v| v == "1");
+        assert!(!required, "REQUIRE_SWIFTSHADER=1, and there is no {manifest} (Debian: chromium)");
+        println!("skipped: no SwiftShader");
+        return;
+    }
+    let drivers = [("VK_ICD_FILENAMES", manifest.as_str()), ("WGPU_BACKEND", "vulkan")];
+    for (scene, overrides, bound) in [
+        (
+            "scenes/muscle_biopsy.toml",
+            &["tissue.cell_size_mm=1.2", "motion.phase.0.depth_mm=4.0", "motion.phase.2.depth_mm=3.0"][..],
+            0.005,
+        ),
+        ("scenes/effects/cohesive.toml", &[], 0.05),
+    ] {
+        let table = compared(scene, overrides, &drivers);
+        assert_eq!(assert_alike(&table, [("force", bound), ("displacement", bound), ("energy", bound)]), 1);
+        assert!(table["rows"][1]["adapter"].as_str().unwrap().contains("SwiftShader"), "{table:#}");
+    }
 }
 
 #[test]

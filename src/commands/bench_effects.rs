@@ -168,6 +168,7 @@ pub fn off_is_absent() -> Result<bool> {
             bore: false,
             slit: false,
             free_path: false,
+            drawn: true,
             tetrahedra: false,
             laws: BTreeSet::from([laws]),
         };

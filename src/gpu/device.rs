@@ -43,14 +43,19 @@ fn adapters_of(backends: wgpu::Backends) -> Result<Vec<wgpu::Adapter>> {
     let instance = wgpu::Instance::new(descriptor);
     let mut found = pollster::block_on(instance.enumerate_adapters(backends));
     // Hardware first, software last; the order of wgpu otherwise.
-    found.sort_by_key(|a| match a.get_info().device_type {
+    found.sort_by_key(rank);
+    Ok(found)
+}
+
+/// Place of an adapter among others.
+fn rank(adapter: &wgpu::Adapter) -> u8 {
+    match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
         wgpu::DeviceType::VirtualGpu => 2,
         wgpu::DeviceType::Other => 3,
         wgpu::DeviceType::Cpu => 4,
-    });
-    Ok(found)
+    }
 }
 
 /// True where the user names an adapter or a backend: then a failure to open one is the user's to mend.
@@ -129,6 +134,52 @@ impl Gpu {
             }
         });
         Ok(Gpu { device, queue, info, failure })
+    }
+
+    /// Opens the first adapter of an instance that can draw on a surface; `WGPU_ADAPTER_NAME` names another.
+    ///
+    /// # Errors
+    /// As [`Gpu::open`].
+    pub fn for_surface(instance: &wgpu::Instance, surface: &wgpu::Surface<'_>) -> Result<(Self, wgpu::Adapter)> {
+        let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+        found.retain(|adapter| adapter.is_surface_supported(surface));
+        found.sort_by_key(rank);
+        let wanted = std::env::var("WGPU_ADAPTER_NAME").unwrap_or_default().to_lowercase();
+        let Some(adapter) = found.into_iter().find(|a| a.get_info().name.to_lowercase().contains(&wanted)) else {
+            return Err(Error::Adapter {
+                message: "no GPU adapter can draw into a window here".into(),
+                way_out: "install a Vulkan driver (Debian/Ubuntu: libvulkan1 mesa-vulkan-drivers), unset \
+                          WGPU_ADAPTER_NAME and WGPU_BACKEND, or run the scene without a window: stylet run"
+                    .into(),
+            });
+        };
+        Ok((Self::of_adapter(&adapter)?, adapter))
+    }
+
+    /// Copies a buffer to the host; waits for everything under way.
+    ///
+    /// # Errors
+    /// `Error::Device`.
+    pub fn read_back(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>> {
+        let failed = |reason: String| Error::Device(format!("a buffer could not be read: {reason}"));
+        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size: buffer.size(),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+        self.queue.submit([encoder.finish()]);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            // Nobody listens any more where the wait below has failed.
+            let _ = sender.send(result);
+        });
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(e.to_string()))?;
+        receiver.recv().map_err(|e| failed(e.to_string()))?.map_err(|e| failed(e.to_string()))?;
+        let view = staging.get_mapped_range(..).map_err(|e| failed(e.to_string()))?;
+        Ok(view.to_vec())
     }
 
     /// True for a software adapter.

@@ -61,6 +61,8 @@ pub struct Features {
     pub slit: bool,
     /// The path of the needle is found while the tip moves.
     pub free_path: bool,
+    /// A window draws the fields.
+    pub drawn: bool,
     /// Keys of the elastic laws that occur.
     pub laws: BTreeSet<&'static str>,
 }
@@ -75,6 +77,7 @@ impl Features {
             bore: model.has_surface(|s| matches!(s, ContactSurface::OuterWall | ContactSurface::Bore)),
             slit: model.has_surface(|s| matches!(s, ContactSurface::Slit { .. })),
             free_path: model.puncture.as_ref().is_some_and(|p| p.free.is_some()),
+            drawn: false,
             laws: model.materials.iter().map(|m| m.law.isochoric.key()).collect(),
         }
     }
@@ -146,6 +149,7 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
         Stage::ElementForces => block,
         Stage::MeasureFaces => features.driven_faces,
+        Stage::CellFields | Stage::NodeFields => features.drawn,
         _ => true,
     };
     Stage::ALL.into_iter().filter(wanted).collect()
@@ -196,10 +200,18 @@ impl GpuEngine {
     /// # Errors
     /// `Error::Input` where the mesh is too large for a portable device, `Error::Shader` for a broken shader.
     pub fn new(model: Arc<Model>, gpu: Gpu, dt: f64, max_steps: usize) -> Result<Self> {
+        Self::for_purpose(model, gpu, dt, max_steps, false)
+    }
+
+    /// The same; `drawn`: with the fields that a window draws, see [`GpuEngine::encode_fields`].
+    ///
+    /// # Errors
+    /// As [`GpuEngine::new`].
+    pub fn for_purpose(model: Arc<Model>, gpu: Gpu, dt: f64, max_steps: usize, drawn: bool) -> Result<Self> {
         // Software adapters pay per buffer access: long strips share most planes. Hardware wants many threads.
         let layers = if gpu.is_software() { 8 } else { 4 };
         let layout = Layout::new(&model.mesh, layers);
-        let features = Features::of(&model);
+        let features = Features { drawn, ..Features::of(&model) };
         let defines = defines(&model.effects, &features);
         // Composing, validating and compiling go side by side: they are most of the time to the first step.
         let reflected = stages(&model.effects, &features)
@@ -228,7 +240,7 @@ impl GpuEngine {
         // What a shader writes and a later step may read; sums of a frame are written whole.
         let kept: Vec<&'static str> = BUFFERS
             .into_iter()
-            .filter(|name| !FRAME_RESULTS.contains(name))
+            .filter(|name| !FRAME_RESULTS.contains(name) && !DRAWN.contains(name))
             .filter(|name| reflected.iter().flat_map(|r| &r.bindings).any(|b| b.writable && b.name == *name))
             .collect();
         let kernels = reflected
@@ -296,6 +308,19 @@ impl GpuEngine {
     /// The opened device, for drawing on the same adapter.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
+    }
+
+    /// A buffer by the name of its shader variable.
+    pub fn buffer(&self, name: &str) -> Option<&wgpu::Buffer> {
+        self.buffers.get(name)
+    }
+
+    /// Brings the fields that a window draws up to date with the present state.
+    pub fn encode_fields(&self, encoder: &mut wgpu::CommandEncoder) {
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        for kernel in self.kernels.iter().filter(|k| k.stage.draws()) {
+            kernel.encode(&mut pass, 0);
+        }
     }
 
     /// Names and sizes of all device buffers [bytes].
@@ -501,7 +526,7 @@ impl GpuEngine {
 
     fn encode_step(&self, pass: &mut wgpu::ComputePass<'_>, step: usize) {
         let offset = (step * size_of::<StepInput>()) as u32;
-        for kernel in self.kernels.iter().filter(|k| !k.stage.once_per_frame()) {
+        for kernel in self.kernels.iter().filter(|k| !k.stage.once_per_frame() && !k.stage.draws()) {
             kernel.encode(pass, offset);
         }
     }
@@ -549,6 +574,8 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
         Stage::AdvanceTip | Stage::AdvanceFreeTip => 32,
         Stage::SoftenFreePath => free_plan(model).map_or(1, |f| f.cell_count() as u32),
         Stage::SoftenPath => model.puncture.as_ref().map_or(1, |p| p.cells.len() as u32),
+        Stage::CellFields => model.mesh.cell_count() as u32,
+        Stage::NodeFields => model.mesh.node_count() as u32,
         Stage::MeasureDilatation | Stage::TetrahedronForces => model.mesh.cell_count() as u32,
         Stage::AveragePressure => model.mesh.node_count() as u32,
         Stage::ElementForces => layout.strips().columns * layout.strips().count,
@@ -566,8 +593,11 @@ fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -
 const FRAME_RESULTS: [&str; 7] =
     ["cell_sums", "node_sums", "contact_totals", "face_sums", "separation_sums", "needle_loads", "tip_result"];
 
+/// Buffers of what a window draws: they follow from the state.
+const DRAWN: [&str; 2] = ["drawn_cells", "drawn_nodes"];
+
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 55] = [
+const BUFFERS: [&str; 57] = [
     "cohesive",
     "face_pairs",
     "pair_states",
@@ -623,6 +653,8 @@ const BUFFERS: [&str; 55] = [
     "cell_bulk_stiffness",
     "pressed_nodes",
     "node_dilatation",
+    "drawn_cells",
+    "drawn_nodes",
 ];
 
 /// What a buffer holds at the start: bytes, or zeros of a size.
@@ -737,6 +769,8 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "cell_dilatation" | "cell_bulk_stiffness" => zeros(cells + 1, 4),
         "pressed_nodes" => zeros(nodes, 16),
         "node_dilatation" => zeros(nodes, 4),
+        "drawn_cells" => zeros(cells + 1, 16),
+        "drawn_nodes" => zeros(nodes, 16),
         "clamped_nodes" => zeros(1, 4),
         "node_work" => zeros(nodes, 4),
         "cell_sums" => zeros(measure_threads.into(), size_of::<CellSums>()),
@@ -1259,6 +1293,10 @@ fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) ->
 impl Engine for GpuEngine {
     fn info(&self) -> &EngineInfo {
         &self.info
+    }
+
+    fn on_device(&self) -> Option<&GpuEngine> {
+        Some(self)
     }
 
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {

@@ -45,7 +45,6 @@ struct Taken {
 pub struct FlexibleNeedle {
     params: Params,
     beam: Beam,
-    kinematics: Kinematics,
     /// Distance between the entries of the table [m].
     spacing: f64,
     /// What the tissue is taken to oppose to a lateral move of the needle.
@@ -99,8 +98,8 @@ impl FlexibleNeedle {
     }
 
     /// The needle of a scene, bent by its weight; `first_frame`: length of the first frame [s]. `None` without the effect.
-    pub fn new(model: &Model, first_frame: f64) -> Option<Self> {
-        let (params, kinematics) = (model.effects.flexible_needle?, model.kinematics.clone()?);
+    pub fn new(model: &Model, kinematics: Option<&Kinematics>, first_frame: f64) -> Option<Self> {
+        let (params, kinematics) = (model.effects.flexible_needle?, kinematics?);
         let plan = model.puncture.as_ref()?;
         let pose = kinematics.pose(0.0);
         let mut beam = Beam::straight(params.beam, hub(&params, &pose));
@@ -128,10 +127,9 @@ impl FlexibleNeedle {
             answered: [DVec3::ZERO; ENTRY_COUNT],
             energy: 0.0,
             beam,
-            kinematics,
         };
         needle.end = needle.shape(&pose);
-        needle.step(loads, DVec3::ZERO, first_frame, first_frame);
+        needle.step(kinematics, loads, DVec3::ZERO, first_frame, first_frame);
         Some(needle)
     }
 
@@ -158,8 +156,8 @@ impl FlexibleNeedle {
 
     /// Moves the beam over the next frame, which lasts `duration` and ends at `time` [s]. `transmitted`: sum of the forces in
     /// `loads`, which the hub feels as they are [N].
-    fn step(&mut self, loads: Loads, transmitted: DVec3, time: f64, duration: f64) {
-        let pose = self.kinematics.pose(time);
+    fn step(&mut self, kinematics: &Kinematics, loads: Loads, transmitted: DVec3, time: f64, duration: f64) {
+        let pose = kinematics.pose(time);
         let before = (self.beam.energy().total(), self.beam.hub().position, self.beam.position.clone());
         let done = self.beam.advance(hub(&self.params, &pose), &loads, duration, TimeRule::BackwardEuler);
         let travel = self.beam.hub().position - before.1;
@@ -202,7 +200,13 @@ impl FlexibleNeedle {
 
     /// Takes the loads of the frame that was bent last and lasted `duration` [s], turns the tool's work into that of the
     /// hub, and bends the needle for the next frame, `next`: its end and length [s].
-    pub fn answer(&mut self, sums: &mut FrameSums, duration: f64, next: Option<(f64, f64)>) -> NeedleRecord {
+    pub fn answer(
+        &mut self,
+        kinematics: &Kinematics,
+        sums: &mut FrameSums,
+        duration: f64,
+        next: Option<(f64, f64)>,
+    ) -> NeedleRecord {
         let axis = self.beam.hub().direction;
         let retreat_rate = (self.end.retreat - self.start.retreat) / duration;
         let on_tissue: f64 = (0..ENTRY_COUNT)
@@ -234,7 +238,7 @@ impl FlexibleNeedle {
         // loads there (cutting goes on); one whose tip stays behind finds less. Of a tip that already stays behind, half of
         // that motion is expected to go on: all of it would make the coupling unstable.
         let middle = 0.5 * (self.start.nodes[0] + self.end.nodes[0]);
-        let straight_on = self.kinematics.pose(time).tip - axis * self.params.beam.length - middle;
+        let straight_on = kinematics.pose(time).tip - axis * self.params.beam.length - middle;
         let ahead = straight_on.dot(axis) - 0.5 * 1.5 * (self.end.retreat - self.start.retreat);
         for n in 1..count {
             let mean = 0.5 * (self.start.nodes[n] + self.end.nodes[n]);
@@ -253,7 +257,7 @@ impl FlexibleNeedle {
             }
             loads.springs[n] = Some(spring);
         }
-        self.step(loads, transmitted, time, length);
+        self.step(kinematics, loads, transmitted, time, length);
         record
     }
 

@@ -10,7 +10,7 @@ pub mod slit;
 
 use glam::DVec3;
 
-use crate::scene::motion::{Leg, Placement};
+use crate::scene::motion::{HandPose, Leg, Placement};
 use crate::scene::{Motion, Vibration};
 
 /// Position and velocity of the tool tip at one moment.
@@ -40,6 +40,8 @@ pub struct Kinematics {
     end: f64,
     at_end: Placement,
     vibration: Option<Vibration>,
+    /// True where a hand leads: legs are no phases.
+    led: bool,
 }
 
 impl Kinematics {
@@ -51,7 +53,44 @@ impl Kinematics {
             legs.push((time, leg));
             time += leg.duration;
         }
-        Kinematics { reference: motion.direction, legs, end: time, at_end: motion.end(), vibration: motion.vibration }
+        Kinematics {
+            reference: motion.direction,
+            legs,
+            end: time,
+            at_end: motion.end(),
+            vibration: motion.vibration,
+            led: false,
+        }
+    }
+
+    /// A motion that a hand leads, see [`Kinematics::lead`]: it starts where the phases would.
+    pub fn led(motion: &Motion) -> Self {
+        Kinematics {
+            reference: motion.direction,
+            legs: Vec::new(),
+            end: 0.0,
+            at_end: motion.begin(),
+            vibration: motion.vibration,
+            led: true,
+        }
+    }
+
+    /// Goes on from the present end to `pose` at `until` [s].
+    pub fn lead(&mut self, pose: &HandPose, until: f64) {
+        let leg = Leg::led(&self.at_end, pose, until - self.end);
+        self.at_end = Placement { velocity: DVec3::ZERO, turning: DVec3::ZERO, ..leg.at(leg.duration) };
+        self.legs.push((self.end, leg));
+        self.end = until;
+    }
+
+    pub fn is_led(&self) -> bool {
+        self.led
+    }
+
+    /// Where the tool is at the end of the motion so far.
+    pub fn last(&self) -> HandPose {
+        let at = self.at_end;
+        HandPose { entry: at.tip - at.direction * at.depth, direction: at.direction, depth: at.depth }
     }
 
     /// Length of the motion [s].
@@ -93,7 +132,7 @@ impl Kinematics {
             direction: at.direction,
             angular_velocity: swing_rate(self.reference, at.direction, at.turning),
             depth: at.depth + offset.dot(at.direction),
-            phase: phase.min(last),
+            phase: if self.led { 0 } else { phase.min(last) },
         }
     }
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{EnergyAccount, ForceParts, FrameRecord, Health};
 use crate::model::Model;
+use crate::needle::Kinematics;
 use crate::scene::Tool;
 use crate::solver::engine::FrameSums;
 
@@ -24,7 +25,7 @@ impl Recorder {
     }
 
     /// Books one frame whose steps lasted `dt` [s] each and returns its record.
-    pub fn record(&mut self, model: &Model, dt: f64, sums: &FrameSums) -> FrameRecord {
+    pub fn record(&mut self, model: &Model, kinematics: Option<&Kinematics>, dt: f64, sums: &FrameSums) -> FrameRecord {
         let duration = f64::from(sums.steps) * dt;
         let begin = self.step as f64 * dt;
         self.step += u64::from(sums.steps);
@@ -47,7 +48,7 @@ impl Recorder {
         self.contact_dissipation += sums.contact_dissipation;
         e.needle = sums.needle_energy;
         e.contact = sums.contact_energy + self.contact_dissipation;
-        let mean_pose = model.kinematics.as_ref().map(|k| k.pose(0.5 * (begin + end)));
+        let mean_pose = kinematics.map(|k| k.pose(0.5 * (begin + end)));
         let direction = mean_pose.map_or(DVec3::ZERO, |p| p.direction);
         let force = sums.impulse / duration;
         let mut parts = ForceParts {
@@ -57,7 +58,7 @@ impl Recorder {
             shaft_spreading: sums.shaft_impulse / duration,
             friction: sums.friction_impulse / duration,
             adhesion: sums.adhesion_impulse / duration,
-            inertia: inertia(model, end),
+            inertia: inertia(model, kinematics, end),
             lateral: force - direction * force.dot(direction),
             torque: sums.angular_impulse / duration,
             ..Default::default()
@@ -98,8 +99,8 @@ impl Recorder {
 /// Mass of the needle times the acceleration of its prescribed motion along the insertion, mean over the display frame
 /// before `end` [N]. The motion changes its speed at once; the mean makes a pulse of it that is one frame long. The tool
 /// stood still before t = 0.
-fn inertia(model: &Model, end: f64) -> f64 {
-    let (Some(kinematics), Some(Tool::Needle(needle))) = (&model.kinematics, &model.scene.tool) else {
+fn inertia(model: &Model, kinematics: Option<&Kinematics>, end: f64) -> f64 {
+    let (Some(kinematics), Some(Tool::Needle(needle))) = (kinematics, &model.scene.tool) else {
         return 0.0;
     };
     let frame = 1.0 / model.scene.solver.frame_rate;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::FrameRecord;
 use crate::model::Model;
+use crate::needle::Kinematics;
 
 /// A target at the end of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -18,11 +19,16 @@ pub struct TargetRecord {
 
 impl TargetRecord {
     /// The targets that have moved by `displacements` [m] at the end of the frame of `record`.
-    pub fn of(model: &Model, record: &FrameRecord, displacements: &[DVec3]) -> Vec<TargetRecord> {
+    pub fn of(
+        model: &Model,
+        kinematics: Option<&Kinematics>,
+        record: &FrameRecord,
+        displacements: &[DVec3],
+    ) -> Vec<TargetRecord> {
         if displacements.is_empty() {
             return Vec::new();
         }
-        let pose = model.kinematics.as_ref().map(|k| k.pose(record.time));
+        let pose = kinematics.map(|k| k.pose(record.time));
         // A flexible needle has its tip beside and behind that of a straight one.
         let tip = pose.map(|p| p.tip + record.needle.tip_offset - p.direction * record.needle.retreat);
         let targets = model.scene.targets.iter().zip(displacements);

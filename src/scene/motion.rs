@@ -1,6 +1,7 @@
 //! Motion of the tool: phases as a scene states them, and the legs of a rigid motion that they make.
 
 use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// Motion of the tool, phase after phase.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -72,6 +73,17 @@ enum LegPath {
     Turn { tip: DVec3, pivot: DVec3, spin: DVec3 },
 }
 
+/// Where a hand wants the needle to be at the end of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HandPose {
+    /// Point of the top face at rest that the needle goes through [m].
+    pub entry: DVec3,
+    /// Unit vector of the insertion.
+    pub direction: DVec3,
+    /// Distance of the tip behind the top face, along the needle [m]; negative outside.
+    pub depth: f64,
+}
+
 /// Where the needle is and how it moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
@@ -97,6 +109,18 @@ fn spin_between(from: DVec3, to: DVec3, duration: f64) -> DVec3 {
 }
 
 impl Leg {
+    /// The way from a placement to where a hand wants the needle, in `duration` [s]; along the needle where it only advances.
+    pub fn led(from: &Placement, to: &HandPose, duration: f64) -> Self {
+        let entry = from.tip - from.direction * from.depth;
+        let path = if to.direction == from.direction && (to.entry - entry).length() < 1e-9 {
+            LegPath::Along { entry: to.entry, depth: from.depth, rate: (to.depth - from.depth) / duration }
+        } else {
+            let velocity = (to.entry + to.direction * to.depth - from.tip) / duration;
+            LegPath::Free { tip: from.tip, velocity, spin: spin_between(from.direction, to.direction, duration) }
+        };
+        Leg { duration, direction: from.direction, path }
+    }
+
     /// Placement `time` [s] after the beginning of the leg.
     pub fn at(&self, time: f64) -> Placement {
         let turned = |spin: DVec3| {
@@ -176,17 +200,22 @@ impl Motion {
         legs
     }
 
+    /// Placement before the first phase: the tip on the surface.
+    pub fn begin(&self) -> Placement {
+        Placement {
+            tip: self.entry,
+            velocity: DVec3::ZERO,
+            direction: self.direction,
+            turning: DVec3::ZERO,
+            depth: 0.0,
+        }
+    }
+
     /// Placement after the last phase.
     pub fn end(&self) -> Placement {
         match self.legs().last() {
             Some(leg) => Placement { velocity: DVec3::ZERO, turning: DVec3::ZERO, ..leg.at(leg.duration) },
-            None => Placement {
-                tip: self.entry,
-                velocity: DVec3::ZERO,
-                direction: self.direction,
-                turning: DVec3::ZERO,
-                depth: 0.0,
-            },
+            None => self.begin(),
         }
     }
 

@@ -6,11 +6,12 @@ use serde::{Deserialize, Serialize};
 use super::checkpoint::EngineImage;
 use crate::effects::adhesion::Bond;
 use crate::error::Result;
+use crate::gpu::GpuEngine;
 use crate::material_point::PointState;
 use crate::model::Model;
-use crate::needle::ToolPose;
 use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
 use crate::needle::free_path::FreeTip;
+use crate::needle::{Kinematics, ToolPose};
 use crate::scene::Face;
 
 /// What is given to one step from outside: the only place where user input enters.
@@ -50,8 +51,13 @@ pub struct FramePlan {
 }
 
 impl StepInput {
-    /// Input of the step that begins at `time` [s] and lasts `dt` [s].
+    /// Input of the step that begins at `time` [s] and lasts `dt` [s], with the motion of the scene.
     pub fn at(model: &Model, time: f64, dt: f64) -> Self {
+        Self::with(model, model.kinematics.as_ref(), time, dt)
+    }
+
+    /// The same with another motion of the tool.
+    pub fn with(model: &Model, kinematics: Option<&Kinematics>, time: f64, dt: f64) -> Self {
         let ramp = |t: f64, duration: f64| {
             if duration > 0.0 { (t / duration).clamp(0.0, 1.0) } else { 1.0 }
         };
@@ -67,7 +73,7 @@ impl StepInput {
             };
         }
         StepInput {
-            pose: model.kinematics.as_ref().map(|k| k.pose(time)),
+            pose: kinematics.map(|k| k.pose(time)),
             load_factor: ramp(time, model.load_ramp),
             drives,
             step: (time / dt).round() as u64,
@@ -223,6 +229,10 @@ pub struct EngineInfo {
 /// frame or two later.
 pub trait Engine {
     fn info(&self) -> &EngineInfo;
+    /// The engine on a device, for those who draw from its buffers.
+    fn on_device(&self) -> Option<&GpuEngine> {
+        None
+    }
     /// Starts one frame. Returns as soon as the work is submitted.
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()>;
     /// The next finished frame. With `wait`, blocks until one is there; `None` when none is under way (or

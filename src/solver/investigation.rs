@@ -125,8 +125,9 @@ impl Simulation {
         let at = steps.last().copied().unwrap_or_default();
         let record = FrameRecord { frame, step: at.step, time: at.time, ..Default::default() };
         let line = self.needle.as_ref().map(|needle| needle.centre_line());
-        let mut fields = super::simulation::snapshot(&self.model, &record, state.clone(), line);
-        fields.depth = self.model.kinematics.as_ref().map_or(0.0, |k| k.pose(at.time).depth);
+        let mut fields =
+            super::simulation::snapshot(&self.model, self.kinematics.as_ref(), &record, state.clone(), line);
+        fields.depth = self.kinematics.as_ref().map_or(0.0, |k| k.pose(at.time).depth);
         Ok(locate(&self.model, &state, fields, steps, sign, frame))
     }
 }

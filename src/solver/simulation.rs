@@ -16,12 +16,13 @@ use crate::material::{Verdict, von_mises};
 use crate::material_point::PointState;
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::needle::ToolPose;
 use crate::needle::centre_line::CentreLine;
 use crate::needle::flexible::FlexibleNeedle;
+use crate::needle::{Kinematics, ToolPose};
 use crate::observables::{
     CoreSample, FieldSnapshot, FrameRecord, NeedleRecord, Recorder, TargetRecord, cells_in_needle,
 };
+use crate::scene::motion::HandPose;
 use crate::scene::{MOST_STEPS_PER_FRAME, Scene};
 
 /// Which engine the user wants.
@@ -65,6 +66,18 @@ const AHEAD: u64 = 2;
 /// turned inside out for a step are counted and reported, more make the stress and the dissipation meaningless.
 pub(super) const RETURN_FAILURE_PART: f64 = 1e-3;
 
+/// Longest motion that a hand may lead [s].
+const LONGEST_LED: f64 = 3600.0;
+
+/// What a simulation is made for, beside records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Purpose {
+    /// A hand leads the tool, not the phases of the scene.
+    pub led: bool,
+    /// The device keeps the fields that a window draws.
+    pub drawn: bool,
+}
+
 /// A simulation that is advanced frame by frame.
 pub struct Simulation {
     pub model: Arc<Model>,
@@ -80,6 +93,10 @@ pub struct Simulation {
     late_steps: u64,
     total_steps: u64,
     frames: u64,
+    /// Motion of the tool: the phases of the scene, or what a hand has led so far.
+    pub(super) kinematics: Option<Kinematics>,
+    /// Frames that a hand has led.
+    led_frames: u64,
     pub(super) started: u64,
     pub(super) collected: u64,
     guard: Guard,
@@ -128,13 +145,47 @@ impl Simulation {
     /// The same on a given mesh.
     pub fn with_mesh(scene: Scene, mesh: impl Into<Mesh>, choice: EngineChoice) -> Result<Self> {
         let (device, notices) = Self::choose_device(choice)?;
-        Self::prepare(scene, mesh.into(), device, notices, MOST_STEPS_PER_FRAME)
+        Self::prepare(scene, mesh.into(), device, notices, MOST_STEPS_PER_FRAME, Purpose::default())
     }
 
     /// The same on this device, without one on the CPU engine.
     pub fn on(scene: Scene, device: Option<Gpu>) -> Result<Self> {
+        Self::for_purpose(scene, device, Purpose::default())
+    }
+
+    /// The same for a purpose. A tool that a hand leads stands on the surface until [`Simulation::lead`] is called.
+    pub fn for_purpose(scene: Scene, device: Option<Gpu>, purpose: Purpose) -> Result<Self> {
         let mesh = Mesh::of_scene(&scene);
-        Self::prepare(scene, mesh, device, Vec::new(), MOST_STEPS_PER_FRAME)
+        let mut simulation = Self::prepare(scene, mesh, device, Vec::new(), MOST_STEPS_PER_FRAME, purpose)?;
+        // A needle that bends is solved one frame ahead: it follows the hand a frame later.
+        if let (Some(_), Some(pose)) = (&simulation.needle, simulation.hand()) {
+            simulation.lead(&pose);
+        }
+        Ok(simulation)
+    }
+
+    /// Where the hand has led the tool so far; `None` where no hand leads.
+    pub fn hand(&self) -> Option<HandPose> {
+        self.kinematics.as_ref().filter(|k| k.is_led()).map(|k| k.last())
+    }
+
+    /// Leads the tool to `pose` within one more frame, which may then be started.
+    pub fn lead(&mut self, pose: &HandPose) {
+        let until = self.first_step(self.led_frames + 1) as f64 * self.dt;
+        if let Some(kinematics) = self.kinematics.as_mut().filter(|k| k.is_led()) {
+            kinematics.lead(pose, until);
+            self.led_frames += 1;
+        }
+    }
+
+    /// Pose of the tool at `time` [s].
+    pub fn tool_pose(&self, time: f64) -> Option<ToolPose> {
+        self.kinematics.as_ref().map(|k| k.pose(time))
+    }
+
+    /// End of a frame [s].
+    pub fn end_of(&self, frame: u64) -> f64 {
+        self.first_step(frame + 1).min(self.total_steps.max(1)) as f64 * self.dt
     }
 
     /// The device of a choice, and what is to be said about it; no device: the CPU engine.
@@ -163,6 +214,7 @@ impl Simulation {
         device: Option<Gpu>,
         mut notices: Vec<String>,
         most_steps: u64,
+        purpose: Purpose,
     ) -> Result<Self> {
         let model = Arc::new(Model::new(scene, mesh));
         let stable_dt = wave_speed_bound(&model);
@@ -197,10 +249,21 @@ impl Simulation {
             ));
         }
         let engine: Box<dyn Engine> = match &device {
-            Some(gpu) => Box::new(GpuEngine::new(model.clone(), gpu.clone(), dt, steps_per_frame as usize)?),
+            Some(gpu) => Box::new(GpuEngine::for_purpose(
+                model.clone(),
+                gpu.clone(),
+                dt,
+                steps_per_frame as usize,
+                purpose.drawn,
+            )?),
             None => Box::new(CpuEngine::new(model.clone(), dt)),
         };
-        let total_steps = ((model.duration() / dt) * (1.0 - 1e-9)).ceil() as u64;
+        let kinematics = match purpose.led {
+            true => model.kinematics.is_some().then(|| Kinematics::led(&model.scene.motion)),
+            false => model.kinematics.clone(),
+        };
+        let duration = if purpose.led { LONGEST_LED } else { model.duration() };
+        let total_steps = ((duration / dt) * (1.0 - 1e-9)).ceil() as u64;
         // The first frame is a single step, so that the time to the first step can be told.
         let frames = 1 + total_steps.saturating_sub(1).div_ceil(steps_per_frame);
         let watch_stretch = model.materials.iter().any(|m| !matches!(m.law.verdict(), Verdict::Stable));
@@ -226,7 +289,9 @@ impl Simulation {
             stops: BTreeSet::new(),
             watch_stretch,
             // The first frame is a single step.
-            needle: FlexibleNeedle::new(&model, dt),
+            needle: FlexibleNeedle::new(&model, kinematics.as_ref(), dt),
+            kinematics,
+            led_frames: 0,
             unbalanced_frames: 0,
             buckling_told: false,
             notices,
@@ -314,7 +379,8 @@ impl Simulation {
         let mut scene = self.model.scene.clone();
         scene.solver.time_step = Some(0.5 * self.dt);
         let (mesh, most_steps) = (self.model.mesh.clone(), 2 * self.steps_per_frame);
-        let mut next = Simulation::prepare(scene, mesh, self.device.clone(), Vec::new(), most_steps)?;
+        let mut next =
+            Simulation::prepare(scene, mesh, self.device.clone(), Vec::new(), most_steps, Purpose::default())?;
         next.engine.write_state(&state)?;
         if let (Some(needle), Some(image)) = (&mut next.needle, &checkpoint.needle) {
             needle.restore(image);
@@ -360,10 +426,13 @@ impl Simulation {
     pub(super) fn plan(&self, frame: u64) -> FramePlan {
         let first_step = self.first_step(frame);
         let last = self.first_step(frame + 1).min(self.total_steps.max(1));
+        let tool = self.kinematics.as_ref();
         let mut plan = FramePlan {
             frame,
             first_step,
-            steps: (first_step..last).map(|s| StepInput::at(&self.model, s as f64 * self.dt, self.dt)).collect(),
+            steps: (first_step..last)
+                .map(|s| StepInput::with(&self.model, tool, s as f64 * self.dt, self.dt))
+                .collect(),
             centre_line: None,
         };
         if let Some(needle) = &self.needle {
@@ -377,18 +446,27 @@ impl Simulation {
             || self.needle.is_some()
             || self.model.has_bore()
             || self.stops.range(self.collected..frame).next().is_some();
-        frame < self.frames && frame - self.collected <= AHEAD && (!waits || frame == self.collected)
+        // The beam of a needle that bends looks one frame ahead.
+        let led = !self.kinematics.as_ref().is_some_and(|k| k.is_led())
+            || frame + u64::from(self.needle.is_some()) < self.led_frames;
+        led && frame < self.frames && frame - self.collected <= AHEAD && (!waits || frame == self.collected)
     }
 
-    /// The next record; `None` after the last frame.
-    ///
-    /// # Errors
-    /// `Error::Diverged` when the state has left the range in which its numbers mean something; `Error::Device`.
-    pub fn next_frame(&mut self) -> Result<Option<FrameRecord>> {
+    /// Gives the engine the frames that may be started; [`Simulation::next_frame`] does so by itself.
+    pub fn start_frames(&mut self) -> Result<()> {
         while self.may_start(self.started) {
             self.engine.start_frame(&self.plan(self.started))?;
             self.started += 1;
         }
+        Ok(())
+    }
+
+    /// The next record; `None` after the last frame, and where no frame has been led.
+    ///
+    /// # Errors
+    /// `Error::Diverged` when the state has left the range in which its numbers mean something; `Error::Device`.
+    pub fn next_frame(&mut self) -> Result<Option<FrameRecord>> {
+        self.start_frames()?;
         if self.collected == self.started {
             return Ok(None);
         }
@@ -397,9 +475,9 @@ impl Simulation {
         };
         self.collected += 1;
         let bent = self.answer_of_the_needle(&mut sums);
-        let mut record = self.recorder.record(&self.model, self.dt, &sums);
+        let mut record = self.recorder.record(&self.model, self.kinematics.as_ref(), self.dt, &sums);
         record.needle = bent;
-        record.targets = TargetRecord::of(&self.model, &record, &sums.targets);
+        record.targets = TargetRecord::of(&self.model, self.kinematics.as_ref(), &record, &sums.targets);
         self.tell_of_the_needle(&record);
         if let Some(trouble) = self.guard.check(&record, sums.steps) {
             return Err(self.stopped(&record, trouble));
@@ -412,7 +490,7 @@ impl Simulation {
         }
         if self.model.has_bore() {
             let state = self.engine.read_state()?;
-            let pose = self.model.kinematics.as_ref().map(|k| k.pose(record.time));
+            let pose = self.kinematics.as_ref().map(|k| k.pose(record.time));
             record.core = pose.and_then(|pose| CoreSample::of(&self.model, &state, &pose));
         }
         if self.watch_stretch {
@@ -428,9 +506,9 @@ impl Simulation {
         let next = (self.collected < self.frames)
             .then(|| (end(self.collected), end(self.collected) - self.first_step(self.collected) as f64 * dt));
         let broken = sums.not_finite || !sums.needle_loads.iter().all(|l| l.is_finite());
-        match &mut self.needle {
+        match (&mut self.needle, &self.kinematics) {
             // Loads of a broken state mean nothing; the run stops right after.
-            Some(needle) if !broken => needle.answer(sums, f64::from(sums.steps) * dt, next),
+            (Some(needle), Some(tool)) if !broken => needle.answer(tool, sums, f64::from(sums.steps) * dt, next),
             _ => NeedleRecord::default(),
         }
     }
@@ -487,11 +565,16 @@ impl Simulation {
         Ok(())
     }
 
+    /// The centre-line of a needle that bends, at the end of the frame that was collected last.
+    pub fn centre_line(&self) -> Option<CentreLine> {
+        self.needle.as_ref().map(|needle| needle.centre_line())
+    }
+
     /// Fields of the present state; call it right after a frame registered with [`Simulation::stop_after`].
     pub fn snapshot(&mut self, record: &FrameRecord) -> Result<FieldSnapshot> {
         let state = self.engine.read_state()?;
         let line = self.needle.as_ref().map(|needle| needle.centre_line());
-        Ok(snapshot(&self.model, record, state, line))
+        Ok(snapshot(&self.model, self.kinematics.as_ref(), record, state, line))
     }
 }
 
@@ -546,7 +629,13 @@ fn principal_stretch_range(f: glam::DMat3) -> (f64, f64) {
 }
 
 /// Stresses and Jacobians of a state, in f64; `line`: the centre-line of a bent needle then.
-pub fn snapshot(model: &Model, record: &FrameRecord, state: State, line: Option<CentreLine>) -> FieldSnapshot {
+pub fn snapshot(
+    model: &Model,
+    kinematics: Option<&Kinematics>,
+    record: &FrameRecord,
+    state: State,
+    line: Option<CentreLine>,
+) -> FieldSnapshot {
     let elements = Elements::new(model);
     let gradients = displacement_gradients(&model.mesh, &state);
     let mut fields = FieldSnapshot {
@@ -557,7 +646,7 @@ pub fn snapshot(model: &Model, record: &FrameRecord, state: State, line: Option<
         centre_line: line,
         ..Default::default()
     };
-    let pose = model.kinematics.as_ref().map(|k| {
+    let pose = kinematics.map(|k| {
         let pose = k.pose(record.time);
         // The tip of a bent needle stays behind.
         ToolPose { tip: pose.tip - pose.direction * record.needle.retreat, ..pose }

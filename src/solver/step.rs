@@ -37,11 +37,15 @@ pub enum Stage {
     MeasureFaces,
     /// Energies and torn area of faces that separate (once per frame).
     MeasureSeparation,
+    /// Stress, pressure and stretch of every cell, for a window (once per frame that is drawn).
+    CellFields,
+    /// Their means at the nodes (once per frame that is drawn).
+    NodeFields,
 }
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 17] = [
+    pub const ALL: [Stage; 19] = [
         Stage::AdvanceTip,
         Stage::SoftenPath,
         Stage::AdvanceFreeTip,
@@ -59,6 +63,8 @@ impl Stage {
         Stage::MeasureContact,
         Stage::MeasureFaces,
         Stage::MeasureSeparation,
+        Stage::CellFields,
+        Stage::NodeFields,
     ];
 
     /// File stem and label.
@@ -81,6 +87,8 @@ impl Stage {
             Stage::MeasureContact => "measure_contact",
             Stage::MeasureFaces => "measure_faces",
             Stage::MeasureSeparation => "measure_separation",
+            Stage::CellFields => "cell_fields",
+            Stage::NodeFields => "node_fields",
         }
     }
 
@@ -93,6 +101,11 @@ impl Stage {
     /// belong to the displacement after its last step.
     pub fn averages(self) -> bool {
         matches!(self, Stage::MeasureDilatation | Stage::AveragePressure)
+    }
+
+    /// True for the stages that give a window what it draws.
+    pub fn draws(self) -> bool {
+        matches!(self, Stage::CellFields | Stage::NodeFields)
     }
 
     /// True for the stages that run once per frame, after its last step.

@@ -1,0 +1,93 @@
+//! `stylet replay`: a recorded session without a window.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::Result;
+use crate::gpu::Gpu;
+use crate::output::{DrivenFace, OutputFolder, Tables};
+use crate::session::Session;
+use crate::solver::simulation::{EngineChoice, Purpose, Simulation};
+
+/// What the user asked for.
+#[derive(Debug, Clone)]
+pub struct ReplayOptions {
+    pub session: PathBuf,
+    pub engine: EngineChoice,
+    pub out: Option<PathBuf>,
+    pub force: bool,
+}
+
+/// What came out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReplayOutcome {
+    pub folder: PathBuf,
+    pub frames: u64,
+    /// Largest axial force [N], and energy that is missing over the largest external work.
+    pub largest_force: f64,
+    pub imbalance: f64,
+    /// Simulated and wall time of the frames [s].
+    pub simulated: f64,
+    pub wall: f64,
+    /// True where version, engine and adapter are those of the session: then the forces are the same bit for bit.
+    pub same_place: bool,
+    pub recorded_by: String,
+    pub adapter: String,
+}
+
+/// Computes a session again and writes its tables.
+///
+/// # Errors
+/// `Error::Input` for a session that is none or whose scene has changed; `Error::Diverged` where the guard stops the run, as it
+/// did when it was recorded; what the folder cannot take.
+pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
+    let session = Session::read(&options.session)?;
+    let scene = session.scene()?;
+    let device = match (options.engine, session.engine.as_str()) {
+        (EngineChoice::Cpu, _) | (EngineChoice::Auto, "cpu") => None,
+        _ => Some(Gpu::open()?),
+    };
+    let folder = OutputFolder::create(options.out.as_deref(), &scene.name, options.force)?;
+    let mut simulation = Simulation::for_purpose(scene.clone(), device, Purpose { led: true, drawn: false })?;
+    let info = simulation.engine().info().clone();
+    let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
+    let mut tables = Tables::create(&folder, &driven, simulation.model.has_bore(), &scene.targets)?;
+    let begin = Instant::now();
+    let mut outcome = ReplayOutcome {
+        folder: folder.path().to_path_buf(),
+        frames: 0,
+        largest_force: 0.0,
+        imbalance: 0.0,
+        simulated: 0.0,
+        wall: 0.0,
+        same_place: session.version == env!("CARGO_PKG_VERSION")
+            && session.adapter == info.adapter
+            && session.driver == info.driver,
+        recorded_by: place(&session.version, &session.adapter),
+        adapter: place(env!("CARGO_PKG_VERSION"), &info.adapter),
+    };
+    for pose in &session.poses {
+        simulation.lead(pose);
+        let Some(record) = simulation.next_frame()? else { break };
+        tables.append(&record)?;
+        outcome.frames += 1;
+        outcome.simulated = record.time;
+        outcome.largest_force = outcome.largest_force.max(record.force.axial);
+        outcome.imbalance = record.energy.imbalance();
+    }
+    outcome.wall = begin.elapsed().as_secs_f64();
+    session.write(&folder.file(SESSION))?;
+    Ok(outcome)
+}
+
+/// File of a session in its folder.
+pub const SESSION: &str = "session.json";
+
+fn place(version: &str, adapter: &str) -> String {
+    format!("stylet {version} on {adapter}")
+}
+
+/// A file of a folder or the file itself.
+pub fn session_file(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join(SESSION) } else { path.to_path_buf() }
+}

@@ -1,0 +1,109 @@
+//! A recorded session: what a hand did, frame by frame, and nothing else. The run is computed again from it.
+//!
+//! Replayed by the same program on the same adapter it gives the same forces bit for bit; elsewhere within what adapters differ
+//! (`stylet compare-adapters`).
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::output::checkpoint::fingerprint;
+use crate::output::whole_file;
+use crate::scene::Scene;
+use crate::scene::motion::HandPose;
+use crate::solver::engine::EngineInfo;
+
+/// Version of the format.
+const FORMAT: u32 = 1;
+/// Largest file that is read: an hour at 60 frames/s takes 40 MB.
+const LARGEST_FILE: u64 = 64 << 20;
+
+/// The inputs of one session.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Session {
+    pub format: u32,
+    /// Program version, engine, adapter and driver that recorded it.
+    pub version: String,
+    pub engine: String,
+    pub adapter: String,
+    pub driver: String,
+    /// Scene file, its overrides, and the fingerprint of both.
+    pub scene: PathBuf,
+    pub overrides: Vec<String>,
+    pub fingerprint: u64,
+    /// Where the hand wanted the needle at the end of every frame; SI.
+    pub poses: Vec<HandPose>,
+}
+
+impl Session {
+    /// An empty session of a scene on an engine.
+    pub fn new(scene: &Scene, overrides: &[String], engine: &EngineInfo) -> Self {
+        Session {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION").into(),
+            engine: engine.engine.clone(),
+            adapter: engine.adapter.clone(),
+            driver: engine.driver.clone(),
+            scene: scene.path.clone(),
+            overrides: overrides.to_vec(),
+            fingerprint: fingerprint(scene),
+            poses: Vec::new(),
+        }
+    }
+
+    /// # Errors
+    /// `Error::File` where the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string(self).map_err(|e| Error::file(path, std::io::Error::other(e)))?;
+        whole_file::write(path, text.as_bytes())
+    }
+
+    /// # Errors
+    /// `Error::Input` for what is no session, is too large, or holds numbers that no hand can mean.
+    pub fn read(path: &Path) -> Result<Self> {
+        let size = std::fs::metadata(path).map_err(|e| Error::file(path, e))?.len();
+        if size > LARGEST_FILE {
+            return Err(wrong(path, format!("{size} bytes, more than the {LARGEST_FILE} of the longest session")));
+        }
+        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
+        let session: Session = serde_json::from_str(&text).map_err(|e| wrong(path, e.to_string()))?;
+        if session.format != FORMAT {
+            return Err(wrong(path, format!("its format is {}, this program knows {FORMAT}", session.format)));
+        }
+        let sane = |pose: &HandPose| {
+            pose.entry.is_finite()
+                && pose.entry.abs().max_element() < 1.0
+                && pose.depth.abs() < 1.0
+                && (pose.direction.length() - 1.0).abs() < 1e-6
+                && pose.direction.z < 0.0
+        };
+        if let Some(frame) = session.poses.iter().position(|pose| !sane(pose)) {
+            return Err(wrong(path, format!("the pose of frame {frame} is none of a needle over the tissue")));
+        }
+        Ok(session)
+    }
+
+    /// The scene as it was recorded.
+    ///
+    /// # Errors
+    /// As [`Scene::load`], and `Error::Input` where the scene is no longer the same.
+    pub fn scene(&self) -> Result<Scene> {
+        let scene = Scene::load(&self.scene, &self.overrides)?;
+        if fingerprint(&scene) != self.fingerprint {
+            return Err(Error::input(
+                format!("{}: the scene has changed since the session was recorded", self.scene.display()),
+                "bring the file back to what it was, or record the session anew",
+            ));
+        }
+        Ok(scene)
+    }
+}
+
+fn wrong(path: &Path, reason: String) -> Error {
+    Error::input(
+        format!("{}: no session: {reason}", path.display()),
+        "give a session.json that `stylet view` has written",
+    )
+}

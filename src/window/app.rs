@@ -1,0 +1,619 @@
+//! The window itself: events in, pictures out, one device for tissue and drawing.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui_wgpu::{RendererOptions, ScreenDescriptor};
+use glam::{DVec3, Vec2};
+use winit::application::ApplicationHandler;
+use winit::event::{ElementState, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
+use winit::keyboard::{KeyCode, PhysicalKey};
+use winit::window::{Window, WindowId};
+
+use super::ViewOptions;
+use super::camera::Camera;
+use super::hand::{Desk, InputDevice, Recording};
+use super::panels::{self, Choices, ReferenceCurve, Wishes};
+use super::practice::{Leader, Practice, State};
+use super::scene_view::{Area, Field, SceneView};
+use super::section::RestPlane;
+use super::texts;
+use super::tool_shape::{self, ToolPlace};
+use crate::gpu::Gpu;
+use crate::scene::Scene;
+use crate::session::Session;
+use crate::{Error, Result};
+
+/// Shortest time between two pictures [s].
+const PICTURE: f64 = 1.0 / 60.0;
+/// Way that a notch of the wheel asks for [m].
+const NOTCH: f64 = 0.25e-3;
+/// Speed of the keys at the start [m/s].
+const DESK_SPEED: f64 = 5e-3;
+/// Size of the window at the start, in points.
+const SIZE: [u32; 2] = [1280, 800];
+/// Pictures between two looks at the range of the field.
+const LOOK_AT_RANGE: u64 = 20;
+/// Part of the nodes that may lie beyond the automatic scale.
+const BEYOND_SCALE: f64 = 0.002;
+
+/// What a session may come to: how many pictures were drawn, how fast, and how the run stands.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ViewOutcome {
+    pub pictures: u64,
+    /// Wall time from the start of the program to the first picture [s].
+    pub first_picture: f64,
+    pub frames: u64,
+    pub depth: f64,
+    pub force: f64,
+    pub frames_per_second: f64,
+    pub real_time_factor: f64,
+    pub stopped: Option<String>,
+}
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// Those of the scene come first. `Error::Input` where there is no display, `Error::Adapter` where no adapter can draw on it.
+pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome> {
+    let (scene, overrides, recording) = match &options.session {
+        None => (Scene::load(&options.scene, &options.overrides)?, options.overrides.clone(), None),
+        Some(path) => {
+            let session = Session::read(path)?;
+            (session.scene()?, session.overrides.clone(), Some(session.poses))
+        }
+    };
+    for notice in &scene.notices {
+        eprintln!("note: {notice}");
+    }
+    let reference = options.reference.as_deref().map(read_curve).transpose()?;
+    // Libraries of the display that are missing end in an error or, some of them, in a panic.
+    let opened = std::panic::catch_unwind(EventLoop::new);
+    let event_loop = match opened {
+        Ok(Ok(event_loop)) => event_loop,
+        Ok(Err(reason)) => return Err(no_display(&reason.to_string())),
+        Err(_) => return Err(no_display("a library of the window system is missing")),
+    };
+    let mut app = App {
+        options: options.clone(),
+        scene,
+        overrides,
+        recording,
+        reference: reference.into_iter().collect(),
+        program_start,
+        open: None,
+        outcome: ViewOutcome::default(),
+        failure: None,
+    };
+    event_loop.run_app(&mut app).map_err(|reason| no_display(&reason.to_string()))?;
+    match app.failure {
+        Some(error) => Err(error),
+        None => Ok(app.outcome),
+    }
+}
+
+fn no_display(reason: &str) -> Error {
+    Error::input(
+        format!("no window can be opened here: {reason}"),
+        "start it on a desktop; on a terminal alone use `stylet run` (pictures, charts and tables in a folder) or a virtual \
+         display: xvfb-run stylet view. Debian/Ubuntu: libx11-6 libxcursor1 libxi6 libxrandr2 libxkbcommon-x11-0",
+    )
+}
+
+/// The force curve of a run.
+fn read_curve(folder: &Path) -> Result<ReferenceCurve> {
+    let path = if folder.is_dir() { folder.join("force.csv") } else { folder.to_path_buf() };
+    let mut reader = csv::Reader::from_path(&path).map_err(|e| Error::file(&path, e.into()))?;
+    let wrong = |reason: String| Error::input(format!("{}: {reason}", path.display()), "give the folder of a run");
+    let headers = reader.headers().map_err(|e| wrong(e.to_string()))?.clone();
+    let column = |name: &str| headers.iter().position(|h| h == name).ok_or_else(|| wrong(format!("no column {name}")));
+    let (depth, force) = (column("depth_m")?, column("axial_force_n")?);
+    let mut points = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(|e| wrong(e.to_string()))?;
+        let number = |n: usize| row.get(n).and_then(|text| text.parse::<f64>().ok());
+        match (number(depth), number(force)) {
+            (Some(depth), Some(force)) => points.push([depth * 1e3, force]),
+            _ => return Err(wrong(format!("row {} holds no numbers", points.len() + 1))),
+        }
+    }
+    let name = path.parent().and_then(Path::file_name).map_or("reference".into(), |n| n.to_string_lossy().into_owned());
+    Ok(ReferenceCurve { name, points })
+}
+
+struct App {
+    options: ViewOptions,
+    scene: Scene,
+    overrides: Vec<String>,
+    recording: Option<Vec<crate::scene::motion::HandPose>>,
+    reference: Vec<ReferenceCurve>,
+    program_start: Instant,
+    open: Option<Open>,
+    outcome: ViewOutcome,
+    failure: Option<Error>,
+}
+
+/// An open window.
+struct Open {
+    window: Arc<Window>,
+    surface: wgpu::Surface<'static>,
+    config: wgpu::SurfaceConfiguration,
+    gpu: Gpu,
+    egui: egui_winit::State,
+    painter: egui_wgpu::Renderer,
+    view: SceneView,
+    practice: Practice,
+    desk: Desk,
+    recording: Option<Recording>,
+    choices: Choices,
+    camera: Camera,
+    /// Simulated time that is due [s], and when it was counted last.
+    due: f64,
+    counted: Instant,
+    next: Instant,
+    pictures: u64,
+}
+
+impl ApplicationHandler for App {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if self.open.is_some() {
+            return;
+        }
+        match self.open_window(event_loop) {
+            Ok(open) => {
+                open.window.request_redraw();
+                self.open = Some(open);
+            }
+            Err(error) => self.fail(event_loop, error),
+        }
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(open) = &mut self.open else { return };
+        let taken = open.egui.on_window_event(&open.window, &event).consumed;
+        match event {
+            WindowEvent::CloseRequested => self.close(event_loop),
+            WindowEvent::Resized(size) => {
+                // A minimised window has no size; its surface stays as it was.
+                if size.width > 0 && size.height > 0 {
+                    (open.config.width, open.config.height) = (size.width, size.height);
+                    open.surface.configure(&open.gpu.device, &open.config);
+                }
+            }
+            WindowEvent::Focused(false) => open.desk.let_go(),
+            WindowEvent::KeyboardInput { event, .. } if !taken => {
+                open.key(event.physical_key, event.state, event.repeat)
+            }
+            WindowEvent::RedrawRequested => {
+                if let Err(error) = self.picture() {
+                    self.fail(event_loop, error);
+                    return;
+                }
+                let done = self.options.frames.is_some_and(|n| self.open.as_ref().is_some_and(|o| o.pictures >= n));
+                if done {
+                    self.close(event_loop);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        let Some(open) = &self.open else { return };
+        if Instant::now() >= open.next {
+            open.window.request_redraw();
+        }
+        event_loop.set_control_flow(ControlFlow::WaitUntil(open.next));
+    }
+}
+
+impl App {
+    fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<Open> {
+        let refused = |reason: String| no_display(&reason);
+        let [width, height] = self.options.size.unwrap_or(SIZE);
+        let attributes = Window::default_attributes()
+            .with_title(format!("{} - {}", texts::TITLE, self.scene.title))
+            .with_inner_size(winit::dpi::LogicalSize::new(width, height));
+        let window = Arc::new(event_loop.create_window(attributes).map_err(|e| refused(e.to_string()))?);
+        let display = Box::new(event_loop.owned_display_handle());
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_with_display_handle_from_env(display));
+        let surface = instance.create_surface(window.clone()).map_err(|e| refused(e.to_string()))?;
+        let (gpu, adapter) = Gpu::for_surface(&instance, &surface)?;
+        let leader = if self.options.script { Leader::Script } else { Leader::Hand };
+        let practice = Practice::new(
+            self.scene.clone(),
+            self.overrides.clone(),
+            gpu.clone(),
+            leader,
+            self.options.out.as_deref(),
+            self.options.force,
+        )?;
+        let size = window.inner_size();
+        let mut config = surface
+            .get_default_config(&adapter, size.width.max(1), size.height.max(1))
+            .ok_or_else(|| refused("the adapter cannot draw into this window".into()))?;
+        // The panels blend bytes, not light.
+        let formats = surface.get_capabilities(&adapter).formats;
+        config.format = formats.into_iter().find(|f| !f.is_srgb()).unwrap_or(config.format);
+        config.present_mode = wgpu::PresentMode::AutoNoVsync;
+        surface.configure(&gpu.device, &config);
+        let context = egui::Context::default();
+        let largest = gpu.device.limits().max_texture_dimension_2d as usize;
+        let egui = egui_winit::State::new(
+            context,
+            egui::ViewportId::ROOT,
+            &window,
+            Some(window.scale_factor() as f32),
+            None,
+            Some(largest),
+        );
+        let painter = egui_wgpu::Renderer::new(&gpu.device, config.format, RendererOptions::default());
+        let mut practice = practice;
+        let mesh = practice.simulation.model.mesh.clone();
+        let engine = practice.simulation.engine().on_device();
+        let engine = engine.ok_or_else(|| Error::Device("the window needs the engine of a device".into()))?;
+        let view = SceneView::new(&gpu, engine, &mesh, config.format)?;
+        let (low, high) = mesh.bounds();
+        let centre = 0.5 * (low + high);
+        let camera = Camera::around(centre.as_vec3(), (0.62 * (high - low).length()) as f32);
+        // Open through the entry point, so that the needle is seen.
+        let at = (self.scene.motion.entry.y - low.y) / (high.y - low.y);
+        let desk = Desk::new(DESK_SPEED.min(practice.speed_limit));
+        if self.options.script || self.recording.is_some() || self.options.frames.is_some() {
+            practice.state = State::Running;
+        }
+        let now = Instant::now();
+        let mut open = Open {
+            window,
+            surface,
+            config,
+            gpu,
+            egui,
+            painter,
+            view,
+            practice,
+            desk,
+            recording: self.recording.clone().map(Recording::new),
+            choices: Choices::new(Some((1, at))),
+            camera,
+            due: 0.0,
+            counted: now,
+            next: now,
+            pictures: 0,
+        };
+        open.cut();
+        Ok(open)
+    }
+
+    /// One picture, and the frame of the tissue that is due.
+    fn picture(&mut self) -> Result<()> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        let wishes = open.picture(&self.reference, None)?;
+        if open.pictures == 1 {
+            self.outcome.first_picture = self.program_start.elapsed().as_secs_f64();
+        }
+        if let Some(leader) = wishes.restart {
+            open.practice.again(leader)?;
+            open.rebind()?;
+        }
+        Ok(())
+    }
+
+    fn close(&mut self, event_loop: &ActiveEventLoop) {
+        if let Some(mut open) = self.open.take() {
+            if let Some(path) = &self.options.screenshot
+                && let Err(error) = open.screenshot(&self.reference, path)
+            {
+                self.failure.get_or_insert(error);
+            }
+            if let Err(error) = open.practice.save() {
+                self.failure.get_or_insert(error);
+            }
+            let last = open.practice.records.last();
+            self.outcome.pictures = open.pictures;
+            self.outcome.frames = open.practice.records.len() as u64;
+            self.outcome.depth = last.map_or(0.0, |r| r.depth);
+            self.outcome.force = last.map_or(0.0, |r| r.force.axial);
+            self.outcome.frames_per_second = open.practice.timing.frames_per_second();
+            self.outcome.real_time_factor = open.practice.timing.real_time_factor();
+            self.outcome.stopped = match &open.practice.state {
+                State::Stopped(reason) => Some(reason.clone()),
+                _ => None,
+            };
+        }
+        event_loop.exit();
+    }
+
+    fn fail(&mut self, event_loop: &ActiveEventLoop, error: Error) {
+        self.failure.get_or_insert(error);
+        self.close(event_loop);
+    }
+}
+
+impl Open {
+    fn key(&mut self, key: PhysicalKey, state: ElementState, repeat: bool) {
+        let held = state == ElementState::Pressed;
+        match key {
+            PhysicalKey::Code(KeyCode::ArrowDown | KeyCode::KeyS) => self.desk.hold_advance(held),
+            PhysicalKey::Code(KeyCode::ArrowUp | KeyCode::KeyW) => self.desk.hold_withdraw(held),
+            PhysicalKey::Code(KeyCode::Space) if held && !repeat => {
+                self.practice.state = match &self.practice.state {
+                    State::Running => State::Paused,
+                    State::Paused => State::Running,
+                    other => other.clone(),
+                };
+            }
+            _ => {}
+        }
+    }
+
+    /// Cuts the tissue where the sliders say.
+    fn cut(&mut self) {
+        let mesh = &self.practice.simulation.model.mesh;
+        let (low, high) = mesh.bounds();
+        let plane = self.choices.cut.map(|(axis, at)| {
+            // The half towards the viewer is taken away: -x, -y, +z.
+            let along = low[axis] + at * (high[axis] - low[axis]);
+            let sign = if axis == 2 { 1.0 } else { -1.0 };
+            RestPlane { normal: DVec3::AXES[axis] * sign, offset: sign * along }
+        });
+        self.view.cut(&self.gpu, mesh, plane);
+    }
+
+    /// After a restart: the buffers are new.
+    fn rebind(&mut self) -> Result<()> {
+        let mesh = self.practice.simulation.model.mesh.clone();
+        if let Some(engine) = self.practice.simulation.engine().on_device() {
+            self.view = SceneView::new(&self.gpu, engine, &mesh, self.config.format)?;
+        }
+        self.cut();
+        self.due = 0.0;
+        Ok(())
+    }
+
+    /// True where a frame of the tissue is due. A slow machine shows slow motion and owes nothing.
+    fn frame_is_due(&mut self) -> bool {
+        let passed = self.counted.elapsed().as_secs_f64();
+        self.counted = Instant::now();
+        if self.practice.state != State::Running {
+            self.due = 0.0;
+            return false;
+        }
+        let frame = self.practice.timing.simulated;
+        self.due = (self.due + passed * self.choices.pace).min(2.0 * frame);
+        let due = self.due >= frame;
+        if due {
+            self.due -= frame;
+        }
+        due
+    }
+
+    /// Draws a picture into the window, or into a texture of its own.
+    fn picture(&mut self, reference: &[ReferenceCurve], own: Option<&wgpu::Texture>) -> Result<Wishes> {
+        self.next = Instant::now() + Duration::from_secs_f64(PICTURE);
+        let due = own.is_none() && self.frame_is_due();
+        if due {
+            let hand: &mut dyn InputDevice = match &mut self.recording {
+                Some(recording) => recording,
+                None => &mut self.desk,
+            };
+            self.practice.start(hand)?;
+        }
+        let input = self.egui.take_egui_input(&self.window);
+        let context = self.egui.egui_ctx().clone();
+        let (mut wishes, mut area) = (Wishes::default(), egui::Rect::NOTHING);
+        let output = context.run_ui(input, |ui| {
+            egui::Panel::left("controls").default_size(250.0).show(ui, |ui| {
+                egui::ScrollArea::vertical().show(ui, |ui| {
+                    wishes =
+                        panels::controls(ui, &mut self.practice, &mut self.choices, &mut self.camera, &mut self.desk);
+                });
+            });
+            egui::Panel::right("readings").default_size(330.0).show(ui, |ui| {
+                panels::readings(ui, &self.practice, &mut self.choices, reference);
+            });
+            egui::CentralPanel::no_frame().show(ui, |ui| {
+                area = ui.available_rect_before_wrap();
+                let response = ui.allocate_rect(area, egui::Sense::click_and_drag());
+                look(&response, ui, &mut self.camera, &mut self.desk);
+            });
+        });
+        self.egui.handle_platform_output(&self.window, output.platform_output);
+        if wishes.recut {
+            self.cut();
+        }
+        let scale = output.pixels_per_point;
+        let triangles = context.tessellate(output.shapes, scale);
+        let mut textures = output.textures_delta;
+        for (id, deltas) in textures.set.drain() {
+            for delta in &deltas {
+                self.painter.update_texture(&self.gpu.device, &self.gpu.queue, id, delta);
+            }
+        }
+        self.place_tool();
+
+        let shown = match own {
+            Some(_) => None,
+            None => match self.surface.get_current_texture() {
+                wgpu::CurrentSurfaceTexture::Success(texture) => Some(texture),
+                wgpu::CurrentSurfaceTexture::Suboptimal(texture) => Some(texture),
+                // Nothing to draw on: the tissue goes on, the picture is left out.
+                wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
+                    self.surface.configure(&self.gpu.device, &self.config);
+                    None
+                }
+                _ => None,
+            },
+        };
+        let target = own.or(shown.as_ref().map(|s| &s.texture));
+        if let Some(target) = target {
+            let (size, view) = (target.size(), target.create_view(&Default::default()));
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            if let Some(engine) = self.practice.simulation.engine().on_device() {
+                engine.encode_fields(&mut encoder);
+            }
+            let pixels = Area {
+                x: area.left() * scale,
+                y: area.top() * scale,
+                width: area.width() * scale,
+                height: area.height() * scale,
+            };
+            let look = (&self.camera, &self.choices.scale);
+            self.view.draw(&self.gpu, &mut encoder, (&view, size), pixels, look);
+            let screen = ScreenDescriptor { size_in_pixels: [size.width, size.height], pixels_per_point: scale };
+            let more =
+                self.painter.update_buffers(&self.gpu.device, &self.gpu.queue, &mut encoder, &triangles, &screen);
+            {
+                let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("panels"),
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view: &view,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+                    })],
+                    ..Default::default()
+                });
+                self.painter.render(&mut pass.forget_lifetime(), &triangles, &screen);
+            }
+            self.gpu.queue.submit(more.into_iter().chain([encoder.finish()]));
+        }
+        for id in textures.free.drain() {
+            self.painter.free_texture(&id);
+        }
+        if due || wishes.step {
+            if wishes.step && !due {
+                self.practice.start(&mut self.desk)?;
+            }
+            let hand: &mut dyn InputDevice = match &mut self.recording {
+                Some(recording) => recording,
+                None => &mut self.desk,
+            };
+            self.practice.finish(hand)?;
+        }
+        if let Some(shown) = shown {
+            self.window.pre_present_notify();
+            self.gpu.queue.present(shown);
+            self.pictures += 1;
+            self.practice.drawn();
+        }
+        self.gpu.check()?;
+        if own.is_none() && self.choices.automatic && self.pictures % LOOK_AT_RANGE == 1 {
+            self.follow_range()?;
+        }
+        Ok(wishes)
+    }
+
+    /// Brings the ends of the scale to what the field holds now.
+    fn follow_range(&mut self) -> Result<()> {
+        let scale = &mut self.choices.scale;
+        if !matches!(scale.field, Field::VonMises | Field::Pressure) {
+            *scale = panels::default_scale(scale.field);
+            return Ok(());
+        }
+        let Some(engine) = self.practice.simulation.engine().on_device() else { return Ok(()) };
+        let Some(buffer) = engine.buffer("drawn_nodes") else { return Ok(()) };
+        let bytes = self.gpu.read_back(buffer)?;
+        let lane = scale.field as usize;
+        let mut values: Vec<f32> =
+            bytes.chunks_exact(16).map(|b| bytemuck::pod_read_unaligned::<[f32; 4]>(b)[lane].abs()).collect();
+        values.sort_unstable_by(f32::total_cmp);
+        let at = ((1.0 - BEYOND_SCALE) * values.len() as f64) as usize;
+        // A scale with three digits that moves little from look to look; never below 0.1 kPa.
+        let high = f64::from(values.get(at).copied().unwrap_or(0.0)).max(100.0);
+        scale.high = if (high / scale.high - 1.0).abs() > 0.1 { high } else { scale.high };
+        scale.low = match scale.field {
+            Field::Pressure => -scale.high,
+            _ if scale.logarithmic => 0.01 * scale.high,
+            _ => 0.0,
+        };
+        Ok(())
+    }
+
+    fn place_tool(&mut self) {
+        let Some(tool) = &self.practice.scene().tool else { return };
+        let Some((tip, direction)) = self.practice.tool_place() else { return };
+        let line = self.practice.simulation.centre_line();
+        let offset = |s: f64| line.as_ref().map_or(DVec3::ZERO, |line| line.at(s, 0.0).offset);
+        let corners = tool_shape::triangles(tool, &ToolPlace { tip, direction, offset: &offset });
+        self.view.place_tool(&self.gpu, &corners);
+    }
+
+    /// Draws the window once more into a texture, and writes that.
+    fn screenshot(&mut self, reference: &[ReferenceCurve], path: &Path) -> Result<()> {
+        let size = wgpu::Extent3d { width: self.config.width, height: self.config.height, depth_or_array_layers: 1 };
+        let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("screenshot"),
+            size,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: self.config.format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        self.picture(reference, Some(&texture))?;
+        let row = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("screenshot"),
+            size: u64::from(row) * u64::from(size.height),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None },
+            },
+            size,
+        );
+        self.gpu.queue.submit([encoder.finish()]);
+        let bytes = self.gpu.read_back(&buffer)?;
+        let swapped =
+            matches!(self.config.format, wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb);
+        let mut pixels = Vec::with_capacity(4 * (size.width * size.height) as usize);
+        for line in bytes.chunks_exact(row as usize) {
+            for pixel in line[..4 * size.width as usize].chunks_exact(4) {
+                let [a, g, c] = [pixel[0], pixel[1], pixel[2]];
+                pixels.extend(if swapped { [c, g, a, 255] } else { [a, g, c, 255] });
+            }
+        }
+        crate::render::write_png(path, &pixels, size.width, size.height)
+    }
+}
+
+/// Mouse over the view: drags turn and shift it, the wheel leads the needle or, with Ctrl, zooms.
+fn look(response: &egui::Response, ui: &egui::Ui, camera: &mut Camera, desk: &mut Desk) {
+    let height = response.rect.height().max(1.0);
+    let drag = response.drag_delta() / height;
+    let drag = Vec2::new(drag.x, drag.y);
+    if response.dragged_by(egui::PointerButton::Primary) {
+        camera.orbit(drag);
+    } else if response.dragged_by(egui::PointerButton::Secondary) || response.dragged_by(egui::PointerButton::Middle) {
+        camera.pan(drag);
+    }
+    if response.hovered() {
+        let (notches, zoom) = ui.input(|input| {
+            let mut notches = 0.0;
+            for event in &input.events {
+                if let egui::Event::MouseWheel { unit, delta, modifiers, .. } = event
+                    && !modifiers.command
+                {
+                    notches += match unit {
+                        egui::MouseWheelUnit::Point => delta.y / 50.0,
+                        egui::MouseWheelUnit::Line => delta.y,
+                        egui::MouseWheelUnit::Page => 10.0 * delta.y,
+                    };
+                }
+            }
+            (notches, input.zoom_delta())
+        });
+        // Towards the user is into the tissue, as a page goes down.
+        desk.ask(-f64::from(notches) * NOTCH);
+        camera.zoom(zoom.ln() / 1.1f32.ln());
+    }
+}

@@ -1,0 +1,41 @@
+//! The window: an insertion is practised by hand, or watched, while the device solves the tissue and draws it.
+//!
+//! [`practice`] holds one attempt: simulation, who leads, records. [`hand`] is what a hand holds. [`section`], [`tool_shape`] and
+//! [`camera`] say what is drawn, [`scene_view`] draws it from the solver's own buffers, [`panels`] stand around it, [`app`] is the
+//! window itself. The window owns no physics: it sends poses and reads records.
+
+pub mod app;
+pub mod camera;
+pub mod hand;
+pub mod panels;
+pub mod practice;
+pub mod scene_view;
+pub mod section;
+pub mod texts;
+pub mod tool_shape;
+
+use std::path::PathBuf;
+
+pub use app::view;
+
+/// What the command line asks for.
+#[derive(Debug, Clone, Default)]
+pub struct ViewOptions {
+    pub scene: PathBuf,
+    pub overrides: Vec<String>,
+    /// The motion of the scene leads, from the start on.
+    pub script: bool,
+    /// A recorded session leads.
+    pub session: Option<PathBuf>,
+    /// Folder of the tables and the session.
+    pub out: Option<PathBuf>,
+    pub force: bool,
+    /// Close after so many pictures.
+    pub frames: Option<u64>,
+    /// Write the last picture to this file.
+    pub screenshot: Option<PathBuf>,
+    /// A run whose force curve lies behind the live one: its folder.
+    pub reference: Option<PathBuf>,
+    /// Size of the window in points.
+    pub size: Option<[u32; 2]>,
+}

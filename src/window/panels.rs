@@ -1,0 +1,256 @@
+//! The panels around the view: what is shown, who leads, forces, energies, health and times.
+
+use egui_plot::{Legend, Line, Plot, PlotPoints};
+
+use super::camera::{Camera, Preset};
+use super::hand::Desk;
+use super::practice::{Leader, Practice, State};
+use super::scene_view::{Field, Scale, colour_bytes};
+use super::texts;
+use crate::observables::ForceParts;
+
+/// What the user has chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choices {
+    pub scale: Scale,
+    /// Ends of the scale follow the largest value seen.
+    pub automatic: bool,
+    /// Cut plane: axis 0..2 and where between the faces, 0..1.
+    pub cut: Option<(usize, f64)>,
+    /// Simulated time over wall time that is aimed at.
+    pub pace: f64,
+    pub show_parts: bool,
+}
+
+impl Choices {
+    pub fn new(cut: Option<(usize, f64)>) -> Self {
+        Choices {
+            scale: Scale { field: Field::VonMises, low: 0.0, high: 10e3, logarithmic: false },
+            automatic: true,
+            cut,
+            pace: 1.0,
+            show_parts: false,
+        }
+    }
+}
+
+/// What the panels ask the window to do.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Wishes {
+    pub restart: Option<Leader>,
+    pub step: bool,
+    pub recut: bool,
+}
+
+/// A curve that lies behind the live one: depth [mm], force [N].
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReferenceCurve {
+    pub name: String,
+    pub points: Vec<[f64; 2]>,
+}
+
+/// Buttons and sliders on the left.
+pub fn controls(
+    ui: &mut egui::Ui,
+    practice: &mut Practice,
+    choices: &mut Choices,
+    camera: &mut Camera,
+    desk: &mut Desk,
+) -> Wishes {
+    let mut wishes = Wishes::default();
+    ui.heading(&practice.scene().title);
+    ui.horizontal(|ui| {
+        let running = practice.state == State::Running;
+        let may_run = matches!(practice.state, State::Running | State::Paused);
+        let label = if running { texts::PAUSE } else { texts::PLAY };
+        if ui.add_enabled(may_run, egui::Button::new(label)).clicked() {
+            practice.state = if running { State::Paused } else { State::Running };
+        }
+        wishes.step = ui.add_enabled(practice.state == State::Paused, egui::Button::new(texts::STEP)).clicked();
+        if ui.button(texts::RESTART).clicked() {
+            wishes.restart = Some(practice.leader);
+        }
+    });
+    ui.horizontal(|ui| {
+        for (leader, name) in [(Leader::Hand, texts::HAND), (Leader::Script, texts::SCRIPT)] {
+            if ui.radio(practice.leader == leader, name).clicked() && practice.leader != leader {
+                wishes.restart = Some(leader);
+            }
+        }
+    });
+    ui.add(egui::Slider::new(&mut choices.pace, 0.1..=1.0).text(texts::PACE));
+    if practice.leader == Leader::Hand {
+        let mut speed = desk.speed * 1e3;
+        let largest = (practice.speed_limit * 1e3).min(50.0);
+        if ui.add(egui::Slider::new(&mut speed, 0.5..=largest).text(texts::HAND_SPEED)).changed() {
+            desk.speed = speed * 1e-3;
+        }
+        ui.small(texts::KEYS);
+    }
+    ui.separator();
+    egui::ComboBox::from_label(texts::FIELD).selected_text(choices.scale.field.name()).show_ui(ui, |ui| {
+        for field in Field::ALL {
+            if ui.selectable_label(choices.scale.field == field, field.name()).clicked() {
+                choices.scale = default_scale(field);
+            }
+        }
+    });
+    let (unit, size) = choices.scale.field.unit();
+    ui.checkbox(&mut choices.automatic, texts::AUTOMATIC);
+    ui.add_enabled_ui(!choices.automatic, |ui| {
+        let (mut low, mut high) = (choices.scale.low / size, choices.scale.high / size);
+        ui.horizontal(|ui| {
+            ui.add(egui::DragValue::new(&mut low).speed(0.1).suffix(format!(" {unit}")));
+            ui.add(egui::DragValue::new(&mut high).speed(0.1).suffix(format!(" {unit}")));
+        });
+        (choices.scale.low, choices.scale.high) = (low * size, high.max(low + 1e-6) * size);
+    });
+    if matches!(choices.scale.field, Field::VonMises) {
+        ui.checkbox(&mut choices.scale.logarithmic, texts::LOGARITHMIC);
+    }
+    colour_bar(ui, &choices.scale);
+    ui.separator();
+    ui.label(texts::CUT);
+    ui.horizontal(|ui| {
+        let mut axis = choices.cut.map(|(axis, _)| axis);
+        for (value, name) in [(None, texts::NO_CUT), (Some(0), "x"), (Some(1), "y"), (Some(2), "z")] {
+            if ui.radio(axis == value, name).clicked() {
+                axis = value;
+                choices.cut = value.map(|axis| (axis, 0.5));
+                wishes.recut = true;
+            }
+        }
+    });
+    if let Some((_, at)) = &mut choices.cut {
+        wishes.recut |= ui.add(egui::Slider::new(at, 0.0..=1.0).show_value(false)).changed();
+    }
+    ui.horizontal(|ui| {
+        for (preset, name) in Preset::ALL {
+            if ui.small_button(name).clicked() {
+                camera.preset(preset);
+            }
+        }
+    });
+    wishes
+}
+
+/// Scale that a field begins with.
+pub fn default_scale(field: Field) -> Scale {
+    let (low, high) = match field {
+        Field::VonMises => (0.0, 10e3),
+        Field::Pressure => (-10e3, 10e3),
+        Field::Stretch => (1.0, 1.5),
+        Field::StiffnessLost => (0.0, 1.0),
+    };
+    Scale { field, low, high, logarithmic: false }
+}
+
+/// The colours from low to high, with numbers and unit.
+fn colour_bar(ui: &mut egui::Ui, scale: &Scale) {
+    let (rect, _) = ui.allocate_exact_size(egui::vec2(ui.available_width(), 14.0), egui::Sense::hover());
+    let painter = ui.painter();
+    let count = 64;
+    for n in 0..count {
+        let [r, g, b] = colour_bytes((f64::from(n) + 0.5) / f64::from(count));
+        let width = rect.width() / count as f32;
+        let left = rect.left() + width * n as f32;
+        let cell = egui::Rect::from_min_size(egui::pos2(left, rect.top()), egui::vec2(width + 0.5, rect.height()));
+        painter.rect_filled(cell, 0.0, egui::Color32::from_rgb(r, g, b));
+    }
+    let (unit, size) = scale.field.unit();
+    let middle = if scale.logarithmic { (scale.low * scale.high).sqrt() } else { 0.5 * (scale.low + scale.high) };
+    ui.columns(3, |columns| {
+        columns[0].label(format!("{:.2}", scale.low / size));
+        columns[1].vertical_centered(|ui| ui.label(format!("{:.2}", middle / size)));
+        columns[2].with_layout(egui::Layout::right_to_left(egui::Align::TOP), |ui| {
+            ui.label(format!("{:.2} {unit}", scale.high / size))
+        });
+    });
+}
+
+/// Force against depth, numbers and lights on the right.
+pub fn readings(ui: &mut egui::Ui, practice: &Practice, choices: &mut Choices, reference: &[ReferenceCurve]) {
+    let Some(record) = practice.records.last() else {
+        ui.label(texts::NOTHING_YET);
+        return;
+    };
+    ui.horizontal(|ui| {
+        ui.heading(format!("{:.3} N", record.force.axial));
+        ui.label(format!("{} {:.2} mm", texts::AT_DEPTH, record.depth * 1e3));
+    });
+    ui.checkbox(&mut choices.show_parts, texts::PARTS);
+    let curve = |of: &dyn Fn(&ForceParts) -> f64| -> PlotPoints<'static> {
+        // A trainee's minutes are thousands of frames; the plot is some hundred pixels wide.
+        let every = practice.records.len().div_ceil(1500).max(1);
+        practice.records.iter().step_by(every).map(|r| [r.depth * 1e3, of(&r.force)]).collect()
+    };
+    Plot::new("force")
+        .height((0.4 * ui.available_height()).max(140.0))
+        .x_axis_label(texts::DEPTH_AXIS)
+        .y_axis_label(texts::FORCE_AXIS)
+        .legend(Legend::default())
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .show(ui, |plot| {
+            for curve in reference {
+                let line = Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone()));
+                plot.line(line.color(egui::Color32::GRAY).width(1.5));
+            }
+            plot.line(Line::new(texts::AXIAL, curve(&|f| f.axial)).width(2.0).color(egui::Color32::WHITE));
+            if choices.show_parts {
+                for part in &ForceParts::PARTS {
+                    let [r, g, b] = part.colour;
+                    let points = curve(&|f| (part.of)(f));
+                    plot.line(Line::new(part.name, points).color(egui::Color32::from_rgb(r, g, b)));
+                }
+            }
+        });
+    egui::Grid::new("numbers").num_columns(2).striped(true).show(ui, |ui| {
+        let mut row = |name: &str, value: String| {
+            ui.label(name);
+            ui.label(value);
+            ui.end_row();
+        };
+        let largest = practice.records.iter().map(|r| r.force.axial).fold(0.0, f64::max);
+        row(texts::LARGEST_FORCE, format!("{largest:.3} N"));
+        row(texts::ASIDE, format!("{:.3} N", record.force.lateral.length()));
+        row(texts::WORK, format!("{:.2} mJ", record.energy.external * 1e3));
+        row(texts::STORED, format!("{:.2} mJ", record.energy.elastic * 1e3));
+        row(texts::FRICTION, format!("{:.2} mJ", record.energy.friction * 1e3));
+        row(texts::CUTTING, format!("{:.2} mJ", record.energy.cutting * 1e3));
+        row(texts::FRAMES, format!("{:.0} /s", practice.timing.frames_per_second()));
+        row(texts::PHYSICS, format!("{:.1} ms", practice.timing.physics * 1e3));
+        row(texts::REAL_TIME, format!("{:.2}", practice.timing.real_time_factor()));
+        if practice.leader == Leader::Hand {
+            row(texts::TOO_FAST, format!("{}", practice.limited_frames));
+        }
+    });
+    ui.horizontal_wrapped(|ui| {
+        let imbalance = record.energy.imbalance().abs();
+        light(ui, texts::ENERGY_LIGHT, &format!("{:.2} %", 100.0 * imbalance), imbalance < 0.02, imbalance < 0.1);
+        let clamped = record.health.clamped_nodes;
+        light(ui, texts::CLAMPED_LIGHT, &clamped.to_string(), clamped == 0, clamped < 10);
+        let inverted = record.health.inverted_cells;
+        light(ui, texts::INVERTED_LIGHT, &inverted.to_string(), inverted == 0, inverted < 5);
+    });
+    match &practice.state {
+        State::Stopped(reason) => {
+            ui.colored_label(egui::Color32::from_rgb(230, 159, 0), format!("{}\n{reason}", texts::STOPPED));
+        }
+        State::Ended => {
+            ui.label(texts::ENDED);
+        }
+        State::Running | State::Paused => {}
+    }
+}
+
+/// A sign that does not need its colour to be read: a tick, a warning or a cross with its value.
+fn light(ui: &mut egui::Ui, name: &str, value: &str, good: bool, bearable: bool) {
+    let (sign, colour) = match (good, bearable) {
+        (true, _) => ("ok", egui::Color32::from_rgb(86, 180, 233)),
+        (_, true) => ("!", egui::Color32::from_rgb(240, 228, 66)),
+        _ => ("!!", egui::Color32::from_rgb(213, 94, 0)),
+    };
+    ui.colored_label(colour, format!("{name}: {value} {sign}"));
+}

@@ -1,0 +1,251 @@
+//! An insertion as it is practised: a simulation, the hand that leads it or the script of the scene, and what was recorded.
+//!
+//! Knows nothing of a window. One frame is [`Practice::start`] - the device computes, the window draws - and
+//! [`Practice::finish`].
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::hand::InputDevice;
+use crate::gpu::Gpu;
+use crate::observables::FrameRecord;
+use crate::output::{DrivenFace, OutputFolder, Tables};
+use crate::scene::Scene;
+use crate::scene::motion::HandPose;
+use crate::session::Session;
+use crate::solver::simulation::{Purpose, Simulation, tool_mach};
+use crate::{Error, Result};
+
+/// Tool speed over the scaled shear wave speed beyond which inertia, not tissue, answers the hand.
+const LARGEST_MACH: f64 = 0.3;
+
+/// How far out of the tissue a hand may lead the tip [m].
+const OUTSIDE: f64 = 5e-3;
+
+/// Who leads the needle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Leader {
+    Hand,
+    /// The motion of the scene.
+    Script,
+}
+
+/// What the insertion is doing.
+#[derive(Debug, Clone, PartialEq)]
+pub enum State {
+    Running,
+    Paused,
+    /// The script is at its end.
+    Ended,
+    /// The run was stopped, with the reason.
+    Stopped(String),
+}
+
+/// Times of the last frames [s].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Timing {
+    /// Simulated time of a frame.
+    pub simulated: f64,
+    /// Wall time from the start of a frame to its results, smoothed.
+    pub physics: f64,
+    /// Wall time from one drawn frame to the next, smoothed.
+    pub between: f64,
+}
+
+impl Timing {
+    /// Takes a wall time into a mean over about ten frames.
+    fn smooth(mean: &mut f64, value: f64) {
+        *mean = if *mean == 0.0 { value } else { 0.9 * *mean + 0.1 * value };
+    }
+
+    /// Simulated time over wall time that the physics alone would reach.
+    pub fn real_time_factor(&self) -> f64 {
+        if self.physics > 0.0 { self.simulated / self.physics } else { 0.0 }
+    }
+
+    pub fn frames_per_second(&self) -> f64 {
+        if self.between > 0.0 { 1.0 / self.between } else { 0.0 }
+    }
+}
+
+/// Where an attempt is written to.
+struct Written {
+    folder: OutputFolder,
+    tables: Tables,
+}
+
+/// One attempt.
+pub struct Practice {
+    scene: Scene,
+    overrides: Vec<String>,
+    gpu: Gpu,
+    out: Option<PathBuf>,
+    written: Option<Written>,
+    pub simulation: Simulation,
+    pub leader: Leader,
+    pub state: State,
+    pub records: Vec<FrameRecord>,
+    pub session: Session,
+    pub timing: Timing,
+    /// Largest speed of the hand that is let through [m/s].
+    pub speed_limit: f64,
+    /// Frames in which the hand was faster.
+    pub limited_frames: u64,
+    started: Option<Instant>,
+    last_drawn: Option<Instant>,
+}
+
+impl Practice {
+    /// Prepares an attempt on a device. `out`: the folder that its tables and its session go to.
+    ///
+    /// # Errors
+    /// As [`Simulation::for_purpose`]; `Error::Input` for a scene without a tool.
+    pub fn new(
+        scene: Scene,
+        overrides: Vec<String>,
+        gpu: Gpu,
+        leader: Leader,
+        out: Option<&Path>,
+        force: bool,
+    ) -> Result<Self> {
+        if scene.tool.is_none() || scene.motion.phases.is_empty() {
+            return Err(Error::input(
+                format!("{}: there is no tool to lead", scene.path.display()),
+                "take a scene with a needle, e.g. scenes/muscle_biopsy.toml, or run this one with `stylet run`",
+            ));
+        }
+        let purpose = Purpose { led: leader == Leader::Hand, drawn: true };
+        let mut simulation = Simulation::for_purpose(scene.clone(), Some(gpu.clone()), purpose)?;
+        let session = Session::new(&scene, &overrides, simulation.engine().info());
+        let written = match out {
+            None => None,
+            Some(out) => {
+                let folder = OutputFolder::create(Some(out), &scene.name, force)?;
+                let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
+                let tables = Tables::create(&folder, &driven, simulation.model.has_bore(), &scene.targets)?;
+                Some(Written { folder, tables })
+            }
+        };
+        let wave = tool_mach(&simulation.model).map(|mach| scene.motion.largest_speed() / mach);
+        let speed_limit = wave.map_or(f64::INFINITY, |wave| LARGEST_MACH * wave).max(scene.motion.largest_speed());
+        let simulated = simulation.steps_per_frame() as f64 * simulation.dt;
+        Ok(Practice {
+            overrides,
+            gpu,
+            out: out.map(Path::to_path_buf),
+            written,
+            simulation,
+            leader,
+            state: State::Paused,
+            records: Vec::new(),
+            session,
+            timing: Timing { simulated, ..Default::default() },
+            speed_limit,
+            limited_frames: 0,
+            started: None,
+            last_drawn: None,
+            scene,
+        })
+    }
+
+    /// The same from the beginning.
+    ///
+    /// # Errors
+    /// As [`Practice::new`].
+    pub fn again(&mut self, leader: Leader) -> Result<()> {
+        self.save()?;
+        let (scene, overrides, gpu) = (self.scene.clone(), self.overrides.clone(), self.gpu.clone());
+        // The attempt before is in its folder; the next one replaces it only where there is none.
+        let out = self.out.take().filter(|_| self.records.is_empty());
+        *self = Practice::new(scene, overrides, gpu, leader, out.as_deref(), true)?;
+        Ok(())
+    }
+
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Where the tool is at the end of the last frame that was started.
+    pub fn depth(&self) -> f64 {
+        self.simulation.hand().map_or_else(|| self.records.last().map_or(0.0, |r| r.depth), |pose| pose.depth)
+    }
+
+    /// Gives the device the next frame, led by what the hand wants. True where there was one to start.
+    ///
+    /// # Errors
+    /// `Error::Device`.
+    pub fn start(&mut self, hand: &mut dyn InputDevice) -> Result<bool> {
+        if let Some(now) = self.simulation.hand() {
+            let wanted = hand.pose(&now, self.timing.simulated);
+            let pose = self.within_reach(&now, wanted);
+            self.session.poses.push(pose);
+            self.simulation.lead(&pose);
+        }
+        self.started = Some(Instant::now());
+        self.simulation.start_frames()?;
+        Ok(true)
+    }
+
+    /// What the tissue can follow of what the hand wants.
+    fn within_reach(&mut self, now: &HandPose, wanted: HandPose) -> HandPose {
+        let deepest = self.scene.motion.deepest();
+        let depth = wanted.depth.clamp(-OUTSIDE, deepest);
+        let step = self.speed_limit * self.timing.simulated;
+        let limited = (depth - now.depth).clamp(-step, step);
+        if limited != depth - now.depth {
+            self.limited_frames += 1;
+        }
+        // A planned path is straight: the needle keeps to it.
+        HandPose { depth: now.depth + limited, ..*now }
+    }
+
+    /// Waits for the results of the frame that was started, and keeps them.
+    ///
+    /// # Errors
+    /// What the folder cannot take. A run that the guard stops is a state, no error.
+    pub fn finish(&mut self, hand: &mut dyn InputDevice) -> Result<()> {
+        match self.simulation.next_frame() {
+            Ok(Some(record)) => {
+                hand.feel(record.force.axial, record.force.lateral);
+                if let Some(written) = &mut self.written {
+                    written.tables.append(&record)?;
+                }
+                self.records.push(record);
+                if let Some(begin) = self.started.take() {
+                    Timing::smooth(&mut self.timing.physics, begin.elapsed().as_secs_f64());
+                }
+            }
+            Ok(None) => self.state = State::Ended,
+            Err(error @ (Error::Diverged { .. } | Error::Device(_))) => self.state = State::Stopped(error.to_string()),
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// Notes that a frame was drawn.
+    pub fn drawn(&mut self) {
+        if let Some(before) = self.last_drawn.replace(Instant::now()) {
+            Timing::smooth(&mut self.timing.between, before.elapsed().as_secs_f64());
+        }
+    }
+
+    /// Writes the session beside the tables.
+    ///
+    /// # Errors
+    /// `Error::File`.
+    pub fn save(&self) -> Result<()> {
+        match &self.written {
+            Some(written) if self.leader == Leader::Hand => self.session.write(&written.folder.file("session.json")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Where the tool is drawn: tip and direction at the end of the last frame that was started.
+    pub fn tool_place(&self) -> Option<(DVec3, DVec3)> {
+        let time = self.records.last().map_or(0.0, |r| r.time);
+        let retreat = self.records.last().map_or(0.0, |r| r.needle.retreat);
+        self.simulation.tool_pose(time).map(|pose| (pose.tip - pose.direction * retreat, pose.direction))
+    }
+}

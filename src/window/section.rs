@@ -1,0 +1,182 @@
+//! What a window draws of the tissue: its surface, cut open by a plane.
+//!
+//! The plane is fixed in the material, not in space: a corner of a triangle is a point on a mesh edge, `(1 - t) X_a + t X_b`, and
+//! stays on that edge while the tissue deforms. So the triangles change only when the plane is moved, and every frame takes the
+//! positions from the solver's own buffer.
+
+use std::collections::HashMap;
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+use crate::mesh::Mesh;
+
+/// A corner of a triangle: between two nodes, `part` of the way.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct TissueCorner {
+    pub nodes: [u32; 2],
+    /// 0 at the first node, 1 at the second.
+    pub part: f32,
+}
+
+/// The tissue with `normal . X > offset` is taken away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RestPlane {
+    /// Unit vector.
+    pub normal: DVec3,
+    /// [m]
+    pub offset: f64,
+}
+
+/// Faces of a hexahedron in VTK order and of a tetrahedron.
+const HEXAHEDRON_FACES: [[usize; 4]; 6] =
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+const TETRAHEDRON_FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+
+/// Their edges.
+const HEXAHEDRON_EDGES: [[usize; 2]; 12] =
+    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
+const TETRAHEDRON_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// The outer faces of a mesh, found once.
+pub struct Outline {
+    faces: Vec<Vec<u32>>,
+}
+
+impl Outline {
+    /// Faces that belong to one cell only. The flat cells between two copies of a grid line are no tissue, so the two sides of a cut
+    /// are faces.
+    pub fn of(mesh: &Mesh) -> Self {
+        let mut seen: HashMap<Vec<u32>, (Vec<u32>, bool)> = HashMap::new();
+        for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell)) {
+            let nodes = mesh.cell_nodes(cell);
+            let mut add = |face: &[usize]| {
+                let face: Vec<u32> = face.iter().map(|n| nodes[*n] as u32).collect();
+                let mut key = face.clone();
+                key.sort_unstable();
+                seen.entry(key).and_modify(|(_, outer)| *outer = false).or_insert((face, true));
+            };
+            match nodes.len() {
+                8 => HEXAHEDRON_FACES.iter().for_each(|face| add(face)),
+                _ => TETRAHEDRON_FACES.iter().for_each(|face| add(face)),
+            }
+        }
+        let mut faces: Vec<Vec<u32>> = seen.into_values().filter(|(_, outer)| *outer).map(|(face, _)| face).collect();
+        // The order of a hash map changes from run to run.
+        faces.sort_unstable();
+        Outline { faces }
+    }
+
+    pub fn face_count(&self) -> usize {
+        self.faces.len()
+    }
+
+    /// Triangles of the tissue that is left by a plane: its surface and the cut. Three corners each.
+    pub fn cut(&self, mesh: &Mesh, plane: Option<RestPlane>) -> Vec<TissueCorner> {
+        let beyond = |node: u32| plane.map_or(-1.0, |p| p.normal.dot(mesh.rest_position(node as usize)) - p.offset);
+        let distance: Vec<f64> = (0..mesh.node_count() as u32).map(beyond).collect();
+        let mut corners = Vec::with_capacity(6 * self.faces.len());
+        let mut polygon = Vec::with_capacity(8);
+        for face in &self.faces {
+            polygon.clear();
+            for (n, a) in face.iter().enumerate() {
+                let b = face[(n + 1) % face.len()];
+                if distance[*a as usize] <= 0.0 {
+                    polygon.push(TissueCorner { nodes: [*a; 2], part: 0.0 });
+                }
+                polygon.extend(crossing(&distance, *a, b));
+            }
+            fan(&polygon, &mut corners);
+        }
+        let Some(plane) = plane else { return corners };
+        let (first, second) = crate::needle::lateral_axes(plane.normal);
+        for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell)) {
+            let nodes = mesh.cell_nodes(cell);
+            let edges: &[[usize; 2]] = if nodes.len() == 8 { &HEXAHEDRON_EDGES } else { &TETRAHEDRON_EDGES };
+            polygon.clear();
+            polygon.extend(edges.iter().filter_map(|[a, b]| crossing(&distance, nodes[*a] as u32, nodes[*b] as u32)));
+            if polygon.len() < 3 {
+                continue;
+            }
+            // A plane cuts a convex cell in a convex polygon: its corners in the order of their angle.
+            let place = |corner: &TissueCorner| {
+                let [a, b] = corner.nodes.map(|n| mesh.rest_position(n as usize));
+                a.lerp(b, f64::from(corner.part))
+            };
+            let centre = polygon.iter().map(place).sum::<DVec3>() / polygon.len() as f64;
+            let angle = |corner: &TissueCorner| {
+                let arm = place(corner) - centre;
+                arm.dot(second).atan2(arm.dot(first))
+            };
+            polygon.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+            fan(&polygon, &mut corners);
+        }
+        corners
+    }
+}
+
+/// Where an edge crosses the plane.
+fn crossing(distance: &[f64], a: u32, b: u32) -> Option<TissueCorner> {
+    let (from, to) = (distance[a as usize], distance[b as usize]);
+    ((from <= 0.0) != (to <= 0.0))
+        .then(|| TissueCorner { nodes: [a, b], part: (from / (from - to)).clamp(0.0, 1.0) as f32 })
+}
+
+/// Triangles of a convex polygon.
+fn fan(polygon: &[TissueCorner], corners: &mut Vec<TissueCorner>) {
+    for n in 2..polygon.len() {
+        corners.extend([polygon[0], polygon[n - 1], polygon[n]]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{BlockMesh, TetMesh};
+    use std::sync::Arc;
+
+    fn block() -> BlockMesh {
+        let line = |n: usize| (0..=n).map(|i| i as f64 * 1e-3).collect::<Vec<_>>();
+        BlockMesh::from_lines([line(4), line(3), line(2)])
+    }
+
+    fn area(mesh: &Mesh, corners: &[TissueCorner]) -> f64 {
+        let place = |c: &TissueCorner| {
+            mesh.rest_position(c.nodes[0] as usize).lerp(mesh.rest_position(c.nodes[1] as usize), f64::from(c.part))
+        };
+        corners
+            .chunks_exact(3)
+            .map(|t| 0.5 * (place(&t[1]) - place(&t[0])).cross(place(&t[2]) - place(&t[0])).length())
+            .sum()
+    }
+
+    /// The surface of a cut block is the surface of the smaller block, whatever the plane and the cells.
+    #[test]
+    fn a_cut_block_is_closed() {
+        let tets = Mesh::Tets(Arc::new(TetMesh::from_block(&block())));
+        for mesh in [Mesh::Block(block()), tets] {
+            let outline = Outline::of(&mesh);
+            let whole = 2.0 * (4.0 * 3.0 + 3.0 * 2.0 + 2.0 * 4.0) * 1e-6;
+            assert!((area(&mesh, &outline.cut(&mesh, None)) / whole - 1.0).abs() < 1e-12);
+            for part in [0.3, 1.0, 2.5] {
+                let plane = RestPlane { normal: DVec3::X, offset: part * 1e-3 };
+                let left = 2.0 * (part * 3.0 + 3.0 * 2.0 + 2.0 * part) * 1e-6;
+                let found = area(&mesh, &outline.cut(&mesh, Some(plane)));
+                assert!((found / left - 1.0).abs() < 1e-6, "{part}: {found} against {left}");
+            }
+        }
+        // A plane at a slope cuts a triangle off a corner.
+        let mesh = Mesh::Block(block());
+        let plane = RestPlane { normal: DVec3::ONE.normalize(), offset: 1e-3 / 3f64.sqrt() };
+        let corners = Outline::of(&mesh).cut(&mesh, Some(plane));
+        let expected = (3f64.sqrt() / 2.0 + 1.5) * 1e-6;
+        assert!((area(&mesh, &corners) / expected - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn nothing_is_left_beyond_the_block() {
+        let mesh = Mesh::Block(block());
+        assert!(Outline::of(&mesh).cut(&mesh, Some(RestPlane { normal: DVec3::X, offset: -1e-3 })).is_empty());
+    }
+}
