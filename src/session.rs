@@ -63,11 +63,11 @@ impl Session {
     /// # Errors
     /// `Error::Input` for what is no session, is too large, or holds numbers that no hand can mean.
     pub fn read(path: &Path) -> Result<Self> {
-        let size = std::fs::metadata(path).map_err(|e| Error::file(path, e))?.len();
+        let size = std::fs::metadata(path).map_err(|e| wrong(path, e.to_string()))?.len();
         if size > LARGEST_FILE {
             return Err(wrong(path, format!("{size} bytes, more than the {LARGEST_FILE} of the longest session")));
         }
-        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
+        let text = std::fs::read_to_string(path).map_err(|e| wrong(path, e.to_string()))?;
         let session: Session = serde_json::from_str(&text).map_err(|e| wrong(path, e.to_string()))?;
         if session.format != FORMAT {
             return Err(wrong(path, format!("its format is {}, this program knows {FORMAT}", session.format)));

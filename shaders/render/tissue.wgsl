@@ -21,21 +21,12 @@ const DISPLACEMENT_UNIT: f32 = 1.4551915228366852e-11;
 struct TissueCorner {
     @builtin(position) clip: vec4<f32>,
     @location(0) place: vec3<f32>,
+    // Place on the colour scale, 0..1.
     @location(1) field: f32,
 }
 
 fn node_place(node: u32) -> vec3<f32> {
     return node_rest[node].xyz + vec3<f32>(node_displacement[node].xyz) * DISPLACEMENT_UNIT;
-}
-
-@vertex
-fn tissue_corner(@location(0) nodes: vec2<u32>, @location(1) part: f32) -> TissueCorner {
-    var out: TissueCorner;
-    out.place = mix(node_place(nodes.x), node_place(nodes.y), part);
-    out.clip = view.view_projection * vec4<f32>(out.place, 1.0);
-    let lane = u32(view.range.z);
-    out.field = mix(drawn_nodes[nodes.x][lane], drawn_nodes[nodes.y][lane], part);
-    return out;
 }
 
 // 0..1 on the colour scale.
@@ -47,14 +38,19 @@ fn on_scale(value: f32) -> f32 {
     return clamp(select(linear, logarithmic, view.range.w > 0.5), 0.0, 1.0);
 }
 
-// The target keeps bytes as they are (the panels blend in them): light to sRGB.
-fn encoded(light: vec3<f32>) -> vec4<f32> {
-    let low = light * 12.92;
-    let high = 1.055 * pow(max(light, vec3<f32>(0.0)), vec3<f32>(1.0 / 2.4)) - 0.055;
-    return vec4<f32>(select(high, low, light <= vec3<f32>(0.0031308)), 1.0);
+@vertex
+fn tissue_corner(@location(0) nodes: vec2<u32>, @location(1) part: f32) -> TissueCorner {
+    var out: TissueCorner;
+    out.place = mix(node_place(nodes.x), node_place(nodes.y), part);
+    out.clip = view.view_projection * vec4<f32>(out.place, 1.0);
+    let lane = u32(view.range.z);
+    // On the scale already here: a software adapter pays for every pixel.
+    out.field = on_scale(mix(drawn_nodes[nodes.x][lane], drawn_nodes[nodes.y][lane], part));
+    return out;
 }
 
-// Light from the eye, on both sides of a face.
+// Light from the eye, on both sides of a face; a factor on bytes as the target keeps them (sRGB), which spares every pixel three
+// powers.
 fn shade(place: vec3<f32>, normal: vec3<f32>) -> f32 {
     let towards = normalize(view.eye.xyz - place);
     return 0.35 + 0.65 * abs(dot(normal, towards));
@@ -62,11 +58,20 @@ fn shade(place: vec3<f32>, normal: vec3<f32>) -> f32 {
 
 @fragment
 fn tissue_colour(corner: TissueCorner) -> @location(0) vec4<f32> {
-    let at = on_scale(corner.field) * 255.0;
-    let low = u32(at);
-    let colour = mix(colour_table[low], colour_table[min(low + 1u, 255u)], at - f32(low));
+    let colour = colour_table[u32(corner.field * 255.0 + 0.5)];
     let normal = normalize(cross(dpdx(corner.place), dpdy(corner.place)));
-    return encoded(colour.rgb * shade(corner.place, normal));
+    return vec4<f32>(colour.rgb * shade(corner.place, normal), 1.0);
+}
+
+// Behind everything, three corners that cover the view.
+@vertex
+fn backdrop_corner(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
+    return vec4<f32>(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 1.0, 1.0);
+}
+
+@fragment
+fn backdrop_colour() -> @location(0) vec4<f32> {
+    return vec4<f32>(0.12, 0.13, 0.15, 1.0);
 }
 
 struct ToolCorner {
@@ -82,5 +87,5 @@ fn tool_corner(@location(0) place: vec3<f32>, @location(1) normal: vec3<f32>) ->
 
 @fragment
 fn tool_colour(corner: ToolCorner) -> @location(0) vec4<f32> {
-    return encoded(view.plain.rgb * shade(corner.place, normalize(corner.normal)));
+    return vec4<f32>(view.plain.rgb * shade(corner.place, normalize(corner.normal)), 1.0);
 }

@@ -328,6 +328,16 @@ pub fn convergence_in_words(orders: &[Order]) -> Vec<String> {
             if list.is_empty() { "none".into() } else { list.join(", ") }
         ),
     });
+    // Far from the reference its own error counts least.
+    if let [.., (fine, near), (coarse, far)] = curve.errors[..]
+        && curve.fit.is_some()
+    {
+        sentences.push(format!(
+            "The error of the reference itself is in none of these numbers; it makes the finest meshes look better and the fitted \
+             power larger. Between the two coarsest meshes alone the power is {:.2}.",
+            (far / near).ln() / (coarse / fine).ln()
+        ));
+    }
     for order in orders.iter().filter(|o| !o.values.is_empty()) {
         let unit = if order.what.starts_with("depth") { "mm" } else { "N" };
         let values: Vec<String> =

@@ -36,6 +36,8 @@ const DESK_SPEED: f64 = 5e-3;
 const SIZE: [u32; 2] = [1280, 800];
 /// Pictures between two looks at the range of the field.
 const LOOK_AT_RANGE: u64 = 20;
+/// Pictures from one on which a software adapter draws the panels to the next.
+const PANELS_EVERY: u64 = 6;
 /// Part of the nodes that may lie beyond the automatic scale.
 const BEYOND_SCALE: f64 = 0.002;
 
@@ -154,6 +156,19 @@ struct Open {
     counted: Instant,
     next: Instant,
     pictures: u64,
+    /// What the window shows. It stays from picture to picture: a software adapter draws the panels on some of them only.
+    canvas: wgpu::Texture,
+    /// Where the tissue is drawn [points], and pixels per point, since the panels were drawn last.
+    area: egui::Rect,
+    scale: f32,
+    /// The panels are drawn on the next picture.
+    stale: bool,
+}
+
+/// The panels as triangles.
+struct Panels {
+    triangles: Vec<egui::ClippedPrimitive>,
+    textures: egui::TexturesDelta,
 }
 
 impl ApplicationHandler for App {
@@ -180,6 +195,8 @@ impl ApplicationHandler for App {
                 if size.width > 0 && size.height > 0 {
                     (open.config.width, open.config.height) = (size.width, size.height);
                     open.surface.configure(&open.gpu.device, &open.config);
+                    open.canvas = canvas(&open.gpu, &open.config);
+                    open.stale = true;
                 }
             }
             WindowEvent::Focused(false) => open.desk.let_go(),
@@ -238,7 +255,9 @@ impl App {
         let formats = surface.get_capabilities(&adapter).formats;
         config.format = formats.into_iter().find(|f| !f.is_srgb()).unwrap_or(config.format);
         config.present_mode = wgpu::PresentMode::AutoNoVsync;
+        config.usage = wgpu::TextureUsages::COPY_DST;
         surface.configure(&gpu.device, &config);
+        let canvas = canvas(&gpu, &config);
         let context = egui::Context::default();
         let largest = gpu.device.limits().max_texture_dimension_2d as usize;
         let egui = egui_winit::State::new(
@@ -249,7 +268,11 @@ impl App {
             None,
             Some(largest),
         );
-        let painter = egui_wgpu::Renderer::new(&gpu.device, config.format, RendererOptions::default());
+        let painter = egui_wgpu::Renderer::new(
+            &gpu.device,
+            config.format,
+            RendererOptions { dithering: false, ..Default::default() },
+        );
         let mut practice = practice;
         let mesh = practice.simulation.model.mesh.clone();
         let engine = practice.simulation.engine().on_device();
@@ -282,6 +305,10 @@ impl App {
             counted: now,
             next: now,
             pictures: 0,
+            canvas,
+            area: egui::Rect::NOTHING,
+            scale: 1.0,
+            stale: true,
         };
         open.cut();
         Ok(open)
@@ -290,7 +317,7 @@ impl App {
     /// One picture, and the frame of the tissue that is due.
     fn picture(&mut self) -> Result<()> {
         let Some(open) = &mut self.open else { return Ok(()) };
-        let wishes = open.picture(&self.reference, None)?;
+        let wishes = open.picture(&self.reference)?;
         if open.pictures == 1 {
             self.outcome.first_picture = self.program_start.elapsed().as_secs_f64();
         }
@@ -390,103 +417,37 @@ impl Open {
         due
     }
 
-    /// Draws a picture into the window, or into a texture of its own.
-    fn picture(&mut self, reference: &[ReferenceCurve], own: Option<&wgpu::Texture>) -> Result<Wishes> {
+    /// Draws a picture, and computes the frame of the tissue that is due beside it.
+    fn picture(&mut self, reference: &[ReferenceCurve]) -> Result<Wishes> {
         self.next = Instant::now() + Duration::from_secs_f64(PICTURE);
-        let due = own.is_none() && self.frame_is_due();
+        let due = self.frame_is_due();
         if due {
-            let hand: &mut dyn InputDevice = match &mut self.recording {
-                Some(recording) => recording,
-                None => &mut self.desk,
-            };
-            self.practice.start(hand)?;
+            self.start()?;
         }
-        let input = self.egui.take_egui_input(&self.window);
-        let context = self.egui.egui_ctx().clone();
-        let (mut wishes, mut area) = (Wishes::default(), egui::Rect::NOTHING);
-        let output = context.run_ui(input, |ui| {
-            egui::Panel::left("controls").default_size(250.0).show(ui, |ui| {
-                egui::ScrollArea::vertical().show(ui, |ui| {
-                    wishes =
-                        panels::controls(ui, &mut self.practice, &mut self.choices, &mut self.camera, &mut self.desk);
-                });
-            });
-            egui::Panel::right("readings").default_size(330.0).show(ui, |ui| {
-                panels::readings(ui, &self.practice, &mut self.choices, reference);
-            });
-            egui::CentralPanel::no_frame().show(ui, |ui| {
-                area = ui.available_rect_before_wrap();
-                let response = ui.allocate_rect(area, egui::Sense::click_and_drag());
-                look(&response, ui, &mut self.camera, &mut self.desk);
-            });
-        });
-        self.egui.handle_platform_output(&self.window, output.platform_output);
-        if wishes.recut {
-            self.cut();
-        }
-        let scale = output.pixels_per_point;
-        let triangles = context.tessellate(output.shapes, scale);
-        let mut textures = output.textures_delta;
-        for (id, deltas) in textures.set.drain() {
-            for delta in &deltas {
-                self.painter.update_texture(&self.gpu.device, &self.gpu.queue, id, delta);
+        let mut wishes = Wishes::default();
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let panels = self.panels_are_due().then(|| self.run_panels(reference, &mut wishes));
+        self.draw(&mut encoder, panels);
+        // Nothing to show it on: the tissue goes on, the picture is left out.
+        let shown = match self.surface.get_current_texture() {
+            wgpu::CurrentSurfaceTexture::Success(texture) | wgpu::CurrentSurfaceTexture::Suboptimal(texture) => {
+                Some(texture).filter(|shown| shown.texture.size() == self.canvas.size())
             }
-        }
-        self.place_tool();
-
-        let shown = match own {
-            Some(_) => None,
-            None => match self.surface.get_current_texture() {
-                wgpu::CurrentSurfaceTexture::Success(texture) => Some(texture),
-                wgpu::CurrentSurfaceTexture::Suboptimal(texture) => Some(texture),
-                // Nothing to draw on: the tissue goes on, the picture is left out.
-                wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
-                    self.surface.configure(&self.gpu.device, &self.config);
-                    None
-                }
-                _ => None,
-            },
+            wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
+                self.surface.configure(&self.gpu.device, &self.config);
+                None
+            }
+            _ => None,
         };
-        let target = own.or(shown.as_ref().map(|s| &s.texture));
-        if let Some(target) = target {
-            let (size, view) = (target.size(), target.create_view(&Default::default()));
-            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-            if let Some(engine) = self.practice.simulation.engine().on_device() {
-                engine.encode_fields(&mut encoder);
-            }
-            let pixels = Area {
-                x: area.left() * scale,
-                y: area.top() * scale,
-                width: area.width() * scale,
-                height: area.height() * scale,
-            };
-            let look = (&self.camera, &self.choices.scale);
-            self.view.draw(&self.gpu, &mut encoder, (&view, size), pixels, look);
-            let screen = ScreenDescriptor { size_in_pixels: [size.width, size.height], pixels_per_point: scale };
-            let more =
-                self.painter.update_buffers(&self.gpu.device, &self.gpu.queue, &mut encoder, &triangles, &screen);
-            {
-                let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("panels"),
-                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                        view: &view,
-                        depth_slice: None,
-                        resolve_target: None,
-                        ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
-                    })],
-                    ..Default::default()
-                });
-                self.painter.render(&mut pass.forget_lifetime(), &triangles, &screen);
-            }
-            self.gpu.queue.submit(more.into_iter().chain([encoder.finish()]));
+        if let Some(shown) = &shown {
+            let (from, to) = (self.canvas.as_image_copy(), shown.texture.as_image_copy());
+            encoder.copy_texture_to_texture(from, to, self.canvas.size());
         }
-        for id in textures.free.drain() {
-            self.painter.free_texture(&id);
+        self.gpu.queue.submit([encoder.finish()]);
+        if wishes.step && !due {
+            self.start()?;
         }
         if due || wishes.step {
-            if wishes.step && !due {
-                self.practice.start(&mut self.desk)?;
-            }
             let hand: &mut dyn InputDevice = match &mut self.recording {
                 Some(recording) => recording,
                 None => &mut self.desk,
@@ -500,10 +461,97 @@ impl Open {
             self.practice.drawn();
         }
         self.gpu.check()?;
-        if own.is_none() && self.choices.automatic && self.pictures % LOOK_AT_RANGE == 1 {
+        if self.choices.automatic && self.pictures % LOOK_AT_RANGE == 1 {
             self.follow_range()?;
         }
         Ok(wishes)
+    }
+
+    /// Gives the device the next frame.
+    fn start(&mut self) -> Result<()> {
+        let hand: &mut dyn InputDevice = match &mut self.recording {
+            Some(recording) => recording,
+            None => &mut self.desk,
+        };
+        self.practice.start(hand)
+    }
+
+    /// Filling the panels takes a software adapter longer than drawing the tissue.
+    fn panels_are_due(&self) -> bool {
+        let input = !self.egui.egui_input().events.is_empty() || self.egui.is_any_pointer_button_down();
+        !self.gpu.is_software() || self.stale || input || self.pictures.is_multiple_of(PANELS_EVERY)
+    }
+
+    /// Asks the panels what they show and what was clicked.
+    fn run_panels(&mut self, reference: &[ReferenceCurve], wishes: &mut Wishes) -> Panels {
+        let input = self.egui.take_egui_input(&self.window);
+        let context = self.egui.egui_ctx().clone();
+        let output = context.run_ui(input, |ui| {
+            egui::Panel::left("controls").default_size(250.0).show(ui, |ui| {
+                egui::ScrollArea::vertical().show(ui, |ui| {
+                    let (practice, choices) = (&mut self.practice, &mut self.choices);
+                    *wishes = panels::controls(ui, practice, choices, &mut self.camera, &mut self.desk);
+                });
+            });
+            egui::Panel::right("readings").default_size(330.0).show(ui, |ui| {
+                panels::readings(ui, &self.practice, &mut self.choices, reference);
+            });
+            egui::CentralPanel::no_frame().show(ui, |ui| {
+                self.area = ui.available_rect_before_wrap();
+                let response = ui.allocate_rect(self.area, egui::Sense::click_and_drag());
+                look(&response, ui, &mut self.camera, &mut self.desk);
+            });
+        });
+        self.scale = output.pixels_per_point;
+        // What moves goes on moving on the next picture.
+        self.stale =
+            output.viewport_output.values().any(|v| v.repaint_delay.is_zero()) || egui::Popup::is_any_open(&context);
+        self.egui.handle_platform_output(&self.window, output.platform_output);
+        if wishes.recut {
+            self.cut();
+        }
+        Panels { triangles: context.tessellate(output.shapes, self.scale), textures: output.textures_delta }
+    }
+
+    /// Draws the tissue on the canvas, and the panels where they were asked.
+    fn draw(&mut self, encoder: &mut wgpu::CommandEncoder, panels: Option<Panels>) {
+        self.place_tool();
+        if let Some(engine) = self.practice.simulation.engine().on_device() {
+            engine.encode_fields(encoder);
+        }
+        let (size, view) = (self.canvas.size(), self.canvas.create_view(&Default::default()));
+        let pixels = Area {
+            x: self.area.left() * self.scale,
+            y: self.area.top() * self.scale,
+            width: self.area.width() * self.scale,
+            height: self.area.height() * self.scale,
+        };
+        self.view.draw(&self.gpu, encoder, (&view, size), pixels, (&self.camera, &self.choices.scale));
+        let Some(mut panels) = panels else { return };
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        for (id, deltas) in panels.textures.set.drain() {
+            for delta in &deltas {
+                self.painter.update_texture(device, queue, id, delta);
+            }
+        }
+        let screen = ScreenDescriptor { size_in_pixels: [size.width, size.height], pixels_per_point: self.scale };
+        let more = self.painter.update_buffers(device, queue, encoder, &panels.triangles, &screen);
+        // Only paint callbacks ask for buffers of their own, and there are none.
+        debug_assert!(more.is_empty());
+        let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("panels"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+            })],
+            ..Default::default()
+        });
+        self.painter.render(&mut pass.forget_lifetime(), &panels.triangles, &screen);
+        for id in panels.textures.free.drain() {
+            self.painter.free_texture(&id);
+        }
     }
 
     /// Brings the ends of the scale to what the field holds now.
@@ -541,20 +589,12 @@ impl Open {
         self.view.place_tool(&self.gpu, &corners);
     }
 
-    /// Draws the window once more into a texture, and writes that.
+    /// Draws the canvas once more, and writes it.
     fn screenshot(&mut self, reference: &[ReferenceCurve], path: &Path) -> Result<()> {
-        let size = wgpu::Extent3d { width: self.config.width, height: self.config.height, depth_or_array_layers: 1 };
-        let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("screenshot"),
-            size,
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: self.config.format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        self.picture(reference, Some(&texture))?;
+        let size = self.canvas.size();
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let panels = self.run_panels(reference, &mut Wishes::default());
+        self.draw(&mut encoder, Some(panels));
         let row = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("screenshot"),
@@ -562,9 +602,8 @@ impl Open {
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         encoder.copy_texture_to_buffer(
-            texture.as_image_copy(),
+            self.canvas.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &buffer,
                 layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None },
@@ -584,6 +623,20 @@ impl Open {
         }
         crate::render::write_png(path, &pixels, size.width, size.height)
     }
+}
+
+/// A texture as large as the window.
+fn canvas(gpu: &Gpu, config: &wgpu::SurfaceConfiguration) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("canvas"),
+        size: wgpu::Extent3d { width: config.width, height: config.height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: config.format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
 }
 
 /// Mouse over the view: drags turn and shift it, the wheel leads the needle or, with Ctrl, zooms.

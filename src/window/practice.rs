@@ -172,11 +172,11 @@ impl Practice {
         self.simulation.hand().map_or_else(|| self.records.last().map_or(0.0, |r| r.depth), |pose| pose.depth)
     }
 
-    /// Gives the device the next frame, led by what the hand wants. True where there was one to start.
+    /// Gives the device the next frame, led by what the hand wants.
     ///
     /// # Errors
     /// `Error::Device`.
-    pub fn start(&mut self, hand: &mut dyn InputDevice) -> Result<bool> {
+    pub fn start(&mut self, hand: &mut dyn InputDevice) -> Result<()> {
         if let Some(now) = self.simulation.hand() {
             let wanted = hand.pose(&now, self.timing.simulated);
             let pose = self.within_reach(&now, wanted);
@@ -184,8 +184,7 @@ impl Practice {
             self.simulation.lead(&pose);
         }
         self.started = Some(Instant::now());
-        self.simulation.start_frames()?;
-        Ok(true)
+        self.simulation.start_frames()
     }
 
     /// What the tissue can follow of what the hand wants.

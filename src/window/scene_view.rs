@@ -12,10 +12,8 @@ use crate::{Error, Result};
 
 const SHADER: &str = include_str!("../../shaders/render/tissue.wgsl");
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Steel, linear light.
-const STEEL: [f32; 4] = [0.42, 0.45, 0.50, 1.0];
-/// Behind everything, as the bytes of the target.
-const BACKGROUND: wgpu::Color = wgpu::Color { r: 0.12, g: 0.13, b: 0.15, a: 1.0 };
+/// Steel, sRGB.
+const STEEL: [f32; 4] = [0.70, 0.72, 0.76, 1.0];
 
 /// A field that can be shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,6 +82,7 @@ pub struct Area {
 
 /// The drawing of one simulation.
 pub struct SceneView {
+    backdrop: wgpu::RenderPipeline,
     tissue: wgpu::RenderPipeline,
     tool: wgpu::RenderPipeline,
     tissue_bindings: wgpu::BindGroup,
@@ -95,13 +94,10 @@ pub struct SceneView {
     depth: Option<(wgpu::Extent3d, wgpu::TextureView)>,
 }
 
-/// Colours of the scale from 0 to 1, linear light: perceptually uniform, from dark to bright, apart for the colour-blind.
+/// Colours of the scale from 0 to 1, sRGB: perceptually uniform, from dark to bright, apart for the colour-blind.
 pub fn colour_table() -> Vec<[f32; 4]> {
-    let linear = |byte: u8| {
-        let c = f32::from(byte) / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    };
-    (0..256).map(|n| colour_bytes(n as f64 / 255.0)).map(|[r, g, b]| [linear(r), linear(g), linear(b), 1.0]).collect()
+    let part = |byte: u8| f32::from(byte) / 255.0;
+    (0..256).map(|n| colour_bytes(f64::from(n) / 255.0)).map(|[r, g, b]| [part(r), part(g), part(b), 1.0]).collect()
 }
 
 /// The colour at 0..1 as bytes (sRGB).
@@ -122,7 +118,12 @@ impl SceneView {
             label: Some("tissue"),
             source: wgpu::ShaderSource::Wgsl(SHADER.into()),
         });
-        let pipeline = |vertex: &str, fragment: &str, stride: usize, attributes: &[wgpu::VertexAttribute]| {
+        let pipeline = |vertex: &str, fragment: &str, stride: usize, attributes: &[wgpu::VertexAttribute], cull| {
+            let buffers = [Some(wgpu::VertexBufferLayout {
+                array_stride: stride as u64,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes,
+            })];
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(vertex),
                 layout: None,
@@ -130,11 +131,7 @@ impl SceneView {
                     module: &module,
                     entry_point: Some(vertex),
                     compilation_options: Default::default(),
-                    buffers: &[Some(wgpu::VertexBufferLayout {
-                        array_stride: stride as u64,
-                        step_mode: wgpu::VertexStepMode::Vertex,
-                        attributes,
-                    })],
+                    buffers: if attributes.is_empty() { &[] } else { &buffers },
                 },
                 fragment: Some(wgpu::FragmentState {
                     module: &module,
@@ -142,11 +139,11 @@ impl SceneView {
                     compilation_options: Default::default(),
                     targets: &[Some(format.into())],
                 }),
-                primitive: Default::default(),
+                primitive: wgpu::PrimitiveState { cull_mode: cull, ..Default::default() },
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: DEPTH,
                     depth_write_enabled: Some(true),
-                    depth_compare: Some(wgpu::CompareFunction::Less),
+                    depth_compare: Some(wgpu::CompareFunction::LessEqual),
                     stencil: Default::default(),
                     bias: Default::default(),
                 }),
@@ -155,17 +152,21 @@ impl SceneView {
                 cache: None,
             })
         };
+        let backdrop = pipeline("backdrop_corner", "backdrop_colour", 0, &[], None);
         let tissue = pipeline(
             "tissue_corner",
             "tissue_colour",
             size_of::<TissueCorner>(),
             &wgpu::vertex_attr_array![0 => Uint32x2, 1 => Float32],
+            // The tissue is closed, its faces look outwards.
+            Some(wgpu::Face::Back),
         );
         let tool = pipeline(
             "tool_corner",
             "tool_colour",
             size_of::<ToolCorner>(),
             &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
+            None,
         );
         let filled = |label, contents: &[u8], usage| {
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
@@ -210,6 +211,7 @@ impl SceneView {
             tool_corners: (nothing(), 0),
             outline: Outline::of(mesh),
             depth: None,
+            backdrop,
             tissue,
             tool,
             tissue_bindings,
@@ -233,7 +235,7 @@ impl SceneView {
         self.tool_corners = vertices(gpu, corners);
     }
 
-    /// Draws into `area` of a target of the size `size`; clears all of it.
+    /// Draws into `area` of a target of the size `size`, and leaves the rest of it as it is.
     pub fn draw(
         &mut self,
         gpu: &Gpu,
@@ -275,7 +277,7 @@ impl SceneView {
                 view: target,
                 depth_slice: None,
                 resolve_target: None,
-                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(BACKGROUND), store: wgpu::StoreOp::Store },
+                ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: depth,
@@ -291,6 +293,9 @@ impl SceneView {
             return;
         }
         pass.set_viewport(area.x, area.y, width, height, 0.0, 1.0);
+        pass.set_scissor_rect(area.x as u32, area.y as u32, width as u32, height as u32);
+        pass.set_pipeline(&self.backdrop);
+        pass.draw(0..3, 0..1);
         for (pipeline, bindings, (buffer, count)) in [
             (&self.tissue, &self.tissue_bindings, &self.corners),
             (&self.tool, &self.tool_bindings, &self.tool_corners),

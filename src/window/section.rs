@@ -138,7 +138,7 @@ mod tests {
 
     fn block() -> BlockMesh {
         let line = |n: usize| (0..=n).map(|i| i as f64 * 1e-3).collect::<Vec<_>>();
-        BlockMesh::from_lines([line(4), line(3), line(2)])
+        BlockMesh::new([line(4), line(3), line(2)])
     }
 
     fn area(mesh: &Mesh, corners: &[TissueCorner]) -> f64 {

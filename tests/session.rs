@@ -1,0 +1,150 @@
+//! Recorded sessions: what a hand did is enough to compute the same forces again, bit for bit.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use common::*;
+use stylet::observables::FrameRecord;
+use stylet::scene::Scene;
+use stylet::session::Session;
+use stylet::solver::simulation::{Purpose, Simulation};
+
+/// A small insertion.
+const OVERRIDES: [&str; 3] =
+    ["tissue.cell_size_mm=1.2", "tissue.size_mm=[14.0, 14.0, 10.0]", "motion.phase.0.depth_mm=6.0"];
+
+fn scene() -> Scene {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/muscle_biopsy.toml");
+    Scene::load(&file, &OVERRIDES.map(String::from)).unwrap()
+}
+
+/// Depth that a nervous hand wants at the end of a frame [m].
+fn wanted(frame: usize) -> f64 {
+    let t = frame as f64 / 60.0;
+    2.2e-3 * t + 0.15e-3 * (9.0 * t).sin() - if t > 1.6 { 1.5e-3 * (t - 1.6) } else { 0.0 }
+}
+
+/// Leads the needle over `frames` frames; the session and the records.
+fn practised(frames: usize, ahead: usize) -> (Session, Vec<FrameRecord>) {
+    let scene = scene();
+    let purpose = Purpose { led: true, drawn: ahead == 0 && gpu().is_some() };
+    let mut simulation = Simulation::for_purpose(scene.clone(), gpu(), purpose).unwrap();
+    let mut session = Session::new(&scene, &OVERRIDES.map(String::from), simulation.engine().info());
+    let mut records = Vec::new();
+    for frame in 0..frames + ahead {
+        if frame < frames {
+            let now = simulation.hand().unwrap();
+            session.poses.push(stylet::scene::motion::HandPose { depth: wanted(frame), ..now });
+            simulation.lead(session.poses.last().unwrap());
+            simulation.start_frames().unwrap();
+        }
+        if frame >= ahead {
+            records.push(simulation.next_frame().unwrap().unwrap());
+        }
+    }
+    assert!(simulation.next_frame().unwrap().is_none(), "a frame that nobody has led");
+    (session, records)
+}
+
+fn bits(records: &[FrameRecord]) -> Vec<[u64; 4]> {
+    let of = |r: &FrameRecord| [r.force.axial, r.force.friction, r.energy.elastic, r.depth].map(f64::to_bits);
+    records.iter().map(of).collect()
+}
+
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn new() -> Self {
+        Place(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn replay(&self, session: &Path, out: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_stylet"))
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .args(["replay".as_ref(), session.as_os_str(), "--out".as_ref(), self.path(out).as_os_str()])
+            .output()
+            .unwrap()
+    }
+}
+
+#[test]
+fn a_hand_that_goes_as_the_script_does_feels_the_same() {
+    let mut scene = scene();
+    scene.motion.phases.truncate(1);
+    let mut scripted = Simulation::on(scene.clone(), gpu()).unwrap();
+    let mut led = Simulation::for_purpose(scene, gpu(), Purpose { led: true, drawn: false }).unwrap();
+    let mut frames = 0;
+    while let Some(record) = scripted.next_frame().unwrap() {
+        let pose = scripted.tool_pose(scripted.end_of(record.frame)).unwrap();
+        let now = led.hand().unwrap();
+        led.lead(&stylet::scene::motion::HandPose { depth: pose.depth, ..now });
+        let same = led.next_frame().unwrap().unwrap();
+        assert_eq!((same.frame, same.step), (record.frame, record.step));
+        at_most("depth", (same.depth - record.depth).abs(), 1e-12);
+        // Poses differ in their last bits.
+        at_most("force", (same.force.axial - record.force.axial).abs(), 2e-4);
+        frames += 1;
+    }
+    assert!(frames > 100);
+}
+
+#[test]
+fn a_session_gives_its_forces_again_bit_for_bit() {
+    let (session, records) = practised(150, 0);
+    let (_, again) = practised(150, 1);
+    assert_eq!(bits(&records), bits(&again), "drawn and in step, or not drawn and a frame ahead");
+    let largest = records.iter().map(|r| r.force.axial).fold(0.0, f64::max);
+    assert!(largest > 0.3, "{largest}: the needle has not reached anything");
+    assert!(records.last().unwrap().energy.imbalance().abs() < 0.02);
+    let place = Place::new();
+    let file = place.path("session.json");
+    session.write(&file).unwrap();
+    assert_eq!(Session::read(&file).unwrap(), session);
+    for out in ["first", "second"] {
+        let output = place.replay(&file, out);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(String::from_utf8_lossy(&output.stdout).contains("bit for bit"), "{output:?}");
+    }
+    let table = |out: &str| std::fs::read_to_string(place.path(out).join("force.csv")).unwrap();
+    assert_eq!(table("first"), table("second"));
+    // The table has nine digits.
+    let header: Vec<String> = table("first").lines().next().unwrap().split(',').map(String::from).collect();
+    let column = header.iter().position(|h| h == "axial_force_n").unwrap();
+    for (row, record) in table("first").lines().skip(1).zip(&records) {
+        let force: f64 = row.split(',').nth(column).unwrap().parse().unwrap();
+        at_most("force", (force - record.force.axial).abs(), 1e-8);
+    }
+}
+
+#[test]
+fn a_session_of_another_scene_is_refused() {
+    let (mut session, _) = practised(3, 0);
+    let place = Place::new();
+    let refused = |session: &Session, what: &str| {
+        let file = place.path("wrong.json");
+        session.write(&file).unwrap();
+        let output = place.replay(&file, "never");
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(what) && told.contains("way out"), "{told}");
+        assert!(!place.path("never").exists());
+    };
+    session.poses[1].depth = 7.0;
+    refused(&session, "frame 1");
+    session.poses[1].depth = f64::NAN;
+    refused(&session, "no session");
+    session.poses[1].depth = 0.0;
+    session.overrides[0] = "tissue.cell_size_mm=1.1".into();
+    refused(&session, "has changed");
+    session.format = 9;
+    refused(&session, "format");
+    std::fs::write(place.path("text.json"), "{ \"format\": 1").unwrap();
+    assert_eq!(place.replay(&place.path("text.json"), "never").status.code(), Some(2));
+    assert_eq!(place.replay(&place.path("nowhere.json"), "never").status.code(), Some(2));
+}

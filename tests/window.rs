@@ -1,0 +1,182 @@
+//! The real window on a virtual display: real mouse and keys, pictures, closing in the middle.
+//!
+//! Needs `Xvfb` and `xdotool`; `REQUIRE_WINDOW=1` turns their absence into a failure.
+#![cfg(feature = "window")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// A virtual display with its own number.
+struct Display {
+    server: Child,
+    name: String,
+    place: tempfile::TempDir,
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+fn has(program: &str) -> bool {
+    let found = std::env::var_os("PATH").is_some_and(|p| std::env::split_paths(&p).any(|d| d.join(program).is_file()));
+    let required = std::env::var("REQUIRE_WINDOW").is_ok_and(|v| v == "1");
+    assert!(found || !required, "REQUIRE_WINDOW=1, and there is no {program}");
+    found
+}
+
+impl Display {
+    fn open() -> Option<Self> {
+        if !has("Xvfb") || !has("xdotool") {
+            println!("skipped: no Xvfb or xdotool");
+            return None;
+        }
+        let place = tempfile::tempdir().unwrap();
+        let numbers = place.path().join("number");
+        // The server looks for a free number itself, and writes it once it takes connections.
+        let file = std::fs::File::create(&numbers).unwrap();
+        let server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
+            .stdout(file)
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let begin = Instant::now();
+        let name = loop {
+            let text = std::fs::read_to_string(&numbers).unwrap();
+            if text.ends_with('\n') {
+                break format!(":{}", text.trim());
+            }
+            assert!(begin.elapsed() < Duration::from_secs(30), "Xvfb gave no number");
+            std::thread::sleep(Duration::from_millis(50));
+        };
+        Some(Display { server, name, place })
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.place.path().join(name)
+    }
+
+    fn view(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
+        command
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .env("DISPLAY", &self.name)
+            .env_remove("WAYLAND_DISPLAY")
+            .arg("view")
+            .arg("scenes/muscle_biopsy.toml")
+            .args(["--set", "tissue.cell_size_mm=1.0"])
+            .args(arguments);
+        command
+    }
+
+    fn xdotool(&self, arguments: &[&str]) -> Output {
+        Command::new("xdotool").env("DISPLAY", &self.name).args(arguments).output().unwrap()
+    }
+
+    /// Waits for the window.
+    fn wait(&self) {
+        let begin = Instant::now();
+        while !self.xdotool(&["search", "--name", "Stylet"]).status.success() {
+            assert!(begin.elapsed() < Duration::from_secs(60), "no window");
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        // Without a window manager nobody gives it the keyboard.
+        self.xdotool(&["search", "--name", "Stylet", "windowfocus"]);
+    }
+}
+
+/// Pixels of a PNG, RGBA, with its size.
+fn picture(path: &Path) -> (Vec<[u8; 4]>, usize, usize) {
+    let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    let pixels = bytes.chunks_exact(info.color_type.samples()).map(|p| [p[0], p[1], p[2], 255]).collect();
+    (pixels, info.width as usize, info.height as usize)
+}
+
+#[test]
+fn a_script_is_watched_and_a_picture_kept() {
+    let Some(display) = Display::open() else { return };
+    let shot = display.path("shot.png");
+    let output =
+        display.view(&["--script", "--frames", "60", "--screenshot", shot.to_str().unwrap()]).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("60 pictures"), "{told}");
+    let (pixels, width, height) = picture(&shot);
+    assert_eq!((width, height), (1280, 800));
+    // The middle shows tissue in the colours of the scale, the rest is background: neither all nor nothing.
+    let coloured = |p: &[u8; 4]| p[0].abs_diff(p[2]) > 25 || p[1].abs_diff(p[2]) > 25;
+    let middle: Vec<[u8; 4]> =
+        (200..600).flat_map(|y| (300..900).map(move |x| (x, y))).map(|(x, y)| pixels[y * width + x]).collect();
+    let part = middle.iter().filter(|p| coloured(p)).count() as f64 / middle.len() as f64;
+    assert!((0.2..1.0).contains(&part), "{part} of the middle is tissue");
+}
+
+#[test]
+fn a_hand_leads_the_needle_and_its_session_is_kept() {
+    let Some(display) = Display::open() else { return };
+    let out = display.path("attempt");
+    let mut child =
+        display.view(&["--out", out.to_str().unwrap()]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    display.wait();
+    std::thread::sleep(Duration::from_millis(700));
+    // Play, three seconds of "advance", the wheel over the tissue, a drag that turns the view, pause, close.
+    display.xdotool(&["key", "space"]);
+    display.xdotool(&["keydown", "Down"]);
+    std::thread::sleep(Duration::from_secs(3));
+    display.xdotool(&["keyup", "Down"]);
+    display.xdotool(&["mousemove", "620", "400", "click", "--repeat", "4", "5"]);
+    display.xdotool(&["mousedown", "1", "mousemove_relative", "--", "60", "20", "mouseup", "1"]);
+    std::thread::sleep(Duration::from_millis(1500));
+    display.xdotool(&["search", "--name", "Stylet", "windowsize", "1000", "600"]);
+    std::thread::sleep(Duration::from_millis(500));
+    display.xdotool(&["key", "space"]);
+    std::thread::sleep(Duration::from_millis(300));
+    display.xdotool(&["search", "--name", "Stylet", "windowquit"]);
+    let begin = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if begin.elapsed() > Duration::from_secs(20) {
+            let _ = child.kill();
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let output = child.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    // What was written is computed again from the session alone.
+    let session: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("session.json")).unwrap()).unwrap();
+    let poses = session["poses"].as_array().unwrap();
+    let deepest = poses.iter().map(|p| p["depth"].as_f64().unwrap()).fold(0.0, f64::max);
+    assert!(poses.len() > 30 && deepest > 1.5e-3, "{} poses, {deepest} m", poses.len());
+    let again = display.path("again");
+    let replayed = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(["replay".as_ref(), out.as_os_str(), "--out".as_ref(), again.as_os_str()])
+        .output()
+        .unwrap();
+    assert!(replayed.status.success(), "{}", String::from_utf8_lossy(&replayed.stderr));
+    let table = |folder: &Path| std::fs::read_to_string(folder.join("force.csv")).unwrap();
+    assert_eq!(table(&out), table(&again));
+}
+
+#[test]
+fn without_a_display_there_is_a_message() {
+    let output = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .arg("view")
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(told.contains("way out") && told.contains("stylet run") && !told.contains("panicked"), "{told}");
+}
