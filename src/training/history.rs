@@ -66,8 +66,7 @@ pub struct History {
 /// whatever a file system folds or rewrites, and none is that of a device (`con`, `nul`, ...).
 pub fn file_name(name: &str) -> String {
     let kept = name.chars().take(LONGEST_NAME).enumerate();
-    let kept: String =
-        kept.map(|(i, c)| if c.is_alphanumeric() || (c == '-' && i > 0) { c } else { '_' }).collect();
+    let kept: String = kept.map(|(i, c)| if c.is_alphanumeric() || (c == '-' && i > 0) { c } else { '_' }).collect();
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     let safe = kept == name && kept.chars().all(plain) && kept.len() > LONGEST_DEVICE;
     if safe { kept } else { format!("{kept}_{}", &fnv1a(&[name])[..8]) }

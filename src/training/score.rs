@@ -114,7 +114,8 @@ fn with_texts(figures: Vec<(String, Option<f64>)>) -> Vec<Row> {
                 key: key.clone(),
                 label,
                 unit: text.unit.into(),
-                value: value.map(|v| v * text.per_si).filter(|v| v.is_finite()),
+                // An empty sum is -0.
+                value: value.map(|v| v * text.per_si + 0.0).filter(|v| v.is_finite()),
                 reference: None,
                 better: text.better,
             });
@@ -141,16 +142,13 @@ impl Score {
         for (key, value) in physical_rows(&physical) {
             let optional = ["separated_area", "largest_damage", "core_mass", "core_length"].contains(&key.as_str());
             if value.is_some() || !optional {
-                rows.push((key, value.filter(|_| trust.is_good())));
+                rows.push((key, value));
             }
         }
-        let mut goals = match &scene.task {
+        let goals = match &scene.task {
             Some(task) => task::judge(task, scene, samples, &kinematic, &physical),
             None => Vec::new(),
         };
-        if !trust.is_good() {
-            goals.iter_mut().for_each(|goal| (goal.measured, goal.met) = (None, None));
-        }
         let mut score = Score {
             scene: scene.name.clone(),
             task: scene.task.as_ref().map(|task| task.name.clone()),
@@ -158,10 +156,27 @@ impl Score {
             goals,
             trust,
         };
+        if !score.trust.is_good() {
+            score.take_back();
+        }
         if let Some(reference) = reference {
             score.compare_with(reference);
         }
         Ok(score)
+    }
+
+    /// Marks the run as one that is not scored, for a reason that its records do not tell, e.g. that it stopped early.
+    pub fn fail(&mut self, reason: impl Into<String>) {
+        self.trust.reasons.push(reason.into());
+        self.take_back();
+    }
+
+    /// Takes back what depends on the tissue, and every verdict.
+    fn take_back(&mut self) {
+        let kinematic = kinematic_rows(&KinematicFigures::default());
+        let rows = self.rows.iter_mut();
+        rows.filter(|row| kinematic.iter().all(|(key, _)| *key != row.key)).for_each(|row| row.value = None);
+        self.goals.iter_mut().for_each(|goal| (goal.measured, goal.met) = (None, None));
     }
 
     /// Puts the values of another attempt beside its own.
