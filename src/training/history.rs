@@ -89,7 +89,7 @@ impl History {
         Ok(self.root.join(file_name(trainee)))
     }
 
-    /// Keeps a score as the next attempt of a trainee at its task, and returns it with its file. No file is ever replaced.
+    /// Keeps a score as the next attempt of a trainee at its task, and returns it with its file. No other attempt is ever replaced.
     ///
     /// # Errors
     /// `Error::Input` for an empty name or a score without a task, `Error::File` where the file cannot be written.
@@ -100,7 +100,7 @@ impl History {
         let stem = file_name(task);
         // Broken files count, too: their numbers are taken.
         let taken = names(&folder)?.iter().filter_map(|name| number_of(name, &stem)).max().unwrap_or(0);
-        let number = taken.saturating_add(1);
+        let (number, path) = reserve(&folder, &stem, taken.saturating_add(1))?;
         let finished = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
         let attempt = Attempt {
             version: VERSION,
@@ -110,9 +110,11 @@ impl History {
             finished,
             score: score.clone(),
         };
-        let path = folder.join(format!("{stem}_{number}.json"));
         let text = serde_json::to_string_pretty(&attempt).map_err(|source| Error::file(&path, source.into()))?;
-        whole_file::write(&path, (text + "\n").as_bytes())?;
+        whole_file::write(&path, (text + "\n").as_bytes()).inspect_err(|_| {
+            // The first error is the one to report; an empty attempt is of no use.
+            let _ = fs::remove_file(&path);
+        })?;
         Ok((attempt, path))
     }
 
@@ -195,6 +197,18 @@ fn names(folder: &Path) -> Result<Vec<String>> {
 fn number_of(name: &str, stem: &str) -> Option<u32> {
     let rest = name.strip_prefix(stem)?.strip_prefix('_')?;
     rest.strip_suffix(whole_file::UNFINISHED).unwrap_or(rest).strip_suffix(".json")?.parse().ok()
+}
+
+/// Makes the file of the first free number from `number` on, so that a second program does not take it, too.
+fn reserve(folder: &Path, stem: &str, mut number: u32) -> Result<(u32, PathBuf)> {
+    loop {
+        let path = folder.join(format!("{stem}_{number}.json"));
+        match fs::File::create_new(&path) {
+            Ok(_) => return Ok((number, path)),
+            Err(source) if source.kind() == std::io::ErrorKind::AlreadyExists && number < u32::MAX => number += 1,
+            Err(source) => return Err(Error::file(path, source)),
+        }
+    }
 }
 
 /// Reads one file.
