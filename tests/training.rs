@@ -354,6 +354,9 @@ fn overshoot_begins_where_the_tip_law_lets_go() {
     }
     near(p.overshoot().unwrap(), 0.5 * MM, 1e-9);
     near(p.deepest_cut, 6.2 * MM, 1e-12);
+    // Through the surface only: how far the needle goes then is the insertion itself.
+    let (samples, records) = run(&[(1.0, 0.0), (2.0, 0.6), (3.0, 0.9)]);
+    assert_eq!(PhysicalFigures::of(&scene, &samples, &records).overshoot(), None);
     // A pause ends the overshoot, and so does turning back.
     for then in [(6.0, 4.6), (5.5, 4.6)] {
         let (samples, records) = run(&[&places[..7], &[then], &places[7..]].concat());
@@ -624,8 +627,8 @@ fn a_score_in_all_its_forms() {
         assert_eq!(rows.contains(text.key), !optional, "{}", text.key);
     }
     // Numbers as people read them.
-    let shorts = [0.0, 1.0, 12.3456, 0.00123456, 98765.4, 2e-9, f64::NAN].map(texts::short);
-    assert_eq!(shorts, ["0", "1", "12.35", "0.001235", "98765", "2.000e-9", "NaN"]);
+    let shorts = [0.0, 1.0, 12.3456, 0.00123456, 98765.4, 2e-5, -2e-9, f64::NAN].map(texts::short);
+    assert_eq!(shorts, ["0", "1", "12.35", "0.001235", "98765", "2.000e-5", "0", "NaN"]);
 }
 
 /// A short and coarse insertion into the first training scene, on the CPU engine.

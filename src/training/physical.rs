@@ -231,9 +231,10 @@ impl PhysicalFigures {
         figures
     }
 
-    /// Overshoot behind the last layer that gave way: the one after which the trainee had to stop [m].
+    /// Overshoot behind the last layer that gave way, the one after which the trainee had to stop [m]; `None` where only the
+    /// surface did, since the travel after that is the insertion itself.
     pub fn overshoot(&self) -> Option<f64> {
-        self.punctures.last().map(|p| p.overshoot)
+        self.punctures.last().filter(|_| self.punctures.len() > 1).map(|p| p.overshoot)
     }
 }
 

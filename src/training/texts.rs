@@ -145,9 +145,10 @@ pub fn bounds(least: Option<f64>, most: Option<f64>, unit: &str) -> String {
     }
 }
 
-/// A number with four significant digits, without an exponent where it can do without.
+/// A number with four significant digits, without an exponent where it can do without. Below a millionth of its unit it is
+/// rounding.
 pub fn short(value: f64) -> String {
-    if value == 0.0 {
+    if value.abs() < 1e-6 {
         return "0".into();
     }
     if !value.is_finite() || !(1e-4..1e7).contains(&value.abs()) {
