@@ -3,7 +3,7 @@
 //! Reading order, which is also the straight line that data takes:
 //! [`scene`] -> [`mesh`] -> [`effects`] -> [`separation`] and [`model`] -> [`solver`] (engines [`solver::cpu`] and
 //! [`gpu`]) -> [`observables`] -> [`output`] and [`render`]. [`stability`] runs that line on the hard cases, [`study`] many
-//! times over. [`untrusted`] lists the readers of files.
+//! times over, [`training`] scores what a trainee did. [`untrusted`] lists the readers of files.
 
 pub mod commands;
 pub mod effects;
@@ -25,6 +25,7 @@ pub mod session;
 pub mod solver;
 pub mod stability;
 pub mod study;
+pub mod training;
 pub mod untrusted;
 #[cfg(feature = "window")]
 pub mod window;

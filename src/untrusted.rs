@@ -12,6 +12,7 @@ use crate::output::checkpoint::RunCheckpoint;
 use crate::output::report::Columns;
 use crate::scene::{Scene, presets};
 use crate::study::store;
+use crate::training::history;
 
 /// One kind of input.
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +38,7 @@ const UNPACKED: usize = 1032 * 4 * 3;
 const PROMISED: usize = 4 << 20;
 
 /// All readers.
-pub const READERS: [Reader; 13] = [
+pub const READERS: [Reader; 14] = [
     Reader { name: "scene", read: scene, memory: (GRID_LINES, 1024) },
     Reader { name: "overrides", read: overrides, memory: (GRID_LINES, 1024) },
     Reader { name: "materials", read: materials, memory: (FEW, 256) },
@@ -52,6 +53,7 @@ pub const READERS: [Reader; 13] = [
     Reader { name: "run_table", read: run_table, memory: (FEW, 128) },
     Reader { name: "study_plan", read: study_plan, memory: (FEW, 128) },
     Reader { name: "study_run", read: study_run, memory: (FEW, 128) },
+    Reader { name: "attempt", read: attempt, memory: (FEW, 128) },
 ];
 
 impl Reader {
@@ -166,5 +168,12 @@ fn study_run(bytes: &[u8]) -> Result<()> {
     run.unfit();
     run.cpu_ns_per_cell_step();
     run.curve();
+    Ok(())
+}
+
+fn attempt(bytes: &[u8]) -> Result<()> {
+    let attempt = history::parse(&place("attempt.json"), bytes)?;
+    attempt.score.text();
+    attempt.score.csv();
     Ok(())
 }

@@ -316,7 +316,10 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
         repetition: 0,
     };
     match reader.name {
-        "scene" => ["scenes", "scenes/hard", "scenes/effects"].iter().flat_map(|f| files(f, "toml")).collect(),
+        "scene" => ["scenes", "scenes/hard", "scenes/effects", "scenes/training"]
+            .iter()
+            .flat_map(|f| files(f, "toml"))
+            .collect(),
         "overrides" => vec![
             b"tissue.cell_size_mm=0.8\nneedle.gauge=18G\nmotion.phase.0.depth_mm=5".to_vec(),
             b"outputs.pictures_at_depth_mm=[1.0, 2.0]\nsolver.frame_rate_hz=30".to_vec(),
@@ -372,6 +375,15 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
                 ..Default::default()
             };
             vec![serde_json::to_vec_pretty(&run).unwrap()]
+        }
+        "attempt" => {
+            let scene = Scene::load(&repository().join("scenes/training/hit_target.toml"), &[]).unwrap();
+            let records = vec![stylet::observables::FrameRecord { time: 0.5, ..Default::default() }; 2];
+            let samples = stylet::training::scripted_samples(&scene, &records);
+            let score = stylet::training::Score::of(&scene, &samples, &records, None).unwrap();
+            let folder = tempfile::tempdir().unwrap();
+            let (_, path) = stylet::training::History::new(folder.path()).add("a trainee", &score).unwrap();
+            vec![std::fs::read(path).unwrap()]
         }
         other => panic!("no sample for the reader {other}"),
     }

@@ -157,6 +157,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
         },
         outputs: Outputs { picture_width: 900, ..Default::default() },
         targets: Vec::new(),
+        task: None,
         notices: Vec::new(),
     }
 }

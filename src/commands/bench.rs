@@ -135,6 +135,7 @@ pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
         },
         outputs: Outputs::default(),
         targets: Vec::new(),
+        task: None,
         notices: Vec::new(),
     }
 }

@@ -39,10 +39,12 @@ pub struct RunCheckpoint {
     pub simulation: Checkpoint,
 }
 
-/// A number that changes with anything that a scene says, its presets and meshes among it, but not with the place of the file.
+/// A number that changes with anything that a scene says, its presets and meshes among it, but not with its task or the place of
+/// the file.
 pub fn fingerprint(scene: &Scene) -> u64 {
     let mut hasher = DefaultHasher::new();
-    let placeless = Scene { path: PathBuf::new(), notices: Vec::new(), ..scene.clone() };
+    // A task changes nothing in the simulation.
+    let placeless = Scene { path: PathBuf::new(), task: None, notices: Vec::new(), ..scene.clone() };
     format!("{placeless:?}").hash(&mut hasher);
     hasher.finish()
 }

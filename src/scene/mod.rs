@@ -8,6 +8,7 @@ pub(crate) mod document;
 pub mod file;
 pub mod motion;
 pub mod presets;
+pub mod task;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,6 +17,7 @@ use glam::DVec3;
 
 pub use file::OnTrouble;
 pub use motion::{Motion, Phase, Vibration};
+pub use task::{Goal, Obstacle, Task};
 
 use crate::effects::{self, EffectSet};
 use crate::material::ElasticLaw;
@@ -57,6 +59,8 @@ pub struct Scene {
     pub outputs: Outputs,
     /// Points of the tissue that the insertion wants to reach.
     pub targets: Vec<Target>,
+    /// What a trainee is asked to do.
+    pub task: Option<Task>,
     /// Things that the user should know and that are no errors, one sentence each.
     pub notices: Vec<String>,
 }

@@ -281,7 +281,7 @@ pub(super) fn first_line(text: &str) -> String {
 }
 
 /// Fowler-Noll-Vo hash of texts, as 16 hexadecimal digits: the same on every machine and in every version of the compiler.
-pub(super) fn fnv1a(texts: &[&str]) -> String {
+pub(crate) fn fnv1a(texts: &[&str]) -> String {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for text in texts {
         // The end of a text counts, so that two texts are not one.

@@ -93,6 +93,7 @@ pub fn block(size_mm: [f64; 3], cell_mm: f64) -> Scene {
         },
         outputs: Outputs::default(),
         targets: Vec::new(),
+        task: None,
         notices: Vec::new(),
     }
 }

@@ -11,6 +11,7 @@ mod mesh;
 pub(super) mod parameters;
 mod regions;
 mod targets;
+mod task;
 mod tool;
 
 use std::path::Path;
@@ -155,6 +156,8 @@ impl Check<'_> {
         let solver = self.solver(&file.solver, tool.is_some(), effects.puncture.is_some(), tissue.cell_size);
         let outputs = self.outputs(&file.outputs, &motion, tool.is_some(), solver.duration);
         let targets = self.targets(file);
+        let bored = effects.cohesive.is_some() && matches!(&tool, Some(Tool::Needle(n)) if n.bore.is_some());
+        let task = file.task.as_ref().map(|table| self.task(table, file, tool.as_ref(), bored, &targets));
         self.problems.check()?;
         self.steps(&solver);
         self.frames(&solver, &motion, targets.len());
@@ -207,6 +210,7 @@ impl Check<'_> {
             solver,
             outputs,
             targets,
+            task,
             notices: std::mem::take(&mut self.notices),
         })
     }

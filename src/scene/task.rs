@@ -1,0 +1,51 @@
+//! What a trainee is asked to do. Whether it was done is judged in `training`.
+
+use glam::DVec3;
+
+/// A task with its goals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Task {
+    /// Short name; attempts are kept under it.
+    pub name: String,
+    /// What the trainee reads before the start.
+    pub briefing: String,
+    /// The attempt must not take longer than this [s].
+    pub time_limit: Option<f64>,
+    /// At least one.
+    pub goals: Vec<Goal>,
+}
+
+/// One thing that must be done, or must not happen.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Goal {
+    /// The tip ends the way in no farther from the target, which the tissue takes along, than `tolerance` [m].
+    HitTarget {
+        /// Index into the targets of the scene.
+        target: usize,
+        tolerance: f64,
+    },
+    /// The outside of the needle never comes closer to the obstacle than `clearance` [m], 0 or more.
+    Avoid { name: String, obstacle: Obstacle, clearance: f64 },
+    /// The deepest point in the material that the tip has cut to lies between two depths below the top face [m].
+    StopInLayer { name: String, from: f64, to: f64 },
+    /// The bore holds at least this mass [kg] at the end.
+    CoreMass { least: f64 },
+    /// The same as a volume at rest [m^3].
+    CoreVolume { least: f64 },
+}
+
+/// What a needle has to stay away from: a fixed place in the coordinates of the scene [m], which the tissue does not take
+/// along.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Obstacle {
+    Sphere {
+        centre: DVec3,
+        radius: f64,
+    },
+    /// A cylinder between two points of its axis, with round ends.
+    Cylinder {
+        from: DVec3,
+        to: DVec3,
+        radius: f64,
+    },
+}

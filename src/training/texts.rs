@@ -1,0 +1,197 @@
+//! Every word of this module that a trainee reads: labels of the figures, sentences about goals and trust. To translate the
+//! training, translate this file.
+
+use serde::{Deserialize, Serialize};
+
+/// Which way a figure gets better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Better {
+    Lower,
+    Higher,
+    /// It says nothing about skill by itself.
+    None,
+}
+
+impl Better {
+    pub fn word(self) -> &'static str {
+        match self {
+            Better::Lower => "lower",
+            Better::Higher => "higher",
+            Better::None => "-",
+        }
+    }
+}
+
+/// How one figure is shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FigureText {
+    /// Stays the same in every language and version.
+    pub key: &'static str,
+    pub label: &'static str,
+    pub unit: &'static str,
+    /// How many of the unit make one SI unit.
+    pub per_si: f64,
+    pub better: Better,
+}
+
+const fn figure(key: &'static str, label: &'static str, unit: &'static str, per_si: f64, better: Better) -> FigureText {
+    FigureText { key, label, unit, per_si, better }
+}
+
+/// All figures, in the order in which they are shown. A key that ends in a dot stands for one row per layer or target,
+/// whose name is put behind key and label.
+pub const FIGURES: [FigureText; 33] = [
+    figure("overshoot", "Overshoot behind the last layer", "mm", 1e3, Better::Lower),
+    figure("passes", "Passes through the surface", "", 1.0, Better::Lower),
+    figure("redirections", "Redirections inside tissue", "", 1.0, Better::Lower),
+    figure("target_distance.", "Tip to target", "mm", 1e3, Better::Lower),
+    figure("target_displacement.", "Target pushed by", "mm", 1e3, Better::Lower),
+    figure("entry_error", "Entry point off the plan", "mm", 1e3, Better::Lower),
+    figure("entry_angle_error", "Entry angle off the plan", "deg", 180.0 / std::f64::consts::PI, Better::Lower),
+    figure("core_mass", "Core in the bore", "mg", 1e6, Better::Higher),
+    figure("core_length", "Core length at rest", "mm", 1e3, Better::Higher),
+    figure("peak_axial_force", "Largest axial force", "N", 1.0, Better::Lower),
+    figure("mean_axial_force", "Mean axial force in tissue", "N", 1.0, Better::Lower),
+    figure("largest_force_rate", "Fastest rise of force (0.1 s)", "N/s", 1.0, Better::Lower),
+    figure("peak_lateral_force", "Largest lateral force", "N", 1.0, Better::Lower),
+    figure("impulse", "Force over time", "N s", 1.0, Better::Lower),
+    figure("injury_energy", "Injury energy", "mJ", 1e3, Better::Lower),
+    figure("injury_energy.", "Injury energy", "mJ", 1e3, Better::Lower),
+    figure("dissipated_energy", "Dissipated energy", "mJ", 1e3, Better::Lower),
+    figure("dissipated_energy.", "Dissipated", "mJ", 1e3, Better::Lower),
+    figure("layer_force.", "Largest force", "N", 1.0, Better::Lower),
+    figure("separated_area", "Separated area", "mm2", 1e6, Better::Lower),
+    figure("largest_damage", "Largest damage", "", 1.0, Better::Lower),
+    figure("deepest_cut", "Deepest cut in the material", "mm", 1e3, Better::None),
+    figure("motion_smoothness", "Jerk (motion smoothness)", "mm/s2.5", 1e3, Better::Lower),
+    figure("translational_motions", "Translational motions", "", 1.0, Better::Lower),
+    figure("rotational_actions", "Rotational actions", "", 1.0, Better::Lower),
+    figure("punctures", "Tissue punctures (+-5 mm)", "", 1.0, Better::Lower),
+    figure("swept_area", "Swept area (potential damage)", "mm2", 1e6, Better::Lower),
+    figure("path_inefficiency", "Path inefficiency", "%", 100.0, Better::Lower),
+    figure("depth_perception", "Travel along the needle", "mm", 1e3, Better::Lower),
+    figure("path_length", "Path length", "mm", 1e3, Better::Lower),
+    figure("path_in_tissue", "Path in tissue", "mm", 1e3, Better::Lower),
+    figure("time_in_tissue", "Time in tissue", "s", 1.0, Better::Lower),
+    figure("elapsed_time", "Elapsed time", "s", 1.0, Better::Lower),
+];
+
+/// The text of a key.
+pub fn figure_of(key: &str) -> Option<&'static FigureText> {
+    FIGURES.iter().find(|f| f.key == key)
+}
+
+/// What lies outside all regions.
+pub const OWN_MATERIAL: &str = "tissue";
+
+// Headings of the tables.
+pub const HEADINGS: [&str; 5] = ["Figure", "Unit", "Value", "Reference", "Better"];
+pub const GOALS: &str = "Goals";
+pub const TRUST: &str = "Trust in the numbers";
+pub const MET: &str = "met";
+pub const MISSED: &str = "missed";
+pub const NOT_JUDGED: &str = "not judged";
+pub const PASSED: &str = "Passed: every goal is met.";
+pub const FAILED: &str = "Not passed: a goal is missed.";
+pub const NOT_SCORED: &str = "Not scored:";
+pub const SCORED: &str = "the run kept within its gates";
+pub const NO_TASK: &str = "no task";
+pub const MEASURED: &str = "measured";
+
+// Trust.
+pub const ENERGY_IMBALANCE: &str = "energy imbalance";
+pub const KINETIC_TO_INTERNAL: &str = "kinetic/internal energy";
+pub const HOURGLASS_TO_INTERNAL: &str = "hourglass/internal energy";
+pub const CLAMPED_NODES: &str = "clamped node steps";
+pub const NO_FRAMES: &str = "the run holds no frame";
+pub const NOT_A_NUMBER: &str = "a force or a displacement is no number";
+
+/// A ratio beyond its bound, both fractions.
+pub fn outside_gate(name: &str, value: Option<f64>, bound: f64) -> String {
+    match value {
+        Some(value) => format!("{name} {:.1} %, at most {:.1} % can be trusted", 100.0 * value, 100.0 * bound),
+        None => format!("{name} is no number"),
+    }
+}
+
+pub fn too_many_clamped(count: u64, most: u64) -> String {
+    format!("{count} {CLAMPED_NODES}, at most {most} can be trusted")
+}
+
+// Goals; lengths in mm.
+pub fn hit_target(name: &str) -> String {
+    format!("hit {name}")
+}
+
+pub fn avoid(name: &str) -> String {
+    format!("stay away from {name}")
+}
+
+pub fn stop_in_layer(name: &str) -> String {
+    format!("stop in {name}")
+}
+
+pub const CORE: &str = "bring out enough of a core";
+pub const TIME_LIMIT: &str = "keep the time limit";
+
+/// The bounds of a goal in words.
+pub fn bounds(least: Option<f64>, most: Option<f64>, unit: &str) -> String {
+    match (least, most) {
+        (Some(least), Some(most)) => format!("{} to {} {unit}", short(least), short(most)),
+        (Some(least), None) => format!("at least {} {unit}", short(least)),
+        (None, Some(most)) => format!("at most {} {unit}", short(most)),
+        (None, None) => String::new(),
+    }
+}
+
+/// A number with four significant digits, without an exponent where it can do without. Below a millionth of its unit it is
+/// rounding.
+pub fn short(value: f64) -> String {
+    if value.abs() < 1e-6 {
+        return "0".into();
+    }
+    if !value.is_finite() || !(1e-4..1e7).contains(&value.abs()) {
+        return format!("{value:.3e}");
+    }
+    let decimals = (3 - value.abs().log10().floor() as i32).max(0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
+// Wrong input.
+pub const NOT_FINITE: &str = "a number is not finite";
+pub const TIME_GOES_BACK: &str = "its time lies before that of the sample before";
+pub const NO_UNIT_VECTOR: &str = "its direction is no unit vector";
+pub const WRONG_SAMPLE_WAY_OUT: &str =
+    "record times [s] in order, tips in m and directions of length 1; leave out what a device missed";
+
+pub fn wrong_sample(index: usize, time: f64, reason: &str) -> String {
+    format!("sample {index} of the trajectory (t = {time} s) cannot be scored: {reason}")
+}
+
+pub const NO_SAMPLES: &str = "the attempt has records but no trajectory";
+pub const NO_SAMPLES_WAY_OUT: &str =
+    "hand over the samples of the needle; those of a scripted run come from its motion";
+
+// History.
+pub const NO_TRAINEE: &str = "the name of the trainee is empty";
+pub const NO_TRAINEE_WAY_OUT: &str = "write a name of one letter or more";
+pub const NO_TASK_WAY_OUT: &str = "score a scene with a [task], or give the attempt a task of your own";
+pub const BROKEN_WAY_OUT: &str = "the file was left as it is; move it away, or restore it from a copy";
+
+pub fn no_attempt(path: &str, reason: &str) -> String {
+    format!("{path} is no attempt of this program: {reason}")
+}
+
+pub fn too_large(bytes: u64, most: u64) -> String {
+    format!("{bytes} bytes, an attempt has at most {most}")
+}
+
+pub fn newer(version: u32, known: u32) -> String {
+    format!("it has version {version}, this program knows up to {known}")
+}
+
+pub fn other_trainee(name: &str) -> String {
+    format!("it says that it belongs to `{name}`")
+}
