@@ -131,6 +131,12 @@ struct ViewArgs {
     /// Folder of a run whose force curve lies behind the live one
     #[arg(long, value_name = "FOLDER")]
     reference: Option<PathBuf>,
+    /// Keep the scores of this trainee's attempts, and show the progress
+    #[arg(long, value_name = "NAME")]
+    trainee: Option<String>,
+    /// Folder of the trainees' attempts
+    #[arg(long, value_name = "FOLDER", default_value = "history")]
+    history: PathBuf,
     /// Size of the window in points
     #[arg(long, value_names = ["WIDTH", "HEIGHT"], num_args = 2)]
     size: Option<Vec<u32>>,
@@ -544,6 +550,8 @@ fn view(args: ViewArgs, start: Instant) -> Result<String> {
         frames: args.frames,
         screenshot: args.screenshot,
         reference: args.reference,
+        trainee: args.trainee,
+        history: args.history,
         size: args.size.and_then(|size| Some([*size.first()?, *size.get(1)?])),
     };
     let seen = stylet::window::view(&options, start)?;

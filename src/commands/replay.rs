@@ -5,9 +5,12 @@ use std::time::Instant;
 
 use crate::Result;
 use crate::gpu::Gpu;
-use crate::output::{DrivenFace, OutputFolder, Tables};
+use crate::observables::FrameRecord;
+use crate::output::{DrivenFace, OutputFolder, Tables, whole_file};
 use crate::session::Session;
 use crate::solver::simulation::{EngineChoice, Purpose, Simulation};
+use crate::training::kinematic::Sample;
+use crate::training::score::Score;
 
 /// What the user asked for.
 #[derive(Debug, Clone)]
@@ -52,7 +55,7 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
     let info = simulation.engine().info().clone();
     let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
     let mut tables = Tables::create(&folder, &driven, simulation.model.has_bore(), &scene.targets)?;
-    let begin = Instant::now();
+    let (begin, mut records) = (Instant::now(), Vec::new());
     let mut outcome = ReplayOutcome {
         folder: folder.path().to_path_buf(),
         frames: 0,
@@ -70,6 +73,7 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
         simulation.lead(pose);
         let Some(record) = simulation.next_frame()? else { break };
         tables.append(&record)?;
+        records.push(record.clone());
         outcome.frames += 1;
         outcome.simulated = record.time;
         outcome.largest_force = outcome.largest_force.max(record.force.axial);
@@ -77,6 +81,17 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
     }
     outcome.wall = begin.elapsed().as_secs_f64();
     session.write(&folder.file(SESSION))?;
+    let sample = |record: &FrameRecord| {
+        let pose = simulation.tool_pose(record.time)?;
+        Some(Sample { time: record.time, tip: pose.tip, direction: pose.direction })
+    };
+    let samples: Vec<Sample> = records.iter().filter_map(sample).collect();
+    if !samples.is_empty() {
+        let score = Score::of(&scene, &samples, &records, None)?;
+        for (name, text) in [("score.json", score.json()), ("score.csv", score.csv()), ("score.tsv", score.tsv())] {
+            whole_file::write(&folder.file(name), text.as_bytes())?;
+        }
+    }
     Ok(outcome)
 }
 

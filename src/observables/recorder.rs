@@ -108,7 +108,8 @@ fn inertia(model: &Model, kinematics: Option<&Kinematics>, end: f64) -> f64 {
         let pose = kinematics.pose(time);
         if time < 0.0 { 0.0 } else { pose.velocity.dot(pose.direction) }
     };
-    // A frame ends on the millionth of itself where a phase does.
-    let moment = |time: f64| time + 1e-6 * frame;
+    // A frame ends on the millionth of itself where a phase does. What a hand does after the frame is not known yet.
+    let beside = if kinematics.is_led() { -1e-6 } else { 1e-6 };
+    let moment = |time: f64| time + beside * frame;
     needle.mass() * (speed(moment(end)) - speed(moment(end - frame))) / frame
 }

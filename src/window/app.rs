@@ -24,6 +24,8 @@ use super::tool_shape::{self, ToolPlace};
 use crate::gpu::Gpu;
 use crate::scene::Scene;
 use crate::session::Session;
+use crate::training::history::{History, progress};
+use crate::training::score::Score;
 use crate::{Error, Result};
 
 /// Shortest time between two pictures [s].
@@ -36,6 +38,8 @@ const DESK_SPEED: f64 = 5e-3;
 const SIZE: [u32; 2] = [1280, 800];
 /// Pictures between two looks at the range of the field.
 const LOOK_AT_RANGE: u64 = 20;
+/// What the progress of a trainee is shown of.
+const PROGRESS_KEY: &str = "peak_axial_force";
 /// Pictures from one on which a software adapter draws the panels to the next.
 const PANELS_EVERY: u64 = 6;
 /// Part of the nodes that may lie beyond the automatic scale.
@@ -84,6 +88,7 @@ pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome
         overrides,
         recording,
         reference: reference.into_iter().collect(),
+        reference_score: options.reference.as_deref().and_then(read_score).transpose()?,
         program_start,
         open: None,
         outcome: ViewOutcome::default(),
@@ -102,6 +107,19 @@ fn no_display(reason: &str) -> Error {
         "start it on a desktop; on a terminal alone use `stylet run` (pictures, charts and tables in a folder) or a virtual \
          display: xvfb-run stylet view. Debian/Ubuntu: libx11-6 libxcursor1 libxi6 libxrandr2 libxkbcommon-x11-0",
     )
+}
+
+/// The scores of an attempt, where its folder holds some.
+fn read_score(folder: &Path) -> Option<Result<Score>> {
+    let path = folder.join("score.json");
+    let text = std::fs::read_to_string(&path).ok()?;
+    let wrong = |e: serde_json::Error| {
+        Error::input(
+            format!("{}: no scores: {e}", path.display()),
+            "give the folder of an attempt, or take the file away",
+        )
+    };
+    Some(serde_json::from_str(&text).map_err(wrong))
 }
 
 /// The force curve of a run.
@@ -131,6 +149,7 @@ struct App {
     overrides: Vec<String>,
     recording: Option<Vec<crate::scene::motion::HandPose>>,
     reference: Vec<ReferenceCurve>,
+    reference_score: Option<Score>,
     program_start: Instant,
     open: Option<Open>,
     outcome: ViewOutcome,
@@ -163,6 +182,8 @@ struct Open {
     scale: f32,
     /// The panels are drawn on the next picture.
     stale: bool,
+    /// What the attempt was worth, with those before it, while that is shown.
+    debriefing: Option<(Score, Vec<(u32, u64, f64)>)>,
 }
 
 /// The panels as triangles.
@@ -309,6 +330,7 @@ impl App {
             area: egui::Rect::NOTHING,
             scale: 1.0,
             stale: true,
+            debriefing: None,
         };
         open.cut();
         Ok(open)
@@ -321,7 +343,28 @@ impl App {
         if open.pictures == 1 {
             self.outcome.first_picture = self.program_start.elapsed().as_secs_f64();
         }
+        if wishes.debrief {
+            open.practice.state = match &open.practice.state {
+                State::Running => State::Paused,
+                other => other.clone(),
+            };
+            let score = open.practice.debrief(self.reference_score.as_ref())?;
+            println!("{}", score.text());
+            let mut before = Vec::new();
+            if let (Some(trainee), Some(task)) = (&self.options.trainee, &score.task) {
+                let history = History::new(&self.options.history);
+                history.add(trainee, &score)?;
+                let found = history.attempts(trainee)?;
+                for broken in &found.broken {
+                    eprintln!("note: {broken}");
+                }
+                before = progress(&found.attempts, task, PROGRESS_KEY);
+            }
+            open.debriefing = Some((score, before));
+            open.stale = true;
+        }
         if let Some(leader) = wishes.restart {
+            open.debriefing = None;
             open.practice.again(leader)?;
             open.rebind()?;
         }
@@ -487,6 +530,11 @@ impl Open {
         let input = self.egui.take_egui_input(&self.window);
         let context = self.egui.egui_ctx().clone();
         let output = context.run_ui(input, |ui| {
+            if let Some((score, before)) = &self.debriefing
+                && !panels::debriefing(ui.ctx(), score, before)
+            {
+                self.debriefing = None;
+            }
             egui::Panel::left("controls").default_size(250.0).show(ui, |ui| {
                 egui::ScrollArea::vertical().show(ui, |ui| {
                     let (practice, choices) = (&mut self.practice, &mut self.choices);
@@ -504,8 +552,9 @@ impl Open {
         });
         self.scale = output.pixels_per_point;
         // What moves goes on moving on the next picture.
-        self.stale =
-            output.viewport_output.values().any(|v| v.repaint_delay.is_zero()) || egui::Popup::is_any_open(&context);
+        self.stale = output.viewport_output.values().any(|v| v.repaint_delay.is_zero())
+            || egui::Popup::is_any_open(&context)
+            || self.debriefing.is_some();
         self.egui.handle_platform_output(&self.window, output.platform_output);
         if wishes.recut {
             self.cut();

@@ -36,6 +36,9 @@ pub struct ViewOptions {
     pub screenshot: Option<PathBuf>,
     /// A run whose force curve lies behind the live one: its folder.
     pub reference: Option<PathBuf>,
+    /// Whose attempts are kept, in which folder.
+    pub trainee: Option<String>,
+    pub history: PathBuf,
     /// Size of the window in points.
     pub size: Option<[u32; 2]>,
 }

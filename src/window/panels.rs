@@ -8,6 +8,7 @@ use super::practice::{Leader, Practice, State};
 use super::scene_view::{Field, Scale, colour_bytes};
 use super::texts;
 use crate::observables::ForceParts;
+use crate::training::score::Score;
 
 /// What the user has chosen.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +41,8 @@ pub struct Wishes {
     pub restart: Option<Leader>,
     pub step: bool,
     pub recut: bool,
+    /// The attempt is over: what is it worth?
+    pub debrief: bool,
 }
 
 /// A curve that lies behind the live one: depth [mm], force [N].
@@ -70,7 +73,15 @@ pub fn controls(
         if ui.button(texts::RESTART).clicked() {
             wishes.restart = Some(practice.leader);
         }
+        let done = egui::Button::new(texts::FINISH);
+        wishes.debrief = ui.add_enabled(!practice.records.is_empty(), done).clicked();
     });
+    if let Some(task) = &practice.scene().task {
+        ui.group(|ui| {
+            ui.strong(&task.name);
+            ui.label(&task.briefing);
+        });
+    }
     ui.horizontal(|ui| {
         for (leader, name) in [(Leader::Hand, texts::HAND), (Leader::Script, texts::SCRIPT)] {
             if ui.radio(practice.leader == leader, name).clicked() && practice.leader != leader {
@@ -243,6 +254,26 @@ pub fn readings(ui: &mut egui::Ui, practice: &Practice, choices: &mut Choices, r
         }
         State::Running | State::Paused => {}
     }
+}
+
+/// What an attempt was worth; false where it was closed.
+pub fn debriefing(context: &egui::Context, score: &Score, progress: &[(u32, u64, f64)]) -> bool {
+    let mut open = true;
+    egui::Window::new(texts::DEBRIEFING).open(&mut open).default_width(620.0).show(context, |ui| {
+        egui::ScrollArea::vertical().max_height(480.0).show(ui, |ui| {
+            ui.monospace(score.text());
+            if progress.len() > 1 {
+                let points: PlotPoints = progress.iter().map(|(n, _, value)| [f64::from(*n), *value]).collect();
+                Plot::new("progress")
+                    .height(140.0)
+                    .x_axis_label(texts::ATTEMPT)
+                    .y_axis_label(texts::PROGRESS)
+                    .allow_scroll(false)
+                    .show(ui, |plot| plot.line(Line::new(texts::PROGRESS, points)));
+            }
+        });
+    });
+    open
 }
 
 /// A sign that does not need its colour to be read: a tick, a warning or a cross with its value.

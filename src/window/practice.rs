@@ -11,11 +11,13 @@ use glam::DVec3;
 use super::hand::InputDevice;
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
-use crate::output::{DrivenFace, OutputFolder, Tables};
+use crate::output::{DrivenFace, OutputFolder, Tables, whole_file};
 use crate::scene::Scene;
 use crate::scene::motion::HandPose;
 use crate::session::Session;
 use crate::solver::simulation::{Purpose, Simulation, tool_mach};
+use crate::training::kinematic::Sample;
+use crate::training::score::Score;
 use crate::{Error, Result};
 
 /// Tool speed over the scaled shear wave speed beyond which inertia, not tissue, answers the hand.
@@ -82,6 +84,8 @@ pub struct Practice {
     overrides: Vec<String>,
     gpu: Gpu,
     out: Option<PathBuf>,
+    /// Number of this attempt since the window was opened, from 1.
+    attempt: u32,
     written: Option<Written>,
     pub simulation: Simulation,
     pub leader: Leader,
@@ -135,6 +139,7 @@ impl Practice {
             overrides,
             gpu,
             out: out.map(Path::to_path_buf),
+            attempt: 1,
             written,
             simulation,
             leader,
@@ -157,9 +162,15 @@ impl Practice {
     pub fn again(&mut self, leader: Leader) -> Result<()> {
         self.save()?;
         let (scene, overrides, gpu) = (self.scene.clone(), self.overrides.clone(), self.gpu.clone());
-        // The attempt before is in its folder; the next one replaces it only where there is none.
-        let out = self.out.take().filter(|_| self.records.is_empty());
-        *self = Practice::new(scene, overrides, gpu, leader, out.as_deref(), true)?;
+        let (out, attempt) = (self.out.clone(), self.attempt + u32::from(!self.records.is_empty()));
+        // The attempt before keeps its folder; one without a frame leaves its place to the next.
+        let folder = out.as_deref().map(|out| match attempt {
+            1 => out.to_path_buf(),
+            n => PathBuf::from(format!("{}_{n}", out.display())),
+        });
+        self.written = None;
+        let next = Practice::new(scene, overrides, gpu, leader, folder.as_deref(), true)?;
+        *self = Practice { out, attempt, ..next };
         Ok(())
     }
 
@@ -239,6 +250,28 @@ impl Practice {
             Some(written) if self.leader == Leader::Hand => self.session.write(&written.folder.file("session.json")),
             _ => Ok(()),
         }
+    }
+
+    /// What the attempt is worth; a run that was stopped is told, and not scored.
+    ///
+    /// # Errors
+    /// `Error::Input` where nothing was recorded; `Error::File` where the folder takes no scores.
+    pub fn debrief(&self, reference: Option<&Score>) -> Result<Score> {
+        let sample = |record: &FrameRecord| {
+            let pose = self.simulation.tool_pose(record.time)?;
+            Some(Sample { time: record.time, tip: pose.tip, direction: pose.direction })
+        };
+        let samples: Vec<Sample> = self.records.iter().filter_map(sample).collect();
+        let mut score = Score::of(&self.scene, &samples, &self.records, reference)?;
+        if let State::Stopped(reason) = &self.state {
+            score.fail(reason.clone());
+        }
+        if let Some(written) = &self.written {
+            for (name, text) in [("score.json", score.json()), ("score.csv", score.csv()), ("score.tsv", score.tsv())] {
+                whole_file::write(&written.folder.file(name), text.as_bytes())?;
+            }
+        }
+        Ok(score)
     }
 
     /// Where the tool is drawn: tip and direction at the end of the last frame that was started.
