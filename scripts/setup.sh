@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Brings what a Debian or Ubuntu machine with Rust lacks to build Stylet and to run it on a GPU adapter:
 # a linker, the Vulkan loader, and a software Vulkan driver where no driver is there at all.
-# Arguments name further programs that are wanted, each in the Debian package of its name: `scripts/setup.sh parallel`.
+# Arguments name further programs that are wanted, each in the Debian package of its name in small letters:
+# `scripts/setup.sh parallel`. The word `window` stands for the libraries that a window needs.
 # Installs nothing when all is there; says what it installs; without apt or the right to use it, it says what is missing
 # and goes on (Stylet then runs on its CPU engine).
 set -euo pipefail
@@ -13,7 +14,17 @@ fi
 
 missing=()
 for program in "$@"; do
-    command -v "$program" >/dev/null || missing+=("$program")
+    if [ "$program" = window ]; then
+        if [ "$(uname -s)" = Linux ]; then
+            known=$(ldconfig -p 2>/dev/null || /sbin/ldconfig -p)
+            for pair in libX11.so.6=libx11-6 libX11-xcb.so.1=libx11-xcb1 libXcursor.so.1=libxcursor1 libXi.so.6=libxi6 \
+                libXrandr.so.2=libxrandr2 libxkbcommon-x11.so.0=libxkbcommon-x11-0; do
+                grep -F "${pair%=*}" <<<"$known" >/dev/null || missing+=("${pair#*=}")
+            done
+        fi
+    elif ! command -v "$program" >/dev/null; then
+        missing+=("${program,,}")
+    fi
 done
 command -v cc >/dev/null || missing+=(gcc libc6-dev)
 if [ "$(uname -s)" = Linux ]; then

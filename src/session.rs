@@ -67,8 +67,16 @@ impl Session {
         if size > LARGEST_FILE {
             return Err(wrong(path, format!("{size} bytes, more than the {LARGEST_FILE} of the longest session")));
         }
-        let text = std::fs::read_to_string(path).map_err(|e| wrong(path, e.to_string()))?;
-        let session: Session = serde_json::from_str(&text).map_err(|e| wrong(path, e.to_string()))?;
+        let bytes = std::fs::read(path).map_err(|e| wrong(path, e.to_string()))?;
+        Self::from_bytes(path, &bytes)
+    }
+
+    /// The same with the bytes in memory.
+    ///
+    /// # Errors
+    /// As [`Session::read`].
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let session: Session = serde_json::from_slice(bytes).map_err(|e| wrong(path, e.to_string()))?;
         if session.format != FORMAT {
             return Err(wrong(path, format!("its format is {}, this program knows {FORMAT}", session.format)));
         }

@@ -11,6 +11,7 @@ use crate::mesh::import::{self, ImportOptions, LengthUnit};
 use crate::output::checkpoint::RunCheckpoint;
 use crate::output::report::Columns;
 use crate::scene::{Scene, presets};
+use crate::session::Session;
 use crate::study::store;
 use crate::training::history;
 
@@ -38,7 +39,7 @@ const UNPACKED: usize = 1032 * 4 * 3;
 const PROMISED: usize = 4 << 20;
 
 /// All readers.
-pub const READERS: [Reader; 14] = [
+pub const READERS: [Reader; 15] = [
     Reader { name: "scene", read: scene, memory: (GRID_LINES, 1024) },
     Reader { name: "overrides", read: overrides, memory: (GRID_LINES, 1024) },
     Reader { name: "materials", read: materials, memory: (FEW, 256) },
@@ -54,6 +55,7 @@ pub const READERS: [Reader; 14] = [
     Reader { name: "study_plan", read: study_plan, memory: (FEW, 128) },
     Reader { name: "study_run", read: study_run, memory: (FEW, 128) },
     Reader { name: "attempt", read: attempt, memory: (FEW, 128) },
+    Reader { name: "session", read: session, memory: (FEW, 128) },
 ];
 
 impl Reader {
@@ -175,5 +177,10 @@ fn attempt(bytes: &[u8]) -> Result<()> {
     let attempt = history::parse(&place("attempt.json"), bytes)?;
     attempt.score.text();
     attempt.score.csv();
+    Ok(())
+}
+
+fn session(bytes: &[u8]) -> Result<()> {
+    Session::from_bytes(&place("session.json"), bytes)?;
     Ok(())
 }

@@ -385,6 +385,19 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
             let (_, path) = stylet::training::History::new(folder.path()).add("a trainee", &score).unwrap();
             vec![std::fs::read(path).unwrap()]
         }
+        "session" => {
+            let scene = Scene::load(&repository().join("scenes/muscle_biopsy.toml"), &[]).unwrap();
+            let mut session = stylet::session::Session::new(&scene, &["solver.safety=0.4".into()], &Default::default());
+            let motion = &scene.motion;
+            session.poses = (0..20)
+                .map(|n| stylet::scene::motion::HandPose {
+                    entry: motion.entry,
+                    direction: motion.direction,
+                    depth: 1e-4 * f64::from(n),
+                })
+                .collect();
+            vec![serde_json::to_vec(&session).unwrap()]
+        }
         other => panic!("no sample for the reader {other}"),
     }
 }

@@ -2,7 +2,8 @@
 struct DrawnCell {
     // Displacement gradient F - I at its centre.
     H: mat3x3<f32>,
-    // Volumetric stress dU/dJ [Pa]; edge V^(1/3) [m]; part of the stiffness that it keeps on the needle's path.
+    // Volumetric stress dU/dJ [Pa]; edge V^(1/3) [m]; part of the stiffness that it keeps for other reasons than
+    // its material's.
     pressure: f32,
     length: f32,
     kept: f32,

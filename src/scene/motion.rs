@@ -3,6 +3,10 @@
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
+/// How far beyond the deepest phase a hand may go [m], and to which part of the height of the tissue.
+const ROOM: f64 = 4e-3;
+const ROOM_PART: f64 = 0.85;
+
 /// Motion of the tool, phase after phase.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Motion {
@@ -241,6 +245,18 @@ impl Motion {
             Phase::Insert { depth, .. } => depth.max(deepest),
             _ => deepest,
         })
+    }
+
+    /// A straight motion for a hand: as deep as the phases and up to `ROOM` beyond, so that one may overshoot, in tissue of the height
+    /// `height` [m]. A free motion stays as it is: its path is found on the way.
+    pub fn with_room(&self, height: f64) -> Motion {
+        let deepest = self.deepest();
+        if self.is_free() || deepest <= 0.0 {
+            return self.clone();
+        }
+        let floor = ROOM_PART * height / -self.direction.z;
+        let depth = (deepest + ROOM).min(floor).max(deepest);
+        Motion { phases: vec![Phase::Insert { speed: self.largest_speed(), depth }], ..self.clone() }
     }
 
     /// Where the tip of a straight motion is at the largest depth [m].

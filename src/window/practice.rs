@@ -26,6 +26,9 @@ const LARGEST_MACH: f64 = 0.3;
 /// How far out of the tissue a hand may lead the tip [m].
 const OUTSIDE: f64 = 5e-3;
 
+/// Frames between two writings of the session: what a crash may cost.
+const SAVE_EVERY: usize = 300;
+
 /// Who leads the needle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Leader {
@@ -200,7 +203,7 @@ impl Practice {
 
     /// What the tissue can follow of what the hand wants.
     fn within_reach(&mut self, now: &HandPose, wanted: HandPose) -> HandPose {
-        let deepest = self.scene.motion.deepest();
+        let deepest = self.simulation.model.scene.motion.deepest();
         let depth = wanted.depth.clamp(-OUTSIDE, deepest);
         let step = self.speed_limit * self.timing.simulated;
         let limited = (depth - now.depth).clamp(-step, step);
@@ -223,6 +226,9 @@ impl Practice {
                     written.tables.append(&record)?;
                 }
                 self.records.push(record);
+                if self.records.len().is_multiple_of(SAVE_EVERY) {
+                    self.save()?;
+                }
                 if let Some(begin) = self.started.take() {
                     Timing::smooth(&mut self.timing.physics, begin.elapsed().as_secs_f64());
                 }
@@ -261,6 +267,7 @@ impl Practice {
             let pose = self.simulation.tool_pose(record.time)?;
             Some(Sample { time: record.time, tip: pose.tip, direction: pose.direction })
         };
+        self.save()?;
         let samples: Vec<Sample> = self.records.iter().filter_map(sample).collect();
         let mut score = Score::of(&self.scene, &samples, &self.records, reference)?;
         if let State::Stopped(reason) = &self.state {

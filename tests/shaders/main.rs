@@ -276,6 +276,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "PointEnergy",
         "PointStress",
         "DrawnCell",
+        "Eigen",
         "PlasticAnswer",
         "MandelStress",
         "FibreStress",
