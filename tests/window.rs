@@ -138,7 +138,7 @@ fn a_hand_leads_the_needle_and_its_session_is_kept() {
     std::thread::sleep(Duration::from_millis(500));
     display.xdotool(&["key", "space"]);
     std::thread::sleep(Duration::from_millis(300));
-    display.xdotool(&["search", "--name", "Stylet", "windowquit"]);
+    display.xdotool(&["key", "ctrl+q"]);
     let begin = Instant::now();
     while child.try_wait().unwrap().is_none() {
         if begin.elapsed() > Duration::from_secs(20) {

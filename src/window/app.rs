@@ -182,6 +182,8 @@ struct Open {
     scale: f32,
     /// The panels are drawn on the next picture.
     stale: bool,
+    /// Ctrl is held.
+    control: bool,
     /// What the attempt was worth, with those before it, while that is shown.
     debriefing: Option<(Score, Vec<(u32, u64, f64)>)>,
 }
@@ -221,6 +223,10 @@ impl ApplicationHandler for App {
                 }
             }
             WindowEvent::Focused(false) => open.desk.let_go(),
+            WindowEvent::ModifiersChanged(modifiers) => open.control = modifiers.state().control_key(),
+            WindowEvent::KeyboardInput { event, .. } if event.physical_key == KeyCode::KeyQ && open.control => {
+                self.close(event_loop);
+            }
             WindowEvent::KeyboardInput { event, .. } if !taken => {
                 open.key(event.physical_key, event.state, event.repeat)
             }
@@ -330,6 +336,7 @@ impl App {
             area: egui::Rect::NOTHING,
             scale: 1.0,
             stale: true,
+            control: false,
             debriefing: None,
         };
         open.cut();
