@@ -185,7 +185,14 @@ struct Open {
     /// Ctrl is held.
     control: bool,
     /// What the attempt was worth, with those before it, while that is shown.
-    debriefing: Option<(Score, Vec<(u32, u64, f64)>)>,
+    debriefing: Option<Debriefing>,
+}
+
+/// A finished attempt.
+struct Debriefing {
+    score: Score,
+    /// The trainee's attempts at this task: number, time, value of what the progress is shown of.
+    before: Vec<(u32, u64, f64)>,
 }
 
 /// The panels as triangles.
@@ -213,14 +220,12 @@ impl ApplicationHandler for App {
         let taken = open.egui.on_window_event(&open.window, &event).consumed;
         match event {
             WindowEvent::CloseRequested => self.close(event_loop),
-            WindowEvent::Resized(size) => {
-                // A minimised window has no size; its surface stays as it was.
-                if size.width > 0 && size.height > 0 {
-                    (open.config.width, open.config.height) = (size.width, size.height);
-                    open.surface.configure(&open.gpu.device, &open.config);
-                    open.canvas = canvas(&open.gpu, &open.config);
-                    open.stale = true;
-                }
+            // A minimised window has no size; its surface stays as it was.
+            WindowEvent::Resized(size) if size.width > 0 && size.height > 0 => {
+                (open.config.width, open.config.height) = (size.width, size.height);
+                open.surface.configure(&open.gpu.device, &open.config);
+                open.canvas = canvas(&open.gpu, &open.config);
+                open.stale = true;
             }
             WindowEvent::Focused(false) => open.desk.let_go(),
             WindowEvent::ModifiersChanged(modifiers) => open.control = modifiers.state().control_key(),
@@ -367,7 +372,7 @@ impl App {
                 }
                 before = progress(&found.attempts, task, PROGRESS_KEY);
             }
-            open.debriefing = Some((score, before));
+            open.debriefing = Some(Debriefing { score, before });
             open.stale = true;
         }
         if let Some(leader) = wishes.restart {
@@ -537,7 +542,7 @@ impl Open {
         let input = self.egui.take_egui_input(&self.window);
         let context = self.egui.egui_ctx().clone();
         let output = context.run_ui(input, |ui| {
-            if let Some((score, before)) = &self.debriefing
+            if let Some(Debriefing { score, before }) = &self.debriefing
                 && !panels::debriefing(ui.ctx(), score, before)
             {
                 self.debriefing = None;
