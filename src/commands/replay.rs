@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::Result;
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
-use crate::output::{DrivenFace, OutputFolder, Tables, whole_file};
+use crate::output::{DrivenFace, OutputFolder, Tables};
 use crate::session::Session;
 use crate::solver::simulation::{EngineChoice, Purpose, Simulation};
 use crate::training::kinematic::Sample;
@@ -87,10 +87,7 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
     };
     let samples: Vec<Sample> = records.iter().filter_map(sample).collect();
     if !samples.is_empty() {
-        let score = Score::of(&scene, &samples, &records, None)?;
-        for (name, text) in [("score.json", score.json()), ("score.csv", score.csv()), ("score.tsv", score.tsv())] {
-            whole_file::write(&folder.file(name), text.as_bytes())?;
-        }
+        Score::of(&scene, &samples, &records, None)?.write(&folder)?;
     }
     Ok(outcome)
 }

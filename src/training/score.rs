@@ -8,6 +8,7 @@ use super::task::{self, GoalResult};
 use super::texts::{self, Better};
 use crate::observables::FrameRecord;
 use crate::output::tables::number;
+use crate::output::{OutputFolder, whole_file};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -195,6 +196,17 @@ impl Score {
     pub fn passed(&self) -> Option<bool> {
         let met: Option<Vec<bool>> = self.goals.iter().map(|goal| goal.met).collect();
         met.filter(|met| !met.is_empty() && self.trust.is_good()).map(|met| met.into_iter().all(|m| m))
+    }
+
+    /// Writes `score.json`, `score.csv` and `score.tsv` into the folder of an attempt.
+    ///
+    /// # Errors
+    /// `Error::File`.
+    pub fn write(&self, folder: &OutputFolder) -> Result<()> {
+        for (name, text) in [("score.json", self.json()), ("score.csv", self.csv()), ("score.tsv", self.tsv())] {
+            whole_file::write(&folder.file(name), text.as_bytes())?;
+        }
+        Ok(())
     }
 
     /// The table with a comma between the columns.

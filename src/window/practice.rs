@@ -11,7 +11,7 @@ use glam::DVec3;
 use super::hand::InputDevice;
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
-use crate::output::{DrivenFace, OutputFolder, Tables, whole_file};
+use crate::output::{DrivenFace, OutputFolder, Tables};
 use crate::scene::Scene;
 use crate::scene::motion::HandPose;
 use crate::session::Session;
@@ -274,9 +274,7 @@ impl Practice {
             score.fail(reason.clone());
         }
         if let Some(written) = &self.written {
-            for (name, text) in [("score.json", score.json()), ("score.csv", score.csv()), ("score.tsv", score.tsv())] {
-                whole_file::write(&written.folder.file(name), text.as_bytes())?;
-            }
+            score.write(&written.folder)?;
         }
         Ok(score)
     }
