@@ -119,7 +119,7 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     ));
     line(format!(
         "step         {:.3} us{}, {} steps, {} frames, {:.3} s simulated",
-        simulation.dt * 1e6,
+        simulation.dt() * 1e6,
         if scene.solver.time_step.is_some() { " (the scene's own)" } else { "" },
         simulation.total_steps(),
         simulation.frame_count(),

@@ -359,7 +359,7 @@ impl<'a> Run<'a> {
             next.notices.push(format!(
                 "{text}\n      on_trouble = \"halve_step\": the run goes on from frame {} with steps of {:.3} us ({} of {MOST_HALVINGS})",
                 image.frames,
-                next.dt * 1e6,
+                next.dt() * 1e6,
                 self.halvings
             ));
             self.simulation = next;
@@ -414,7 +414,7 @@ impl<'a> Run<'a> {
             effects: scene.effects.keys().iter().map(|k| k.to_string()).collect(),
             cells: mesh.cell_count() as u64,
             nodes: mesh.node_count() as u64,
-            dt_s: self.simulation.dt,
+            dt_s: self.simulation.dt(),
             stable_dt_s: self.simulation.stable_dt,
             mass_scaling: self.simulation.model.mass_scaling(),
             halvings: self.halvings,
@@ -491,7 +491,7 @@ fn difference(after: Option<f64>, before: Option<f64>) -> Option<f64> {
 /// The frames at which pictures and field files are due.
 fn moments(simulation: &Simulation) -> Vec<Moment> {
     let outputs = &simulation.model.scene.outputs;
-    let frame_of_time = |t: f64| (t <= simulation.duration() + simulation.dt).then(|| simulation.frame_at(t));
+    let frame_of_time = |t: f64| (t <= simulation.duration() + simulation.dt()).then(|| simulation.frame_at(t));
     let frame_of = |value: f64| match &simulation.model.kinematics {
         // A depth counts on the way in: the first time that the tool gets there.
         Some(k) => k.time_of_depth(value).map(|t| simulation.frame_at(t)),

@@ -20,6 +20,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Effect;
+use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "adhesion",
@@ -27,7 +28,45 @@ pub const EFFECT: Effect = Effect {
     summary: "tissue sticks to the tip and lets go: drops at a fixed spacing; a model of the built-up-edge hypothesis",
     source: "hypothesis of Lv2022; law: this project",
     cost: "no buffer; 20 operations per step",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 4] = [
+    Parameter::new(
+        "adhesion.static_force_n",
+        "force at which it lets go",
+        "N",
+        [0.0, 2.0],
+        "hypothesis, see the effect",
+        |s| s.effects.adhesion.as_ref().map(|p| p.static_force),
+    ),
+    Parameter::new(
+        "adhesion.kinetic_force_n",
+        "force after a slip",
+        "N",
+        [0.0, 2.0],
+        "hypothesis, see the effect",
+        |s| s.effects.adhesion.as_ref().map(|p| p.kinetic_force),
+    ),
+    Parameter::new(
+        "adhesion.stiffness_n_mm",
+        "stiffness of the bond",
+        "N/mm",
+        [0.05, 20.0],
+        "hypothesis, see the effect",
+        |s| s.effects.adhesion.as_ref().map(|p| p.stiffness / 1e3),
+    )
+    .logarithmic(),
+    Parameter::new(
+        "adhesion.sliding_distance_mm",
+        "distance until it sticks anew",
+        "mm",
+        [0.1, 5.0],
+        "hypothesis, see the effect",
+        |s| s.effects.adhesion.as_ref().map(|p| p.sliding_distance / 1e-3),
+    ),
+];
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

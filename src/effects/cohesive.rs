@@ -21,6 +21,7 @@
 //! the leapfrog work. Range of validity: the process zone `E G_c/strength^2` spans a few faces; penalty K = factor E/h.
 
 use super::Effect;
+use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "cohesive",
@@ -28,7 +29,64 @@ pub const EFFECT: Effect = Effect {
     summary: "faces that separate: bilinear cohesion on the slit or bore of a needle and on chosen planes",
     source: "Turon2006, Camanho2002, Benzeggagh1996",
     cost: "one dispatch per step; doubled nodes on the surface; 80 B per pair; shorter time step by the penalty",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 7] = [
+    Parameter::new(
+        "cohesive.strength_kpa",
+        "strength in opening",
+        "kPa",
+        [0.1, 1000.0],
+        "default of this project",
+        |s| s.effects.cohesive.as_ref().map(|p| p.strength / 1e3),
+    )
+    .logarithmic(),
+    Parameter::new(
+        "cohesive.shear_strength_kpa",
+        "strength in shear",
+        "kPa",
+        [0.1, 1000.0],
+        "default of this project",
+        |s| s.effects.cohesive.as_ref().map(|p| p.shear_strength / 1e3),
+    )
+    .logarithmic(),
+    Parameter::new(
+        "cohesive.energy_j_m2",
+        "fracture energy in opening",
+        "J/m^2",
+        [1.0, 10000.0],
+        "default of this project",
+        |s| s.effects.cohesive.as_ref().map(|p| p.energy),
+    )
+    .logarithmic(),
+    Parameter::new(
+        "cohesive.shear_energy_j_m2",
+        "fracture energy in shear",
+        "J/m^2",
+        [1.0, 10000.0],
+        "default of this project",
+        |s| s.effects.cohesive.as_ref().map(|p| p.shear_energy),
+    )
+    .logarithmic(),
+    Parameter::new("cohesive.exponent", "exponent of the mode mixity", "-", [0.5, 5.0], "Benzeggagh1996", |s| {
+        s.effects.cohesive.as_ref().map(|p| p.exponent)
+    }),
+    Parameter::new("cohesive.penalty_factor", "penalty stiffness over E/h", "-", [1.0, 1000.0], "numerical", |s| {
+        s.effects.cohesive.as_ref().filter(|p| p.penalty.is_none()).map(|p| p.penalty_factor)
+    })
+    .logarithmic(),
+    Parameter::new(
+        "cohesive.penalty_pa_m",
+        "penalty stiffness",
+        "Pa/m",
+        [1000000.0, 1000000000000.0],
+        "numerical",
+        |s| s.effects.cohesive.as_ref().and_then(|p| p.penalty),
+    )
+    .logarithmic(),
+];
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, PartialEq)]

@@ -13,6 +13,7 @@
 //! Source: Hillerborg 1976, Lubliner et al. 1989; [Lv2022] Eq. 12-14 with the kinematics of Eq. 8.
 
 use super::Effect;
+use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "damage",
@@ -20,7 +21,32 @@ pub const EFFECT: Effect = Effect {
     summary: "failure by plastic displacement, regularised by the cell size; needs plasticity",
     source: "Lubliner1989; Lv2022 Eq. 12-14",
     cost: "no state of its own",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 3] = [
+    Parameter::new("damage.onset", "plastic strain at onset", "-", [0.0, 1.0], "Lv2022, tension tests", |s| {
+        s.effects.damage?;
+        s.material.damage.or(s.effects.damage).map(|p| p.onset)
+    }),
+    Parameter::new(
+        "damage.failure_displacement_mm",
+        "failure displacement",
+        "mm",
+        [0.005, 2.0],
+        "Lv2022, tension tests",
+        |s| {
+            s.effects.damage?;
+            s.material.damage.or(s.effects.damage).map(|p| p.failure_displacement / 1e-3)
+        },
+    )
+    .logarithmic(),
+    Parameter::new("damage.d_max", "largest damage", "-", [0.05, 0.999], "keeps a cell in shape", |s| {
+        s.effects.damage?;
+        s.material.damage.or(s.effects.damage).map(|p| p.largest)
+    }),
+];
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,6 +11,7 @@
 use glam::{DMat3, DVec3};
 
 use super::Effect;
+use super::parameter::{Parameter, Value};
 use crate::material::demiray::capped_exponential;
 use crate::material::kinematics::{cofactor, isochoric_factor, jacobian_minus_one};
 
@@ -20,7 +21,30 @@ pub const EFFECT: Effect = Effect {
     summary: "one family of fibres that stiffen exponentially in tension",
     source: "Holzapfel2000",
     cost: "no state; about 40 operations per cell",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 3] = [
+    Parameter::new("fibres.direction", "direction x, y, z", "-", [-1.0, 1.0], "anatomy", |_| None).holding(
+        Value::List(
+            |s| {
+                s.effects.fibres?;
+                s.material.fibres.or(s.effects.fibres).map(|p| p.direction.to_array().to_vec())
+            },
+            None,
+        ),
+    ),
+    Parameter::new("fibres.k1_kpa", "stiffness k1", "kPa", [0.0, 200.0], "Lv2022, tension tests", |s| {
+        s.effects.fibres?;
+        s.material.fibres.or(s.effects.fibres).map(|p| p.k1 / 1e3)
+    }),
+    Parameter::new("fibres.k2", "exponent k2", "-", [0.001, 10.0], "Lv2022, tension tests", |s| {
+        s.effects.fibres?;
+        s.material.fibres.or(s.effects.fibres).map(|p| p.k2)
+    })
+    .logarithmic(),
+];
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -28,6 +28,7 @@
 use glam::DVec3;
 
 use super::Effect;
+use super::parameter::{Parameter, Value};
 use crate::needle::beam::{BeamParams, Section};
 
 pub const EFFECT: Effect = Effect {
@@ -36,7 +37,40 @@ pub const EFFECT: Effect = Effect {
     summary: "the needle is a beam clamped in its hub: it bends, and buckles where it is too thin",
     source: "Crisfield1991; Berger1977; coupling: this project",
     cost: "1.5 KiB; one beam solution per display frame, which waits for the frame before",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 4] = [
+    Parameter::new("flexible_needle.free_length_mm", "length from hub to tip", "mm", [20.0, 300.0], "needle", |s| {
+        s.effects.flexible_needle.as_ref().map(|p| p.beam.length / 1e-3)
+    }),
+    Parameter::new(
+        "flexible_needle.elements",
+        "elements of the beam",
+        "count",
+        [4.0, 200.0],
+        "converged from 40 on",
+        |s| s.effects.flexible_needle.as_ref().map(|p| p.beam.elements as f64),
+    ),
+    Parameter::new(
+        "flexible_needle.inner_diameter_mm",
+        "bore of the tube",
+        "mm",
+        [0.0, 2.0],
+        "the gauge of the needle",
+        |s| s.effects.flexible_needle.as_ref().map(|p| p.beam.section.inner_diameter / 1e-3),
+    ),
+    Parameter::new(
+        "flexible_needle.gravity_m_s2",
+        "free fall x, y, z",
+        "m/s^2",
+        [-20.0, 20.0],
+        "9.81 m/s^2 on earth",
+        |_| None,
+    )
+    .holding(Value::List(|s| s.effects.flexible_needle.map(|p| p.gravity.to_array().to_vec()), None)),
+];
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

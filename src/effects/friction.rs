@@ -8,6 +8,7 @@
 //! cannot stick. Source: Wriggers 2006, ch. 5 (return mapping); coefficient 0.3: Lv2022, section 3.2.
 
 use super::Effect;
+use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "friction",
@@ -15,7 +16,31 @@ pub const EFFECT: Effect = Effect {
     summary: "Coulomb friction with stick memory on the shaft, none on the cone",
     source: "Wriggers2006, Lv2022",
     cost: "no buffer: stick memory is a lane of the contact memory; about 40 operations per touching node",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 3] = [
+    Parameter::new("friction.coefficient", "friction coefficient", "-", [0.0, 1.0], "Lv2022, section 3.2", |s| {
+        s.effects.friction.as_ref().map(|p| p.coefficient)
+    }),
+    Parameter::new(
+        "friction.stiffness_ratio",
+        "tangential over normal stiffness",
+        "-",
+        [0.05, 1.0],
+        "calibration",
+        |s| s.effects.friction.as_ref().map(|p| p.stiffness_ratio),
+    ),
+    Parameter::new(
+        "friction.fade_length_mm",
+        "fade behind the cone",
+        "mm",
+        [0.1, 5.0],
+        "one cell of the default mesh",
+        |s| s.effects.friction.as_ref().map(|p| p.fade_length / 1e-3),
+    ),
+];
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::Effect;
+use super::parameter::{Parameter, Value};
 
 pub const EFFECT: Effect = Effect {
     key: "gravity",
@@ -10,7 +11,19 @@ pub const EFFECT: Effect = Effect {
     summary: "weight of the tissue",
     source: "Newton",
     cost: "no buffer; one multiply-add per node",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 1] = [Parameter::new(
+    "gravity.acceleration_m_s2",
+    "free fall x, y, z",
+    "m/s^2",
+    [-20.0, 20.0],
+    "9.81 m/s^2 on earth",
+    |_| None,
+)
+.holding(Value::List(|s| s.effects.gravity.map(|p| p.acceleration.to_array().to_vec()), None))];
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,6 +5,7 @@
 //! directions. `k = stiffness_factor (K + 4/3 mu) l^2/h` with `h` the fine cell edge, l = 0.6 mm.
 
 use super::Effect;
+use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "indentation",
@@ -12,7 +13,19 @@ pub const EFFECT: Effect = Effect {
     summary: "contact of the top face with a rigid sphere or flat punch",
     source: "Wriggers2006",
     cost: "one dispatch and 160 B per top-face node near the tool",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 2] = [
+    Parameter::new("indentation.contact_stiffness_factor", "contact stiffness", "-", [0.05, 5.0], "numerical", |s| {
+        s.effects.indentation.as_ref().map(|p| p.stiffness_factor)
+    })
+    .logarithmic(),
+    Parameter::new("indentation.contact_damping", "contact damping", "of critical", [0.0, 1.0], "numerical", |s| {
+        s.effects.indentation.as_ref().map(|p| p.contact_damping)
+    }),
+];
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,6 +8,7 @@
 //! Source: Olovsson, Simonsson & Unosson 2005 (selective mass scaling); Joldes et al. 2008 (tissue).
 
 use super::Effect;
+use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "mass_scaling",
@@ -15,7 +16,19 @@ pub const EFFECT: Effect = Effect {
     summary: "inertia of the tissue times S, so that the stable step grows with sqrt(S)",
     source: "Olovsson2005, Joldes2008",
     cost: "no buffer; a handful of operations per node",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 1] = [Parameter::new(
+    "solver.mass_scaling",
+    "mass scaling factor",
+    "-",
+    [1.0, 100000.0],
+    "kinetic energy stays a small part of the elastic one",
+    |s| s.effects.mass_scaling.as_ref().map(|p| p.factor),
+)
+.logarithmic()];
 
 /// Largest ratio of needle speed to scaled shear wave speed that `auto` allows (dimensionless).
 pub const AUTO_MACH: f64 = 0.03;

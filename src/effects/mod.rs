@@ -9,6 +9,7 @@ pub mod friction;
 pub mod gravity;
 pub mod indentation;
 pub mod mass_scaling;
+pub mod parameter;
 pub mod plasticity;
 pub mod puncture;
 pub mod viscoelastic;
@@ -32,7 +33,7 @@ pub struct EffectSet {
 }
 
 /// What the program knows about an effect without running it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Effect {
     /// Key in the scene's `effects` list and stem of its files.
     pub key: &'static str,
@@ -44,6 +45,8 @@ pub struct Effect {
     pub source: &'static str,
     /// What it costs, one line.
     pub cost: &'static str,
+    /// Numbers that may be changed while a run goes on.
+    pub parameters: &'static [parameter::Parameter],
 }
 
 /// All effects. The order is the order of their blocks in the stages.

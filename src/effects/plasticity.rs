@@ -17,6 +17,7 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::Effect;
+use super::parameter::Parameter;
 use crate::material::kinematics::{double_dot, symmetric_eigen};
 use crate::material::{ElasticLaw, deviator, equivalent};
 
@@ -26,7 +27,28 @@ pub const EFFECT: Effect = Effect {
     summary: "permanent flow above a yield stress, linear hardening (F = Fe Fp)",
     source: "Lee 1969, Simo & Ortiz 1985; Lv2022 Eq. 8",
     cost: "48 B per cell",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 2] = [
+    Parameter::new("plasticity.yield_stress_kpa", "yield stress", "kPa", [1.0, 200.0], "Lv2022, tension tests", |s| {
+        s.effects.plasticity?;
+        s.material.plasticity.or(s.effects.plasticity).map(|p| p.yield_stress / 1e3)
+    })
+    .logarithmic(),
+    Parameter::new(
+        "plasticity.hardening_kpa",
+        "hardening modulus",
+        "kPa",
+        [0.0, 2000.0],
+        "Lv2022, tension tests",
+        |s| {
+            s.effects.plasticity?;
+            s.material.plasticity.or(s.effects.plasticity).map(|p| p.hardening / 1e3)
+        },
+    ),
+];
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

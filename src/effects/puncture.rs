@@ -35,6 +35,7 @@
 //! 164 J/m^2 [Gokgol2012].
 
 use super::Effect;
+use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "puncture",
@@ -42,7 +43,125 @@ pub const EFFECT: Effect = Effect {
     summary: "tip law (puncture, cutting) and contact with the opened path of the needle",
     source: "this project (README, What it computes); toughness: Gokgol2012, Azar2008",
     cost: "three dispatches per step; 4 B per cell; 160 B per node near the path",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 14] = [
+    Parameter::new(
+        "puncture.puncture_force_n",
+        "force at which a surface gives way",
+        "N",
+        [0.01, 5.0],
+        "calibration with Lv2022",
+        |s| {
+            s.material.cutting.is_none().then_some(())?;
+            s.effects.puncture.map(|p| p.puncture_force)
+        },
+    )
+    .logarithmic(),
+    Parameter::new(
+        "puncture.cutting_force_n",
+        "force of steady cutting",
+        "N",
+        [0.01, 5.0],
+        "calibration with Lv2022",
+        |s| {
+            s.material.cutting.is_none().then_some(())?;
+            s.effects.puncture.map(|p| p.cutting_force)
+        },
+    )
+    .logarithmic(),
+    Parameter::new(
+        "material.puncture_force_n",
+        "force at which this material gives way",
+        "N",
+        [0.01, 5.0],
+        "preset of the material",
+        |s| s.effects.puncture.and(s.material.cutting).map(|c| c.puncture_force),
+    )
+    .logarithmic(),
+    Parameter::new(
+        "material.cutting_force_n",
+        "force of steady cutting in this material",
+        "N",
+        [0.01, 5.0],
+        "preset of the material",
+        |s| s.effects.puncture.and(s.material.cutting).map(|c| c.cutting_force),
+    )
+    .logarithmic(),
+    Parameter::new(
+        "puncture.transition_length_mm",
+        "travel from puncture to cutting",
+        "mm",
+        [0.05, 5.0],
+        "calibration with Lv2022",
+        |s| s.effects.puncture.as_ref().map(|p| p.transition_length / 1e-3),
+    )
+    .logarithmic(),
+    Parameter::new(
+        "puncture.tip_stiffness_n_mm",
+        "stiffness of the tip springs",
+        "N/mm",
+        [0.2, 20.0],
+        "as stiff as the tissue around the tip",
+        |s| s.effects.puncture.as_ref().map(|p| p.tip_stiffness / 1e3),
+    )
+    .logarithmic(),
+    Parameter::new(
+        "puncture.softened_radius_mm",
+        "radius of the softened path",
+        "mm",
+        [0.1, 1.5],
+        "calibration with Lv2022",
+        |s| s.effects.puncture.as_ref().map(|p| p.softened_radius / 1e-3),
+    ),
+    Parameter::new(
+        "puncture.residual_stiffness",
+        "stiffness left on the path",
+        "-",
+        [0.001, 1.0],
+        "keeps the cells of the path in shape",
+        |s| s.effects.puncture.as_ref().map(|p| p.residual_stiffness),
+    )
+    .logarithmic(),
+    Parameter::new(
+        "puncture.ring_radius_mm",
+        "radius of the ring that is pushed",
+        "mm",
+        [1.0, 4.0],
+        "calibration with Lv2022",
+        |s| s.effects.puncture.as_ref().map(|p| p.ring_radius / 1e-3),
+    ),
+    Parameter::new(
+        "puncture.contact_stiffness_factor",
+        "contact stiffness",
+        "-",
+        [0.05, 5.0],
+        "calibration with Lv2022",
+        |s| s.effects.puncture.as_ref().map(|p| p.contact_stiffness_factor),
+    )
+    .logarithmic(),
+    Parameter::new("puncture.contact_damping", "contact damping", "of critical", [0.0, 1.0], "numerical", |s| {
+        s.effects.puncture.as_ref().map(|p| p.contact_damping)
+    }),
+    Parameter::new("puncture.entry_fade_mm", "fade of an overlap", "mm", [0.05, 5.0], "numerical", |s| {
+        s.effects.puncture.as_ref().map(|p| p.entry_fade / 1e-3)
+    })
+    .logarithmic(),
+    Parameter::new("puncture.rate_exponent", "exponent of the speed", "-", [0.0, 1.0], "Terzano2021", |s| {
+        s.effects.puncture.as_ref().map(|p| p.rate_exponent)
+    }),
+    Parameter::new(
+        "puncture.reference_speed_mm_s",
+        "speed of the written forces",
+        "mm/s",
+        [0.1, 100.0],
+        "Terzano2021",
+        |s| s.effects.puncture.as_ref().map(|p| p.reference_speed / 1e-3),
+    )
+    .logarithmic(),
+];
 
 /// Parameters in SI units. Those marked [calibration] set the force as much as the tissue does; they are the
 /// same in every scene that compares materials.

@@ -15,6 +15,8 @@
 //! `Xi = sum q_i:q_i/(4 mu0 g_i)` is stored and the rest, `sum E:dq - Xi`, dissipated.
 
 use super::Effect;
+use super::parameter::{Parameter, Value};
+use crate::scene::Scene;
 
 pub const EFFECT: Effect = Effect {
     key: "viscoelastic",
@@ -22,7 +24,45 @@ pub const EFFECT: Effect = Effect {
     summary: "stress that relaxes with time: Prony series on the isochoric stress",
     source: "Simo1987, Taylor1970",
     cost: "32 B per cell and 32 B per cell and term",
+    parameters: &PARAMETERS,
 };
+
+/// What may be changed while a run goes on.
+const PARAMETERS: [Parameter; 2] = [
+    Parameter::new(
+        "viscoelastic.g",
+        "share of the stress that relaxes",
+        "-",
+        [0.001, 0.9],
+        "assumption; total of 50 %: Van Loocke 2008",
+        |_| None,
+    )
+    .holding(Value::List(|s| shares(s), Some(("viscoelastic.tau_s", times)))),
+    Parameter::new(
+        "viscoelastic.tau_s",
+        "relaxation time",
+        "s",
+        [0.001, 1000.0],
+        "assumption; total of 50 %: Van Loocke 2008",
+        |_| None,
+    )
+    .holding(Value::List(|s| times(s), Some(("viscoelastic.g", shares))))
+    .logarithmic(),
+];
+
+/// The series of the tissue's own material.
+fn series(scene: &Scene) -> Option<&Params> {
+    let common = scene.effects.viscoelastic.as_ref()?;
+    Some(scene.material.viscoelastic.as_ref().unwrap_or(common))
+}
+
+fn shares(scene: &Scene) -> Option<Vec<f64>> {
+    Some(series(scene)?.terms.iter().map(|term| term.ratio).collect())
+}
+
+fn times(scene: &Scene) -> Option<Vec<f64>> {
+    Some(series(scene)?.terms.iter().map(|term| term.time).collect())
+}
 
 /// Most terms of a series.
 pub const LARGEST_TERM_COUNT: usize = 8;

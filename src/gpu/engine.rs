@@ -191,6 +191,8 @@ pub struct GpuEngine {
     /// Buffers that a checkpoint holds.
     kept: Vec<&'static str>,
     max_steps: usize,
+    /// Sum of mass without scaling times displacement at the end of the last frame [kg m], and what gravity has done since t = 0 [J].
+    moment: DVec3,
     gravity_work: f64,
 }
 
@@ -301,6 +303,7 @@ impl GpuEngine {
             finished: VecDeque::new(),
             kept,
             max_steps,
+            moment: DVec3::ZERO,
             gravity_work: 0.0,
         })
     }
@@ -483,7 +486,8 @@ impl GpuEngine {
         let around = corners.chunks_exact(8).map(|c| std::array::from_fn(|n| c[n]));
         sums.targets = self.model.targets.iter().zip(around).map(|(target, u)| target.interpolated(u)).collect();
         if let Some(gravity) = self.model.effects.gravity {
-            let total = moment.dot(gravity.acceleration) / self.model.mass_scaling();
+            self.moment = moment / self.model.mass_scaling();
+            let total = self.moment.dot(gravity.acceleration);
             sums.load_work += total - self.gravity_work;
             self.gravity_work = total;
         }
@@ -595,6 +599,9 @@ const FRAME_RESULTS: [&str; 7] =
 
 /// Buffers of what a window draws: they follow from the state.
 const DRAWN: [&str; 2] = ["drawn_cells", "drawn_nodes"];
+
+/// Buffers that are written anew for every frame.
+const PER_FRAME: [&str; 2] = [STEP_INPUT, "centre_line"];
 
 /// All buffers by the name of their shader variable.
 const BUFFERS: [&str; 57] = [
@@ -1353,6 +1360,49 @@ impl Engine for GpuEngine {
         Ok(self.finished.pop_front())
     }
 
+    fn retune(&mut self, model: Arc<Model>, dt: f64, steps: usize) -> Result<bool> {
+        while self.collect_oldest(true)? {}
+        let features = |m: &Model| Features { drawn: self.kernels.iter().any(|k| k.stage.draws()), ..Features::of(m) };
+        let (old, new) = (features(&self.model), features(&model));
+        let measured = measure_threads(&model);
+        let fits = steps <= self.max_steps
+            && defines(&model.effects, &new) == defines(&self.model.effects, &old)
+            && self.kernels.iter().all(|k| k.threads() == threads(k.stage, &model, &self.layout, measured));
+        if !fits {
+            return Ok(false);
+        }
+        let mut writes = Vec::new();
+        for (name, buffer) in &self.buffers {
+            // Cells of the path count what they lose; between frames that has been told.
+            let state = self.kept.contains(name) && *name != "path_cells";
+            if state || FRAME_RESULTS.contains(name) || DRAWN.contains(name) || PER_FRAME.contains(name) {
+                continue;
+            }
+            if let Contents::Bytes(bytes) = contents(name, &model, &self.layout, dt, measured, self.max_steps) {
+                if (bytes.len() as u64).next_multiple_of(4).max(4) != buffer.size() {
+                    return Ok(false);
+                }
+                writes.push((buffer.clone(), bytes));
+            }
+        }
+        // What the Prony terms remember is kept in a form that depends on the step.
+        let viscous = model.effects.viscoelastic.is_some();
+        if viscous && model.prony_term_count() != self.model.prony_term_count() {
+            return Ok(false);
+        }
+        let state = if viscous { Some(self.read_state()?) } else { None };
+        for (buffer, bytes) in &writes {
+            self.gpu.queue.write_buffer(buffer, 0, bytes);
+        }
+        (self.model, self.dt) = (model, dt);
+        if let Some(state) = state {
+            self.write_state(&state)?;
+        }
+        let gravity = self.model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration);
+        self.gravity_work = self.moment.dot(gravity);
+        Ok(true)
+    }
+
     fn read_state(&mut self) -> Result<State> {
         const OPTIONAL: [&str; 9] = [
             "pair_states",
@@ -1518,7 +1568,8 @@ impl Engine for GpuEngine {
         write("point_history", bytemuck::cast_slice(&history));
         if let Some(gravity) = self.model.effects.gravity {
             let moment: DVec3 = state.displacement.iter().zip(&self.model.node_mass).map(|(u, m)| *u * *m).sum();
-            self.gravity_work = moment.dot(gravity.acceleration) / self.model.mass_scaling();
+            self.moment = moment / self.model.mass_scaling();
+            self.gravity_work = self.moment.dot(gravity.acceleration);
         }
         Ok(())
     }

@@ -156,6 +156,10 @@ impl Kernel {
         Ok(Kernel { stage, pipeline, group, dynamic, workgroup_size, threads })
     }
 
+    pub fn threads(&self) -> u32 {
+        self.threads
+    }
+
     /// Records the dispatch. `step_offset` is the byte offset of the step's input.
     pub fn encode(&self, pass: &mut wgpu::ComputePass<'_>, step_offset: u32) {
         pass.set_pipeline(&self.pipeline);

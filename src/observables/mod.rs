@@ -96,6 +96,8 @@ pub struct EnergyAccount {
     pub contact: f64,
     /// Gained and damped by a flexible needle since t = 0.
     pub needle: f64,
+    /// Put in by changes of parameters while the run went on: the same state stores more or less with other constants.
+    pub changes: f64,
     /// Largest |external| so far, the scale of the imbalance.
     pub external_max: f64,
 }
@@ -116,6 +118,7 @@ impl EnergyAccount {
             + self.viscous
             + self.contact
             + self.needle
+            - self.changes
     }
 
     /// (external - accounted) / largest external work; 0 while nothing has happened.

@@ -7,6 +7,7 @@ use super::{EnergyAccount, ForceParts, FrameRecord, Health};
 use crate::model::Model;
 use crate::needle::Kinematics;
 use crate::scene::Tool;
+use crate::solver::clock::Clock;
 use crate::solver::engine::FrameSums;
 
 /// Adds up what the frames deliver, in f64.
@@ -15,21 +16,30 @@ pub struct Recorder {
     totals: EnergyAccount,
     contact_dissipation: f64,
     cohesive_dissipation: f64,
-    step: u64,
 }
 
 impl Recorder {
-    /// Counts on in steps of half the length.
-    pub fn halve_step(&mut self) {
-        self.step *= 2;
+    /// Books what the state at the end of the last frame stores more after a change of constants; `sums` are those of a frame without
+    /// a step. Springs of contact are not seen there: what they hold more shows in the balance.
+    pub fn book_change(&mut self, sums: &FrameSums) {
+        let before = &self.totals;
+        let stored = before.elastic + before.kinetic + before.hourglass + before.viscous + before.cohesive;
+        let now = sums.elastic + sums.kinetic + sums.hourglass + sums.viscous_dissipation + sums.cohesive_energy;
+        self.totals.changes += now + self.cohesive_dissipation - stored;
     }
 
-    /// Books one frame whose steps lasted `dt` [s] each and returns its record.
-    pub fn record(&mut self, model: &Model, kinematics: Option<&Kinematics>, dt: f64, sums: &FrameSums) -> FrameRecord {
-        let duration = f64::from(sums.steps) * dt;
-        let begin = self.step as f64 * dt;
-        self.step += u64::from(sums.steps);
-        let end = self.step as f64 * dt;
+    /// Books the frame whose steps begin with number `first` and returns its record.
+    pub fn record(
+        &mut self,
+        model: &Model,
+        kinematics: Option<&Kinematics>,
+        (clock, first): (&Clock, u64),
+        sums: &FrameSums,
+    ) -> FrameRecord {
+        let duration = f64::from(sums.steps) * clock.dt;
+        let begin = clock.time_of(first);
+        let step = first + u64::from(sums.steps);
+        let end = clock.time_of(step);
         let e = &mut self.totals;
         e.external += sums.tool_work + sums.load_work;
         e.external_max = e.external_max.max(e.external.abs());
@@ -67,7 +77,7 @@ impl Recorder {
         parts.axial = ForceParts::PARTS.iter().map(|part| (part.of)(&parts)).sum();
         FrameRecord {
             frame: sums.frame,
-            step: self.step,
+            step,
             time: end,
             depth: mean_pose.map_or(0.0, |p| p.depth),
             phase: mean_pose.map_or(0, |p| p.phase),

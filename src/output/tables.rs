@@ -33,7 +33,7 @@ pub fn force_columns() -> Vec<&'static str> {
 }
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 29] = [
+pub const ENERGY_COLUMNS: [&str; 30] = [
     "time_s",
     "depth_m",
     "external_work_j",
@@ -50,6 +50,7 @@ pub const ENERGY_COLUMNS: [&str; 29] = [
     "viscous_j",
     "contact_j",
     "needle_j",
+    "changes_j",
     "imbalance",
     "kinetic_to_internal",
     "hourglass_to_internal",
@@ -277,6 +278,7 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         number(e.viscous),
         number(e.contact),
         number(e.needle),
+        number(e.changes),
         number(e.imbalance()),
         number(kinetic_to_internal(e)),
         number(hourglass_to_internal(e)),

@@ -1,5 +1,7 @@
 //! What both engines offer, and what passes between them and the run.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -227,7 +229,7 @@ pub struct EngineInfo {
 
 /// A solver that can advance a model. Frames are started in order; results come in the same order, possibly a
 /// frame or two later.
-pub trait Engine {
+pub trait Engine: Send {
     fn info(&self) -> &EngineInfo;
     /// The engine on a device, for those who draw from its buffers.
     fn on_device(&self) -> Option<&GpuEngine> {
@@ -238,6 +240,9 @@ pub trait Engine {
     /// The next finished frame. With `wait`, blocks until one is there; `None` when none is under way (or
     /// finished, without `wait`).
     fn collect(&mut self, wait: bool) -> Result<Option<FrameSums>>;
+    /// Takes the constants of `model`, which has the mesh and the effects of the present one, and steps of `dt` [s], `steps` of them in
+    /// a frame; the state stays. Call it between frames. False where other buffers or kernels would be needed; nothing has changed then.
+    fn retune(&mut self, model: Arc<Model>, dt: f64, steps: usize) -> Result<bool>;
     /// The present state (waits for all frames under way).
     fn read_state(&mut self) -> Result<State>;
     /// Replaces the state, for tests, resumed runs and bisecting.

@@ -72,7 +72,7 @@ impl Simulation {
     /// As [`Simulation::resume`], and those of the engine.
     pub fn investigate(&mut self, from: &Checkpoint, last: u64) -> Result<Finding> {
         self.resume(from)?;
-        let limit = self.model.speed_limit(self.dt);
+        let limit = self.model.speed_limit(self.clock.dt);
         let mut steps = Vec::new();
         let mut sign = None;
         let mut frame = self.collected;
@@ -88,7 +88,7 @@ impl Simulation {
                 let Some(mut sums) = self.engine.collect(true)? else { break 'frames };
                 let record = StepRecord {
                     step: first_step + 1,
-                    time: (first_step + 1) as f64 * self.dt,
+                    time: self.clock.time_of(first_step + 1),
                     elastic: sums.elastic,
                     kinetic: sums.kinetic,
                     hourglass: sums.hourglass,

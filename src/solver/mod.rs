@@ -1,6 +1,8 @@
 //! The step: one list of stages, two engines.
 
+pub mod change;
 pub mod checkpoint;
+pub mod clock;
 pub mod cpu;
 pub mod elements;
 pub mod engine;

@@ -5,6 +5,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use super::checkpoint::{Checkpoint, foreign_image};
+use super::clock::Clock;
 use super::cpu::CpuEngine;
 use super::elements::{CellShape, CellStates, Elements};
 use super::engine::{Engine, FramePlan, FrameSums, State, StepInput};
@@ -67,7 +68,7 @@ const AHEAD: u64 = 2;
 pub(super) const RETURN_FAILURE_PART: f64 = 1e-3;
 
 /// Longest motion that a hand may lead [s].
-const LONGEST_LED: f64 = 3600.0;
+pub(super) const LONGEST_LED: f64 = 3600.0;
 
 /// What a simulation is made for, beside records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -78,21 +79,25 @@ pub struct Purpose {
     pub drawn: bool,
 }
 
+impl Purpose {
+    /// Steps per frame that are made room for where `steps` are planned: a hand that leads may change the scene too.
+    pub fn most_steps(self, steps: u64) -> usize {
+        (if self.led || self.drawn { (4 * steps).min(MOST_STEPS_PER_FRAME) } else { steps }) as usize
+    }
+}
+
 /// A simulation that is advanced frame by frame.
 pub struct Simulation {
     pub model: Arc<Model>,
     /// Stable step: the wave-speed bound at rest [s].
     pub stable_dt: f64,
-    /// Time step [s].
-    pub dt: f64,
     pub(super) engine: Box<dyn Engine>,
     device: Option<Gpu>,
+    pub(super) purpose: Purpose,
     pub(super) recorder: Recorder,
-    steps_per_frame: u64,
-    /// Steps by which frame 1 begins later than after one step: halved steps keep the frames where they were.
-    late_steps: u64,
-    total_steps: u64,
-    frames: u64,
+    pub(super) clock: Clock,
+    pub(super) total_steps: u64,
+    pub(super) frames: u64,
     /// Motion of the tool: the phases of the scene, or what a hand has led so far.
     pub(super) kinematics: Option<Kinematics>,
     /// Frames that a hand has led.
@@ -104,7 +109,7 @@ pub struct Simulation {
     return_failures: u64,
     /// Frames after which the state is read, so that no later frame may have been started.
     stops: BTreeSet<u64>,
-    watch_stretch: bool,
+    pub(super) watch_stretch: bool,
     /// The beam of a flexible needle; every frame waits for the one before.
     pub(super) needle: Option<FlexibleNeedle>,
     /// Frames in which the beam did not find its balance.
@@ -174,7 +179,7 @@ impl Simulation {
 
     /// Leads the tool to `pose` within one more frame, which may then be started.
     pub fn lead(&mut self, pose: &HandPose) {
-        let until = self.first_step(self.led_frames + 1) as f64 * self.dt;
+        let until = self.clock.time_of(self.clock.first_step(self.led_frames + 1));
         if let Some(kinematics) = self.kinematics.as_mut().filter(|k| k.is_led()) {
             kinematics.lead(pose, until);
             self.led_frames += 1;
@@ -188,7 +193,7 @@ impl Simulation {
 
     /// End of a frame [s].
     pub fn end_of(&self, frame: u64) -> f64 {
-        self.first_step(frame + 1).min(self.total_steps.max(1)) as f64 * self.dt
+        self.clock.time_of(self.clock.first_step(frame + 1).min(self.total_steps.max(1)))
     }
 
     /// The device of a choice, and what is to be said about it; no device: the CPU engine.
@@ -256,7 +261,7 @@ impl Simulation {
                 model.clone(),
                 gpu.clone(),
                 dt,
-                steps_per_frame as usize,
+                purpose.most_steps(steps_per_frame),
                 purpose.drawn,
             )?),
             None => Box::new(CpuEngine::new(model.clone(), dt)),
@@ -266,18 +271,17 @@ impl Simulation {
             false => model.kinematics.clone(),
         };
         let duration = if purpose.led { LONGEST_LED } else { model.duration() };
-        let total_steps = ((duration / dt) * (1.0 - 1e-9)).ceil() as u64;
-        // The first frame is a single step, so that the time to the first step can be told.
-        let frames = 1 + total_steps.saturating_sub(1).div_ceil(steps_per_frame);
+        let clock = Clock::new(dt, steps_per_frame);
+        let total_steps = clock.steps_until(duration);
+        let frames = 1 + clock.frame_of(total_steps);
         let watch_stretch = model.materials.iter().any(|m| !matches!(m.law.verdict(), Verdict::Stable));
         Ok(Simulation {
             stable_dt,
-            dt,
+            clock,
             engine,
             device,
+            purpose,
             recorder: Recorder::default(),
-            steps_per_frame,
-            late_steps: 0,
             total_steps,
             frames,
             started: 0,
@@ -316,8 +320,13 @@ impl Simulation {
         self.frames
     }
 
+    /// Time step [s].
+    pub fn dt(&self) -> f64 {
+        self.clock.dt
+    }
+
     pub fn steps_per_frame(&self) -> u64 {
-        self.steps_per_frame
+        self.clock.steps_per_frame
     }
 
     pub fn total_steps(&self) -> u64 {
@@ -326,18 +335,12 @@ impl Simulation {
 
     /// Simulated length of the run [s].
     pub fn duration(&self) -> f64 {
-        self.total_steps as f64 * self.dt
-    }
-
-    /// Steps before frame `frame`.
-    fn first_step(&self, frame: u64) -> u64 {
-        if frame == 0 { 0 } else { self.late_steps + 1 + (frame - 1) * self.steps_per_frame }
+        self.clock.time_of(self.total_steps)
     }
 
     /// Frame whose end is the first one at or after `time` [s].
     pub fn frame_at(&self, time: f64) -> u64 {
-        let step = (time / self.dt).ceil().max(1.0) as u64;
-        ((step - 1).div_ceil(self.steps_per_frame)).min(self.frames - 1)
+        self.clock.frame_of(self.clock.steps_until(time)).min(self.frames - 1)
     }
 
     /// Asks that the state can be read right after the record of `frame` has been returned.
@@ -359,8 +362,8 @@ impl Simulation {
         }
         Ok(Checkpoint {
             frames: self.collected,
-            steps: self.first_step(self.collected),
-            dt: self.dt,
+            steps: self.clock.first_step(self.collected),
+            dt: self.clock.dt,
             engine: self.engine.save()?,
             recorder: self.recorder.clone(),
             needle: self.needle.as_ref().map(|needle| needle.save()),
@@ -380,19 +383,18 @@ impl Simulation {
         self.resume(checkpoint)?;
         let state = self.engine.read_state()?;
         let mut scene = self.model.scene.clone();
-        scene.solver.time_step = Some(0.5 * self.dt);
-        let (mesh, most_steps) = (self.model.mesh.clone(), 2 * self.steps_per_frame);
+        scene.solver.time_step = Some(0.5 * self.clock.dt);
+        let (mesh, most_steps) = (self.model.mesh.clone(), 2 * self.clock.steps_per_frame);
         let mut next =
             Simulation::prepare(scene, mesh, self.device.clone(), Vec::new(), most_steps, Purpose::default())?;
         next.engine.write_state(&state)?;
         if let (Some(needle), Some(image)) = (&mut next.needle, &checkpoint.needle) {
             needle.restore(image);
         }
-        next.late_steps = 2 * self.late_steps + 1;
+        next.clock = self.clock.halved();
         next.frames = self.frames;
         (next.started, next.collected) = (checkpoint.frames, checkpoint.frames);
         next.recorder = checkpoint.recorder.clone();
-        next.recorder.halve_step();
         next.guard = checkpoint.guard.clone();
         next.return_failures = checkpoint.return_failures;
         next.buckling_told = checkpoint.buckling_told;
@@ -406,9 +408,9 @@ impl Simulation {
     /// # Errors
     /// `Error::Input` where it belongs to another engine, scene or time step.
     pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<()> {
-        let same = checkpoint.dt == self.dt
+        let same = checkpoint.dt == self.clock.dt
             && checkpoint.frames <= self.frames
-            && checkpoint.steps == self.first_step(checkpoint.frames)
+            && checkpoint.steps == self.clock.first_step(checkpoint.frames)
             && checkpoint.needle.is_some() == self.needle.is_some();
         if checkpoint.engine.engine() == self.engine.info().engine && !same {
             return Err(foreign_image(checkpoint.engine.engine(), &checkpoint.engine));
@@ -427,25 +429,28 @@ impl Simulation {
     }
 
     pub(super) fn plan(&self, frame: u64) -> FramePlan {
-        let first_step = self.first_step(frame);
-        let last = self.first_step(frame + 1).min(self.total_steps.max(1));
+        let (clock, dt) = (&self.clock, self.clock.dt);
+        let first_step = clock.first_step(frame);
+        let last = clock.first_step(frame + 1).min(self.total_steps.max(1));
         let tool = self.kinematics.as_ref();
         let mut plan = FramePlan {
             frame,
             first_step,
             steps: (first_step..last)
-                .map(|s| StepInput::with(&self.model, tool, s as f64 * self.dt, self.dt))
+                .map(|step| StepInput { step, ..StepInput::with(&self.model, tool, clock.time_of(step), dt) })
                 .collect(),
             centre_line: None,
         };
         if let Some(needle) = &self.needle {
-            needle.bend(&mut plan, self.dt);
+            needle.bend(&mut plan, dt);
         }
         plan
     }
 
     fn may_start(&self, frame: u64) -> bool {
-        let waits = self.watch_stretch
+        // A window wants each frame as soon as it can be had, not several at once.
+        let waits = self.purpose.drawn
+            || self.watch_stretch
             || self.needle.is_some()
             || self.model.has_bore()
             || self.stops.range(self.collected..frame).next().is_some();
@@ -478,7 +483,8 @@ impl Simulation {
         };
         self.collected += 1;
         let bent = self.answer_of_the_needle(&mut sums);
-        let mut record = self.recorder.record(&self.model, self.kinematics.as_ref(), self.dt, &sums);
+        let when = (&self.clock, self.clock.first_step(sums.frame));
+        let mut record = self.recorder.record(&self.model, self.kinematics.as_ref(), when, &sums);
         record.needle = bent;
         record.targets = TargetRecord::of(&self.model, self.kinematics.as_ref(), &record, &sums.targets);
         self.tell_of_the_needle(&record);
@@ -487,7 +493,7 @@ impl Simulation {
         }
         self.return_failures += u64::from(record.health.return_failures);
         // Against a whole frame at least: the first one is a single step.
-        let cell_steps = record.step.max(self.steps_per_frame) as f64 * self.model.mesh.cell_count() as f64;
+        let cell_steps = record.step.max(self.clock.steps_per_frame) as f64 * self.model.mesh.cell_count() as f64;
         if too_many_return_failures(self.return_failures, cell_steps) {
             return Err(self.flow_lost(&record, self.return_failures as f64 / cell_steps));
         }
@@ -504,10 +510,10 @@ impl Simulation {
 
     /// The beam's answer to the loads of the frame that was collected last.
     pub(super) fn answer_of_the_needle(&mut self, sums: &mut FrameSums) -> NeedleRecord {
-        let (dt, last) = (self.dt, self.total_steps.max(1));
-        let end = |frame: u64| self.first_step(frame + 1).min(last) as f64 * dt;
+        let (clock, dt, last) = (&self.clock, self.clock.dt, self.total_steps.max(1));
+        let end = |frame: u64| clock.time_of(clock.first_step(frame + 1).min(last));
         let next = (self.collected < self.frames)
-            .then(|| (end(self.collected), end(self.collected) - self.first_step(self.collected) as f64 * dt));
+            .then(|| (end(self.collected), end(self.collected) - clock.time_of(clock.first_step(self.collected))));
         let broken = sums.not_finite || !sums.needle_loads.iter().all(|l| l.is_finite());
         match (&mut self.needle, &self.kinematics) {
             // Loads of a broken state mean nothing; the run stops right after.
@@ -582,7 +588,7 @@ impl Simulation {
 }
 
 /// The stable step of the model is too short for the frames of the scene.
-fn too_many_steps(scene: &Scene, stable_dt: f64, steps: u64) -> Error {
+pub(super) fn too_many_steps(scene: &Scene, stable_dt: f64, steps: u64) -> Error {
     let per_step = steps as f64 / MOST_STEPS_PER_FRAME as f64;
     Error::input(
         format!(

@@ -64,10 +64,10 @@ impl Simulation {
     }
 
     fn smaller_step(&self) -> String {
-        if self.dt > self.stable_dt {
+        if self.clock.dt > self.stable_dt {
             return format!(
                 "the time step {:.3} us is above the stable step {:.3} us: drop time_step_us",
-                self.dt * 1e6,
+                self.clock.dt * 1e6,
                 self.stable_dt * 1e6
             );
         }
@@ -101,7 +101,7 @@ impl Simulation {
 
     /// Where the tissue moves fastest in a run whose speeds are clamped all over.
     fn runaway(&mut self, record: &FrameRecord, part: f64) -> Error {
-        let limit = self.model.speed_limit(self.dt);
+        let limit = self.model.speed_limit(self.clock.dt);
         let (place, way_out) = (self.fastest(), self.smaller_step());
         Error::Diverged {
             frame: record.frame,

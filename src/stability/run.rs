@@ -134,7 +134,7 @@ fn part(
             }
         }
     };
-    report.take(&trace, part.balance, simulation.dt, fastest_wave(&simulation.model));
+    report.take(&trace, part.balance, simulation.dt(), fastest_wave(&simulation.model));
     report.steps = stopped_at.unwrap_or(report.steps);
     if let (End::Survived, Some(answer)) = (&end, part.answer) {
         report.answer = Some((answer.of)(&mut simulation, &trace)?);

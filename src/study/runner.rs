@@ -102,7 +102,7 @@ pub fn run(
         part: part.map(str::to_string),
         cells: simulation.model.mesh.cell_count() as u64,
         nodes: simulation.model.mesh.node_count() as u64,
-        dt_s: simulation.dt,
+        dt_s: simulation.dt(),
         device_bytes: info.device_bytes,
         ..Default::default()
     };

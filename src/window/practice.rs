@@ -137,7 +137,7 @@ impl Practice {
         };
         let wave = tool_mach(&simulation.model).map(|mach| scene.motion.largest_speed() / mach);
         let speed_limit = wave.map_or(f64::INFINITY, |wave| LARGEST_MACH * wave).max(scene.motion.largest_speed());
-        let simulated = simulation.steps_per_frame() as f64 * simulation.dt;
+        let simulated = simulation.steps_per_frame() as f64 * simulation.dt();
         Ok(Practice {
             overrides,
             gpu,

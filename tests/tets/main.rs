@@ -344,7 +344,7 @@ fn run(what: &str, scene: Scene, mesh: TetMesh, choice: EngineChoice) -> (Simula
         "{what}: {} tets, {} steps of {:.1} us, {:.1} s wall; imbalance {:.3} %, smallest J {smallest:.3}, clamped {}",
         simulation.model.mesh.cell_count(),
         simulation.total_steps(),
-        simulation.dt * 1e6,
+        simulation.dt() * 1e6,
         begin.elapsed().as_secs_f64(),
         100.0 * summary.energy_imbalance,
         summary.clamped_nodes

@@ -68,11 +68,10 @@ pub struct CpuEngine {
 }
 
 impl CpuEngine {
-    /// A model at rest, advanced with steps of `dt` [s].
-    pub fn new(model: Arc<Model>, dt: f64) -> Self {
-        let nodes = model.mesh.node_count();
-        let cells = model.mesh.cell_count();
-        let state = State {
+    /// The state of a model at rest.
+    pub fn new_state(model: &Model) -> State {
+        let (nodes, cells) = (model.mesh.node_count(), model.mesh.cell_count());
+        State {
             displacement: vec![DVec3::ZERO; nodes],
             velocity: vec![DVec3::ZERO; nodes],
             stiffness: if model.puncture.is_some() { vec![1.0; cells] } else { Vec::new() },
@@ -83,7 +82,13 @@ impl CpuEngine {
             contact: vec![ContactState::default(); model.contact_nodes.len()],
             pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
-        };
+        }
+    }
+
+    /// A model at rest, advanced with steps of `dt` [s].
+    pub fn new(model: Arc<Model>, dt: f64) -> Self {
+        let (nodes, cells) = (model.mesh.node_count(), model.mesh.cell_count());
+        let state = Self::new_state(&model);
         let bytes = nodes * (3 * size_of::<DVec3>() + 8)
             + cells * size_of::<CellForces>()
             + state.stiffness.len() * 8
@@ -379,6 +384,18 @@ impl Engine for CpuEngine {
 
     fn collect(&mut self, _wait: bool) -> Result<Option<FrameSums>> {
         Ok(self.finished.pop_front())
+    }
+
+    fn retune(&mut self, model: Arc<Model>, dt: f64, _steps: usize) -> Result<bool> {
+        if !Self::new_state(&model).fits(&self.state) {
+            return Ok(false);
+        }
+        let mut next = CpuEngine::new(model, dt);
+        std::mem::swap(&mut next.state, &mut self.state);
+        std::mem::swap(&mut next.finished, &mut self.finished);
+        (next.booked, next.tip_energy, next.contact_energy) = (self.booked, self.tip_energy, self.contact_energy);
+        *self = next;
+        Ok(true)
     }
 
     fn read_state(&mut self) -> Result<State> {

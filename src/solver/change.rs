@@ -1,0 +1,240 @@
+//! A changed scene takes the place of the one that runs, between two frames: other constants, other effects.
+//!
+//! Constants are written into the buffers that are there. Other effects are other kernels: an engine of their own is made, beside the run
+//! where somebody waits for the next frame, and takes over the state. What the old effects remember and the new ones do not have is
+//! dropped; what the new ones remember begins now. A change of the same state's energy is booked as work of the change
+//! ([`crate::observables::EnergyAccount::changes`]), so the balance goes on.
+
+use std::sync::Arc;
+
+use super::engine::{ContactState, Engine, FramePlan, State};
+use super::simulation::{Purpose, Simulation, choose_step};
+use super::stable_dt::wave_speed_bound;
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, GpuEngine};
+use crate::material::Verdict;
+use crate::material_point::PointState;
+use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::needle::flexible::FlexibleNeedle;
+use crate::scene::{MOST_STEPS_PER_FRAME, Scene};
+use crate::solver::cpu::CpuEngine;
+
+/// A step is kept while it is at most so much shorter than the one that a scene would get.
+const KEPT_STEP: f64 = 1.25;
+
+/// How far a change reaches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// Numbers only: the next frame has them.
+    Constants,
+    /// Effects: another engine takes over the state.
+    Kernels,
+    /// The mesh, the path or what touches the tissue is another: the run begins anew.
+    Start,
+}
+
+/// A change that was thought through: the model of the changed scene and its step.
+pub struct Change {
+    pub reach: Reach,
+    model: Arc<Model>,
+    stable_dt: f64,
+    dt: f64,
+    steps_per_frame: u64,
+    device: Option<Gpu>,
+    purpose: Purpose,
+}
+
+impl Change {
+    pub fn scene(&self) -> &Scene {
+        &self.model.scene
+    }
+
+    /// The engine of the changed scene; takes as long as starting does, on any thread.
+    ///
+    /// # Errors
+    /// As [`GpuEngine::new`].
+    pub fn engine(&self) -> Result<Box<dyn Engine>> {
+        Ok(match &self.device {
+            Some(gpu) => Box::new(GpuEngine::for_purpose(
+                self.model.clone(),
+                gpu.clone(),
+                self.dt,
+                self.purpose.most_steps(self.steps_per_frame),
+                self.purpose.drawn,
+            )?),
+            None => Box::new(CpuEngine::new(self.model.clone(), self.dt)),
+        })
+    }
+}
+
+impl Simulation {
+    /// Thinks a changed scene through; nothing has changed yet.
+    ///
+    /// # Errors
+    /// `Error::Input` where a frame would need too many steps.
+    pub fn plan_change(&self, mut scene: Scene) -> Result<Change> {
+        let now = &self.model.scene;
+        if self.purpose.led {
+            scene.motion = scene.motion.with_room(scene.tissue.size.z);
+        }
+        let same_mesh = now.tissue == scene.tissue && now.mesh == scene.mesh;
+        let same_lines = |mesh: &Mesh| *mesh == self.model.mesh;
+        let mesh = if same_mesh && now.mesh.is_some() { self.model.mesh.clone() } else { Mesh::of_scene(&scene) };
+        let stays = same_lines(&mesh)
+            && now.motion == scene.motion
+            && now.tool == scene.tool
+            && now.faces == scene.faces
+            && now.supports == scene.supports
+            && touching(now) == touching(&scene)
+            && now.effects.flexible_needle == scene.effects.flexible_needle;
+        let model = Arc::new(Model::new(scene, mesh));
+        let stable_dt = wave_speed_bound(&model);
+        let (mut dt, mut steps_per_frame) = choose_step(&model, stable_dt);
+        if steps_per_frame > MOST_STEPS_PER_FRAME {
+            return Err(super::simulation::too_many_steps(&model.scene, stable_dt, steps_per_frame));
+        }
+        let same_frames = model.scene.solver.frame_rate == now.solver.frame_rate;
+        if same_frames && model.scene.solver.time_step.is_none() && self.dt() <= dt && dt <= KEPT_STEP * self.dt() {
+            (dt, steps_per_frame) = (self.dt(), self.steps_per_frame());
+        }
+        let reach = match (stays && same_frames, now.effects.keys() == model.scene.effects.keys()) {
+            (false, _) => Reach::Start,
+            (true, false) => Reach::Kernels,
+            (true, true) => Reach::Constants,
+        };
+        let (device, purpose) = (self.device().cloned(), self.purpose);
+        Ok(Change { reach, model, stable_dt, dt, steps_per_frame, device, purpose })
+    }
+
+    /// Gives the running engine the constants of a change. False where they do not fit its buffers or kernels; nothing has changed then.
+    /// Waits for the frames under way.
+    ///
+    /// # Errors
+    /// `Error::Device`; `Error::Input` in the middle of frames whose results nobody has collected.
+    pub fn retune(&mut self, change: &Change) -> Result<bool> {
+        self.between_frames()?;
+        if change.reach != Reach::Constants
+            || !self.engine.retune(change.model.clone(), change.dt, change.steps_per_frame as usize)?
+        {
+            return Ok(false);
+        }
+        self.adopted(change)?;
+        Ok(true)
+    }
+
+    /// Goes on with another engine of the changed scene, which takes over the state.
+    ///
+    /// # Errors
+    /// As [`Simulation::retune`].
+    pub fn adopt(&mut self, change: &Change, mut engine: Box<dyn Engine>) -> Result<()> {
+        self.between_frames()?;
+        let state = self.engine.read_state()?;
+        engine.write_state(&carried(&state, &self.model, &change.model))?;
+        self.engine = engine;
+        self.adopted(change)
+    }
+
+    /// A change at once, whatever it takes; false where the run has to begin anew, and goes on unchanged.
+    ///
+    /// # Errors
+    /// As [`Simulation::retune`] and [`Change::engine`].
+    pub fn change(&mut self, scene: Scene) -> Result<bool> {
+        let change = self.plan_change(scene)?;
+        if change.reach == Reach::Start {
+            return Ok(false);
+        }
+        if !self.retune(&change)? {
+            self.adopt(&change, change.engine()?)?;
+        }
+        Ok(true)
+    }
+
+    fn between_frames(&self) -> Result<()> {
+        match self.started == self.collected {
+            true => Ok(()),
+            false => Err(Error::Device("a change of the scene between frames that are under way".into())),
+        }
+    }
+
+    /// The engine has the change; the rest of the simulation follows.
+    fn adopted(&mut self, change: &Change) -> Result<()> {
+        if (change.dt, change.steps_per_frame) != (self.clock.dt, self.clock.steps_per_frame) {
+            self.clock = match self.collected {
+                0 => super::clock::Clock::new(change.dt, change.steps_per_frame),
+                frame => self.clock.changed(frame, change.dt, change.steps_per_frame),
+            };
+        }
+        self.stable_dt = change.stable_dt;
+        self.model = change.model.clone();
+        let end = match self.purpose.led {
+            true => super::simulation::LONGEST_LED,
+            false => self.model.duration(),
+        };
+        self.total_steps = self.clock.steps_until(end);
+        self.frames = 1 + self.clock.frame_of(self.total_steps);
+        self.watch_stretch = self.model.materials.iter().any(|m| !matches!(m.law.verdict(), Verdict::Stable));
+        if let Some(image) = self.needle.as_ref().map(|needle| needle.save()) {
+            // The same beam in another tissue.
+            self.needle = FlexibleNeedle::new(&self.model, self.kinematics.as_ref(), self.clock.dt);
+            if let Some(needle) = &mut self.needle {
+                needle.restore(&image);
+            }
+        }
+        if self.collected > 0 {
+            // A frame without a step measures the state with the new constants.
+            let (frame, first_step) = (self.collected, self.clock.first_step(self.collected));
+            self.engine.start_frame(&FramePlan { frame, first_step, steps: Vec::new(), centre_line: None })?;
+            let sums = self.engine.collect(true)?.ok_or_else(|| Error::Device("the engine lost a frame".into()))?;
+            self.recorder.book_change(&sums);
+        }
+        Ok(())
+    }
+}
+
+/// What touches the tissue: with another one the memory of contact and path means nothing.
+fn touching(scene: &Scene) -> ([bool; 4], Option<Vec<crate::effects::cohesive::Plane>>) {
+    let e = &scene.effects;
+    let kinds = [e.puncture.is_some(), e.indentation.is_some(), e.cohesive.is_some(), e.flexible_needle.is_some()];
+    (kinds, e.cohesive.as_ref().map(|c| c.planes.clone()))
+}
+
+/// The state of a model in the terms of another one on the same mesh.
+fn carried(state: &State, from: &Model, to: &Model) -> State {
+    let mut next = CpuEngine::new_state(to);
+    next.displacement = state.displacement.clone();
+    next.velocity = state.velocity.clone();
+    (next.tip_coordinate, next.tip, next.bond) = (state.tip_coordinate, state.tip, state.bond);
+    let fitting = |old: &Vec<f64>, new: &mut Vec<f64>| {
+        if old.len() == new.len() {
+            new.clone_from(old);
+        }
+    };
+    fitting(&state.stiffness, &mut next.stiffness);
+    fitting(&state.pairs, &mut next.pairs);
+    if state.cut_samples.len() == next.cut_samples.len() {
+        next.cut_samples.clone_from(&state.cut_samples);
+    }
+    // Contact is remembered by node; a node that is new in the ring begins anew. A node may have several surfaces.
+    let place = |model: &Model, n: usize| (model.contact_nodes[n].node, discriminant(model, n));
+    let known: std::collections::HashMap<_, ContactState> =
+        state.contact.iter().enumerate().map(|(n, memory)| (place(from, n), *memory)).collect();
+    for (n, memory) in next.contact.iter_mut().enumerate() {
+        if let Some(old) = known.get(&place(to, n)) {
+            *memory = *old;
+        }
+    }
+    let terms = to.prony_term_count();
+    for (new, old) in next.points.iter_mut().zip(&state.points) {
+        *new = PointState { ..old.clone() };
+        if to.effects.viscoelastic.is_none() || new.viscous.len() != terms {
+            new.viscous.clear();
+        }
+    }
+    next
+}
+
+/// Which of its surfaces a contact node stands for.
+fn discriminant(model: &Model, n: usize) -> std::mem::Discriminant<crate::model::ContactSurface> {
+    std::mem::discriminant(&model.contact_nodes[n].surface)
+}
