@@ -558,12 +558,24 @@ fn view(args: ViewArgs, start: Instant) -> Result<String> {
     if let Some(reason) = seen.stopped {
         return Err(Error::Device(reason));
     }
+    let latency = seen.latency;
+    let felt = match latency.count {
+        0 => "no input".to_string(),
+        n => format!(
+            "{n} inputs: force after {} frame(s) of tissue at most, {:.0} ms in the mean, {:.0} ms at most",
+            latency.most_frames,
+            latency.mean * 1e3,
+            latency.longest * 1e3
+        ),
+    };
     Ok(format!(
-        "{} pictures, {:.1} a second; first one after {:.2} s\n{} frames of tissue, real-time factor {:.2}; {:.3} N at {:.2} mm",
+        "{} pictures, {:.1} a second; first one after {:.2} s\n{} frames of tissue, {:.2} of real time with the window open (tissue alone: \
+         {:.2}); {:.3} N at {:.2} mm\n{felt}",
         seen.pictures,
         seen.frames_per_second,
         seen.first_picture,
         seen.frames,
+        seen.achieved,
         seen.real_time_factor,
         seen.force,
         seen.depth * 1e3

@@ -13,9 +13,12 @@ use crate::output::whole_file;
 use crate::scene::Scene;
 use crate::scene::motion::HandPose;
 use crate::solver::engine::EngineInfo;
+use crate::solver::simulation::Simulation;
 
 /// Version of the format.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
+/// Oldest format that is read; sessions of it have no changes.
+const OLDEST_FORMAT: u32 = 1;
 /// Largest file that is read: an hour at 60 frames/s takes 40 MB.
 const LARGEST_FILE: u64 = 64 << 20;
 
@@ -35,6 +38,19 @@ pub struct Session {
     pub fingerprint: u64,
     /// Where the hand wanted the needle at the end of every frame; SI.
     pub poses: Vec<HandPose>,
+    /// What was changed while it ran, in order.
+    #[serde(default)]
+    pub changes: Vec<SceneChange>,
+}
+
+/// Other values of the scene from a frame on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneChange {
+    /// Frames that were led before.
+    pub frame: u64,
+    /// All overrides that hold from there on.
+    pub overrides: Vec<String>,
 }
 
 impl Session {
@@ -50,6 +66,7 @@ impl Session {
             overrides: overrides.to_vec(),
             fingerprint: fingerprint(scene),
             poses: Vec::new(),
+            changes: Vec::new(),
         }
     }
 
@@ -77,8 +94,11 @@ impl Session {
     /// As [`Session::read`].
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
         let session: Session = serde_json::from_slice(bytes).map_err(|e| wrong(path, e.to_string()))?;
-        if session.format != FORMAT {
-            return Err(wrong(path, format!("its format is {}, this program knows {FORMAT}", session.format)));
+        if !(OLDEST_FORMAT..=FORMAT).contains(&session.format) {
+            return Err(wrong(
+                path,
+                format!("its format is {}, this program knows {OLDEST_FORMAT} to {FORMAT}", session.format),
+            ));
         }
         let sane = |pose: &HandPose| {
             pose.entry.is_finite()
@@ -90,7 +110,28 @@ impl Session {
         if let Some(frame) = session.poses.iter().position(|pose| !sane(pose)) {
             return Err(wrong(path, format!("the pose of frame {frame} is none of a needle over the tissue")));
         }
+        let frames = session.poses.len() as u64;
+        let orderly = session.changes.is_sorted_by_key(|change| change.frame);
+        if !orderly || session.changes.last().is_some_and(|change| change.frame > frames) {
+            return Err(wrong(path, format!("its changes are no moments of {frames} frames in order")));
+        }
         Ok(session)
+    }
+
+    /// Brings a simulation to the changes that were made before its next frame is led.
+    ///
+    /// # Errors
+    /// Those of the scene; `Error::Input` for a change that begins a run anew, which no session holds.
+    pub fn change(&self, simulation: &mut Simulation, frame: u64) -> Result<()> {
+        for change in self.changes.iter().filter(|change| change.frame == frame) {
+            if !simulation.change(Scene::load(&self.scene, &change.overrides)?)? {
+                return Err(Error::input(
+                    format!("{}: a change before frame {frame} begins the run anew", self.scene.display()),
+                    "record the session anew",
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// The scene as it was recorded.

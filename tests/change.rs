@@ -16,7 +16,12 @@ mod common;
 
 fn scene(overrides: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/training/hit_target.toml");
-    let coarse = ["damage.failure_displacement_mm=0.6", "tissue.cell_size_mm=1.0", "tissue.size_mm=[14, 14, 12]", "target.0.position_mm=[0, 0, -6]"];
+    let coarse = [
+        "damage.failure_displacement_mm=0.6",
+        "tissue.cell_size_mm=1.0",
+        "tissue.size_mm=[14, 14, 12]",
+        "target.0.position_mm=[0, 0, -6]",
+    ];
     let all: Vec<String> = coarse.iter().chain(overrides).map(|s| s.to_string()).collect();
     let all = with_overrides(&[], &all);
     Scene::load(&path, &with_overrides(&all, &["motion.phase.0.depth_mm=6".into()])).unwrap_or_else(|e| panic!("{e}"))

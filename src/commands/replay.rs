@@ -69,7 +69,8 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
         recorded_by: place(&session.version, &session.adapter),
         adapter: place(env!("CARGO_PKG_VERSION"), &info.adapter),
     };
-    for pose in &session.poses {
+    for (frame, pose) in (0..).zip(&session.poses) {
+        session.change(&mut simulation, frame)?;
         simulation.lead(pose);
         let Some(record) = simulation.next_frame()? else { break };
         tables.append(&record)?;

@@ -16,11 +16,12 @@ use super::ViewOptions;
 use super::camera::Camera;
 use super::hand::{Desk, InputDevice, Recording};
 use super::panels::{self, Choices, ReferenceCurve, Wishes};
-use super::practice::{Leader, Practice, State};
+use super::practice::{Latency, Leader, Practice, Renewed, State};
 use super::scene_view::{Area, Field, SceneView};
 use super::section::RestPlane;
 use super::texts;
 use super::tool_shape::{self, ToolPlace};
+use super::tuning::Source;
 use crate::gpu::Gpu;
 use crate::scene::Scene;
 use crate::session::Session;
@@ -30,6 +31,8 @@ use crate::{Error, Result};
 
 /// Shortest time between two pictures [s].
 const PICTURE: f64 = 1.0 / 60.0;
+/// Longest time between two pictures while the tissue lags behind [s].
+const SLOWEST_PICTURE: f64 = 1.0 / 24.0;
 /// Way that a notch of the wheel asks for [m].
 const NOTCH: f64 = 0.25e-3;
 /// Speed of the keys at the start [m/s].
@@ -55,7 +58,11 @@ pub struct ViewOutcome {
     pub depth: f64,
     pub force: f64,
     pub frames_per_second: f64,
+    /// Simulated over wall time while the run was on, the window with its pictures included; at most the pace.
+    pub achieved: f64,
+    /// The same of the frames alone, from their start to their results.
     pub real_time_factor: f64,
+    pub latency: Latency,
     pub stopped: Option<String>,
 }
 
@@ -64,11 +71,16 @@ pub struct ViewOutcome {
 /// # Errors
 /// Those of the scene come first. `Error::Input` where there is no display, `Error::Adapter` where no adapter can draw on it.
 pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome> {
-    let (scene, overrides, recording) = match &options.session {
-        None => (Scene::load(&options.scene, &options.overrides)?, options.overrides.clone(), None),
+    let (source, scene, recorded) = match &options.session {
+        None => {
+            let (source, scene) = Source::read(options.scene.clone(), options.overrides.clone())?;
+            (source, scene, None)
+        }
         Some(path) => {
             let session = Session::read(path)?;
-            (session.scene()?, session.overrides.clone(), Some(session.poses))
+            session.scene()?;
+            let (source, scene) = Source::read(session.scene.clone(), session.overrides.clone())?;
+            (source, scene, Some(session))
         }
     };
     for notice in &scene.notices {
@@ -85,8 +97,8 @@ pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome
     let mut app = App {
         options: options.clone(),
         scene,
-        overrides,
-        recording,
+        source,
+        recorded,
         reference: reference.into_iter().collect(),
         reference_score: options.reference.as_deref().and_then(read_score).transpose()?,
         program_start,
@@ -146,8 +158,8 @@ fn read_curve(folder: &Path) -> Result<ReferenceCurve> {
 struct App {
     options: ViewOptions,
     scene: Scene,
-    overrides: Vec<String>,
-    recording: Option<Vec<crate::scene::motion::HandPose>>,
+    source: Source,
+    recorded: Option<Session>,
     reference: Vec<ReferenceCurve>,
     reference_score: Option<Score>,
     program_start: Instant,
@@ -168,12 +180,15 @@ struct Open {
     practice: Practice,
     desk: Desk,
     recording: Option<Recording>,
+    recorded: Option<Session>,
     choices: Choices,
     camera: Camera,
     /// Simulated time that is due [s], and when it was counted last.
     due: f64,
     counted: Instant,
     next: Instant,
+    /// When the last picture was begun.
+    shown: Instant,
     pictures: u64,
     /// What the window shows. It stays from picture to picture: a software adapter draws the panels on some of them only.
     canvas: wgpu::Texture,
@@ -273,7 +288,7 @@ impl App {
         let leader = if self.options.script { Leader::Script } else { Leader::Hand };
         let practice = Practice::new(
             self.scene.clone(),
-            self.overrides.clone(),
+            self.source.clone(),
             gpu.clone(),
             leader,
             self.options.out.as_deref(),
@@ -316,7 +331,7 @@ impl App {
         // Open through the entry point, so that the needle is seen.
         let at = (self.scene.motion.entry.y - low.y) / (high.y - low.y);
         let desk = Desk::new(DESK_SPEED.min(practice.speed_limit));
-        if self.options.script || self.recording.is_some() || self.options.frames.is_some() {
+        if self.options.script || self.recorded.is_some() || self.options.frames.is_some() {
             practice.state = State::Running;
         }
         let now = Instant::now();
@@ -330,12 +345,14 @@ impl App {
             view,
             practice,
             desk,
-            recording: self.recording.clone().map(Recording::new),
+            recording: self.recorded.as_ref().map(|session| Recording::new(session.poses.clone())),
+            recorded: self.recorded.clone(),
             choices: Choices::new(Some((1, at))),
             camera,
             due: 0.0,
             counted: now,
             next: now,
+            shown: now,
             pictures: 0,
             canvas,
             area: egui::Rect::NOTHING,
@@ -380,6 +397,14 @@ impl App {
             open.practice.again(leader)?;
             open.rebind()?;
         }
+        match open.practice.take_changes()? {
+            Renewed::Nothing | Renewed::Constants => {}
+            Renewed::Buffers => open.take_buffers()?,
+            Renewed::Attempt => {
+                open.debriefing = None;
+                open.rebind()?;
+            }
+        }
         Ok(())
     }
 
@@ -400,6 +425,8 @@ impl App {
             self.outcome.force = last.map_or(0.0, |r| r.force.axial);
             self.outcome.frames_per_second = open.practice.timing.frames_per_second();
             self.outcome.real_time_factor = open.practice.timing.real_time_factor();
+            self.outcome.achieved = open.practice.timing.achieved();
+            self.outcome.latency = open.practice.latency;
             self.outcome.stopped = match &open.practice.state {
                 State::Stopped(reason) => Some(reason.clone()),
                 _ => None,
@@ -455,6 +482,14 @@ impl Open {
         Ok(())
     }
 
+    /// After a change of effects: the engine is new, the mesh and all that is drawn of it the same.
+    fn take_buffers(&mut self) -> Result<()> {
+        match self.practice.simulation.engine().on_device() {
+            Some(engine) => self.view.take_buffers(&self.gpu, engine),
+            None => Ok(()),
+        }
+    }
+
     /// True where a frame of the tissue is due. A slow machine shows slow motion and owes nothing.
     fn frame_is_due(&mut self) -> bool {
         let passed = self.counted.elapsed().as_secs_f64();
@@ -463,6 +498,7 @@ impl Open {
             self.due = 0.0;
             return false;
         }
+        self.practice.timing.running += passed;
         let frame = self.practice.timing.simulated;
         self.due = (self.due + passed * self.choices.pace).min(2.0 * frame);
         let due = self.due >= frame;
@@ -474,11 +510,20 @@ impl Open {
 
     /// Draws a picture, and computes the frame of the tissue that is due beside it.
     fn picture(&mut self, reference: &[ReferenceCurve]) -> Result<Wishes> {
-        self.next = Instant::now() + Duration::from_secs_f64(PICTURE);
+        let begin = Instant::now();
+        self.next = begin + Duration::from_secs_f64(PICTURE);
         let due = self.frame_is_due();
         if due {
             self.start()?;
         }
+        // Tissue that lags behind goes first, as long as the eye does not see it.
+        let late = self.due >= self.practice.timing.simulated;
+        if due && late && self.shown.elapsed().as_secs_f64() < SLOWEST_PICTURE {
+            self.next = begin;
+            self.finish()?;
+            return Ok(Wishes::default());
+        }
+        self.shown = begin;
         let mut wishes = Wishes::default();
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let panels = self.panels_are_due().then(|| self.run_panels(reference, &mut wishes));
@@ -503,11 +548,7 @@ impl Open {
             self.start()?;
         }
         if due || wishes.step {
-            let hand: &mut dyn InputDevice = match &mut self.recording {
-                Some(recording) => recording,
-                None => &mut self.desk,
-            };
-            self.practice.finish(hand)?;
+            self.finish()?;
         }
         if let Some(shown) = shown {
             self.window.pre_present_notify();
@@ -524,11 +565,29 @@ impl Open {
 
     /// Gives the device the next frame.
     fn start(&mut self) -> Result<()> {
+        if let Some(session) = &self.recorded
+            && self.practice.follow(session)? == Renewed::Buffers
+        {
+            self.take_buffers()?;
+        }
         let hand: &mut dyn InputDevice = match &mut self.recording {
             Some(recording) => recording,
             None => &mut self.desk,
         };
         self.practice.start(hand)
+    }
+
+    /// Waits for the frame that was given.
+    fn finish(&mut self) -> Result<()> {
+        let inputs = self.practice.latency.count;
+        let hand: &mut dyn InputDevice = match &mut self.recording {
+            Some(recording) => recording,
+            None => &mut self.desk,
+        };
+        self.practice.finish(hand)?;
+        // The force that answers an input is read at once.
+        self.stale |= self.practice.latency.count > inputs;
+        Ok(())
     }
 
     /// Filling the panels takes a software adapter longer than drawing the tissue.

@@ -1,5 +1,7 @@
 //! What leads the needle: mouse and keyboard, or any other device behind the same trait.
 
+use std::time::Instant;
+
 use glam::DVec3;
 
 use crate::scene::motion::HandPose;
@@ -11,6 +13,11 @@ pub trait InputDevice {
 
     /// Where the needle shall be `duration` [s] after it was at `now`. Called once per simulated frame.
     fn pose(&mut self, now: &HandPose, duration: f64) -> HandPose;
+
+    /// When the oldest input came that no pose has had yet; forgets it.
+    fn fresh_input(&mut self) -> Option<Instant> {
+        None
+    }
 
     /// Mean force of the tissue on the needle over the last frame [N]: along the axis, positive against an insertion, and aside.
     fn feel(&mut self, _axial: f64, _lateral: DVec3) {}
@@ -25,24 +32,35 @@ pub struct Desk {
     withdraw: bool,
     /// Way that wheel and drags still ask for [m].
     asked: f64,
+    /// Oldest input that no pose has had yet.
+    fresh: Option<Instant>,
 }
 
 impl Desk {
     pub fn new(speed: f64) -> Self {
-        Desk { speed, advance: false, withdraw: false, asked: 0.0 }
+        Desk { speed, advance: false, withdraw: false, asked: 0.0, fresh: None }
     }
 
     pub fn hold_advance(&mut self, held: bool) {
         self.advance = held;
+        self.touched();
     }
 
     pub fn hold_withdraw(&mut self, held: bool) {
         self.withdraw = held;
+        self.touched();
     }
 
     /// Asks for a way along the needle [m].
     pub fn ask(&mut self, way: f64) {
         self.asked += way;
+        if way != 0.0 {
+            self.touched();
+        }
+    }
+
+    fn touched(&mut self) {
+        self.fresh.get_or_insert_with(Instant::now);
     }
 
     /// Lets go of everything: the window has lost the keyboard.
@@ -54,6 +72,10 @@ impl Desk {
 impl InputDevice for Desk {
     fn name(&self) -> &str {
         "mouse and keyboard"
+    }
+
+    fn fresh_input(&mut self) -> Option<Instant> {
+        self.fresh.take()
     }
 
     fn pose(&mut self, now: &HandPose, duration: f64) -> HandPose {

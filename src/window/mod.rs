@@ -6,6 +6,7 @@
 
 pub mod app;
 pub mod camera;
+pub mod effects_panel;
 pub mod hand;
 pub mod panels;
 pub mod practice;
@@ -13,6 +14,7 @@ pub mod scene_view;
 pub mod section;
 pub mod texts;
 pub mod tool_shape;
+pub mod tuning;
 
 use std::path::PathBuf;
 

@@ -98,6 +98,10 @@ pub fn controls(
         }
         ui.small(texts::KEYS);
     }
+    egui::CollapsingHeader::new(texts::EFFECTS).show(ui, |ui| {
+        let (scene, tuning) = practice.tunable();
+        super::effects_panel::effects(ui, scene, tuning);
+    });
     ui.separator();
     egui::ComboBox::from_label(texts::FIELD).selected_text(choices.scale.field.name()).show_ui(ui, |ui| {
         for field in Field::ALL {
@@ -234,6 +238,9 @@ pub fn readings(ui: &mut egui::Ui, practice: &Practice, choices: &mut Choices, r
         row(texts::PHYSICS, format!("{:.1} ms", practice.timing.physics * 1e3));
         row(texts::REAL_TIME, format!("{:.2}", practice.timing.real_time_factor()));
         if practice.leader == Leader::Hand {
+            let latency = practice.latency;
+            let told = format!("{} frame(s), {:.0} ms", latency.most_frames, latency.mean * 1e3);
+            row(texts::LATENCY, if latency.count > 0 { told } else { "-".into() });
             row(texts::TOO_FAST, format!("{}", practice.limited_frames));
         }
     });

@@ -9,12 +9,13 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::hand::InputDevice;
+use super::tuning::{Source, Taken, Tuning};
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::{DrivenFace, OutputFolder, Tables};
 use crate::scene::Scene;
 use crate::scene::motion::HandPose;
-use crate::session::Session;
+use crate::session::{SceneChange, Session};
 use crate::solver::simulation::{Purpose, Simulation, tool_mach};
 use crate::training::kinematic::Sample;
 use crate::training::score::Score;
@@ -37,6 +38,18 @@ pub enum Leader {
     Script,
 }
 
+/// What a change has left behind for those who draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Renewed {
+    Nothing,
+    /// The buffers are those of before.
+    Constants,
+    /// The buffers of the engine are new, the mesh is the same.
+    Buffers,
+    /// Everything is new.
+    Attempt,
+}
+
 /// What the insertion is doing.
 #[derive(Debug, Clone, PartialEq)]
 pub enum State {
@@ -57,12 +70,41 @@ pub struct Timing {
     pub physics: f64,
     /// Wall time from one drawn frame to the next, smoothed.
     pub between: f64,
+    /// Wall time for which the run has been on, and what was simulated in it.
+    pub running: f64,
+    pub done: f64,
+}
+
+/// How long inputs took until the hand felt them.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Latency {
+    /// Inputs that were measured.
+    pub count: u64,
+    /// Frames of the tissue that ended between an input and its force, the frame that has it included; most of all.
+    pub most_frames: u64,
+    /// Wall time, mean and longest [s].
+    pub mean: f64,
+    pub longest: f64,
+}
+
+impl Latency {
+    fn add(&mut self, frames: u64, time: f64) {
+        self.count += 1;
+        self.most_frames = self.most_frames.max(frames);
+        self.mean += (time - self.mean) / self.count as f64;
+        self.longest = self.longest.max(time);
+    }
 }
 
 impl Timing {
     /// Takes a wall time into a mean over about ten frames.
     fn smooth(mean: &mut f64, value: f64) {
         *mean = if *mean == 0.0 { value } else { 0.9 * *mean + 0.1 * value };
+    }
+
+    /// Simulated over wall time while the run was on.
+    pub fn achieved(&self) -> f64 {
+        if self.running > 0.0 { self.done / self.running } else { 0.0 }
     }
 
     /// Simulated time over wall time that the physics alone would reach.
@@ -75,6 +117,17 @@ impl Timing {
     }
 }
 
+fn purpose(leader: Leader) -> Purpose {
+    Purpose { led: leader == Leader::Hand, drawn: true }
+}
+
+/// Largest speed of a hand that is let through [m/s].
+fn speed_limit(simulation: &Simulation) -> f64 {
+    let script = simulation.model.scene.motion.largest_speed();
+    let wave = tool_mach(&simulation.model).map(|mach| script / mach);
+    wave.map_or(f64::INFINITY, |wave| LARGEST_MACH * wave).max(script)
+}
+
 /// Where an attempt is written to.
 struct Written {
     folder: OutputFolder,
@@ -84,7 +137,6 @@ struct Written {
 /// One attempt.
 pub struct Practice {
     scene: Scene,
-    overrides: Vec<String>,
     gpu: Gpu,
     out: Option<PathBuf>,
     /// Number of this attempt since the window was opened, from 1.
@@ -93,6 +145,7 @@ pub struct Practice {
     pub simulation: Simulation,
     pub leader: Leader,
     pub state: State,
+    pub tuning: Tuning,
     pub records: Vec<FrameRecord>,
     pub session: Session,
     pub timing: Timing,
@@ -101,6 +154,9 @@ pub struct Practice {
     /// Frames in which the hand was faster.
     pub limited_frames: u64,
     started: Option<Instant>,
+    /// Input that the frame under way has, with the frames that had ended when it came.
+    fresh: Option<(Instant, u64)>,
+    pub latency: Latency,
     last_drawn: Option<Instant>,
 }
 
@@ -111,7 +167,7 @@ impl Practice {
     /// As [`Simulation::for_purpose`]; `Error::Input` for a scene without a tool.
     pub fn new(
         scene: Scene,
-        overrides: Vec<String>,
+        source: Source,
         gpu: Gpu,
         leader: Leader,
         out: Option<&Path>,
@@ -123,9 +179,21 @@ impl Practice {
                 "take a scene with a needle, e.g. scenes/muscle_biopsy.toml, or run this one with `stylet run`",
             ));
         }
-        let purpose = Purpose { led: leader == Leader::Hand, drawn: true };
-        let mut simulation = Simulation::for_purpose(scene.clone(), Some(gpu.clone()), purpose)?;
-        let session = Session::new(&scene, &overrides, simulation.engine().info());
+        let simulation = Simulation::for_purpose(scene.clone(), Some(gpu.clone()), purpose(leader))?;
+        Self::with(simulation, scene, source, gpu, leader, out, force)
+    }
+
+    /// The same with a simulation at its beginning.
+    fn with(
+        mut simulation: Simulation,
+        scene: Scene,
+        source: Source,
+        gpu: Gpu,
+        leader: Leader,
+        out: Option<&Path>,
+        force: bool,
+    ) -> Result<Self> {
+        let session = Session::new(&scene, &source.overrides, simulation.engine().info());
         let written = match out {
             None => None,
             Some(out) => {
@@ -135,11 +203,10 @@ impl Practice {
                 Some(Written { folder, tables })
             }
         };
-        let wave = tool_mach(&simulation.model).map(|mach| scene.motion.largest_speed() / mach);
-        let speed_limit = wave.map_or(f64::INFINITY, |wave| LARGEST_MACH * wave).max(scene.motion.largest_speed());
+        let speed_limit = speed_limit(&simulation);
         let simulated = simulation.steps_per_frame() as f64 * simulation.dt();
         Ok(Practice {
-            overrides,
+            tuning: Tuning::new(source),
             gpu,
             out: out.map(Path::to_path_buf),
             attempt: 1,
@@ -153,6 +220,8 @@ impl Practice {
             speed_limit,
             limited_frames: 0,
             started: None,
+            fresh: None,
+            latency: Latency::default(),
             last_drawn: None,
             scene,
         })
@@ -164,7 +233,14 @@ impl Practice {
     /// As [`Practice::new`].
     pub fn again(&mut self, leader: Leader) -> Result<()> {
         self.save()?;
-        let (scene, overrides, gpu) = (self.scene.clone(), self.overrides.clone(), self.gpu.clone());
+        let (scene, source, gpu) = (self.scene.clone(), self.tuning.source.clone(), self.gpu.clone());
+        let simulation = Simulation::for_purpose(scene.clone(), Some(gpu.clone()), purpose(leader))?;
+        self.begin(simulation, scene, source, leader)
+    }
+
+    /// Begins with a simulation at its beginning.
+    fn begin(&mut self, simulation: Simulation, scene: Scene, source: Source, leader: Leader) -> Result<()> {
+        let gpu = self.gpu.clone();
         let (out, attempt) = (self.out.clone(), self.attempt + u32::from(!self.records.is_empty()));
         // The attempt before keeps its folder; one without a frame leaves its place to the next.
         let folder = out.as_deref().map(|out| match attempt {
@@ -172,9 +248,65 @@ impl Practice {
             n => PathBuf::from(format!("{}_{n}", out.display())),
         });
         self.written = None;
-        let next = Practice::new(scene, overrides, gpu, leader, folder.as_deref(), true)?;
-        *self = Practice { out, attempt, ..next };
+        let next = Practice::with(simulation, scene, source, gpu, leader, folder.as_deref(), true)?;
+        *self = Practice { out, attempt, latency: self.latency, ..next };
         Ok(())
+    }
+
+    /// Makes the changes that a session made before its next frame.
+    ///
+    /// # Errors
+    /// As [`Session::change`].
+    pub fn follow(&mut self, session: &Session) -> Result<Renewed> {
+        let frame = self.session.poses.len() as u64;
+        let Some(last) = session.changes.iter().rfind(|change| change.frame == frame) else {
+            return Ok(Renewed::Nothing);
+        };
+        session.change(&mut self.simulation, frame)?;
+        self.tuning.source.overrides.clone_from(&last.overrides);
+        self.session.changes.extend(session.changes.iter().filter(|change| change.frame == frame).cloned());
+        self.scene = self.tuning.source.scene()?;
+        self.timing.simulated = self.simulation.steps_per_frame() as f64 * self.simulation.dt();
+        Ok(Renewed::Buffers)
+    }
+
+    /// Takes the changes that are ready; call it between frames.
+    ///
+    /// # Errors
+    /// What befalls the engine, and what the folder of a new attempt cannot take.
+    pub fn take_changes(&mut self) -> Result<Renewed> {
+        let taken = match self.tuning.take(&mut self.simulation, &self.gpu, purpose(self.leader)) {
+            Ok(taken) => taken,
+            Err(error @ (Error::Diverged { .. } | Error::Device(_))) => {
+                self.state = State::Stopped(error.to_string());
+                return Ok(Renewed::Nothing);
+            }
+            Err(error) => return Err(error),
+        };
+        let renewed = match taken {
+            Taken::Nothing => return Ok(Renewed::Nothing),
+            Taken::Constants => Renewed::Constants,
+            Taken::Engine => Renewed::Buffers,
+            Taken::Simulation(source, simulation) => {
+                self.save()?;
+                let (leader, pace) = (self.leader, self.tuning.last);
+                self.begin(*simulation, source.scene()?, source, leader)?;
+                self.tuning.last = pace;
+                return Ok(Renewed::Attempt);
+            }
+        };
+        // The session says which frame is the first that has it.
+        let frame = self.session.poses.len() as u64;
+        self.session.changes.push(SceneChange { frame, overrides: self.tuning.source.overrides.clone() });
+        self.scene = self.tuning.source.scene()?;
+        self.speed_limit = speed_limit(&self.simulation);
+        self.timing.simulated = self.simulation.steps_per_frame() as f64 * self.simulation.dt();
+        Ok(renewed)
+    }
+
+    /// The scene that runs, and what changes it.
+    pub fn tunable(&mut self) -> (&Scene, &mut Tuning) {
+        (&self.scene, &mut self.tuning)
     }
 
     pub fn scene(&self) -> &Scene {
@@ -192,6 +324,8 @@ impl Practice {
     /// `Error::Device`.
     pub fn start(&mut self, hand: &mut dyn InputDevice) -> Result<()> {
         if let Some(now) = self.simulation.hand() {
+            // Nothing is under way: what ends next has the input.
+            self.fresh = hand.fresh_input().map(|since| (since, self.records.len() as u64));
             let wanted = hand.pose(&now, self.timing.simulated);
             let pose = self.within_reach(&now, wanted);
             self.session.poses.push(pose);
@@ -222,10 +356,14 @@ impl Practice {
         match self.simulation.next_frame() {
             Ok(Some(record)) => {
                 hand.feel(record.force.axial, record.force.lateral);
+                if let Some((since, frames)) = self.fresh.take() {
+                    self.latency.add(self.records.len() as u64 + 1 - frames, since.elapsed().as_secs_f64());
+                }
                 if let Some(written) = &mut self.written {
                     written.tables.append(&record)?;
                 }
                 self.records.push(record);
+                self.timing.done += self.timing.simulated;
                 if self.records.len().is_multiple_of(SAVE_EVERY) {
                     self.save()?;
                 }

@@ -88,6 +88,8 @@ pub struct SceneView {
     tissue_bindings: wgpu::BindGroup,
     tool_bindings: wgpu::BindGroup,
     view: wgpu::Buffer,
+    table: wgpu::Buffer,
+    rest: wgpu::Buffer,
     corners: (wgpu::Buffer, u32),
     tool_corners: (wgpu::Buffer, u32),
     outline: Outline,
@@ -181,23 +183,9 @@ impl SceneView {
             })
             .collect();
         let rest = filled("node_rest", bytemuck::cast_slice(&rest), wgpu::BufferUsages::STORAGE);
-        let of_engine = |name: &str| {
-            engine.buffer(name).ok_or_else(|| Error::Device(format!("the engine was not made to be drawn: no {name}")))
-        };
-        let (displacement, fields) = (of_engine("node_displacement")?, of_engine("drawn_nodes")?);
-        let bindings = |pipeline: &wgpu::RenderPipeline, buffers: &[&wgpu::Buffer]| {
-            let entries: Vec<wgpu::BindGroupEntry> = (0..)
-                .zip(buffers)
-                .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-                .collect();
-            device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout: &pipeline.get_bind_group_layout(0),
-                entries: &entries,
-            })
-        };
-        let tissue_bindings = bindings(&tissue, &[&view, &table, displacement, &rest, fields]);
-        let tool_bindings = bindings(&tool, &[&view]);
+        let [displacement, fields] = drawn_buffers(engine)?;
+        let tissue_bindings = bindings(device, &tissue, &[&view, &table, displacement, &rest, fields]);
+        let tool_bindings = bindings(device, &tool, &[&view]);
         let nothing = || {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: None,
@@ -217,12 +205,25 @@ impl SceneView {
             tissue_bindings,
             tool_bindings,
             view,
+            table,
+            rest,
         };
         drawing.cut(gpu, mesh, None);
         if let Some(error) = pollster::block_on(scope.pop()) {
             return Err(Error::Device(format!("drawing of the tissue: {error}")));
         }
         Ok(drawing)
+    }
+
+    /// Draws from another engine of the same mesh.
+    ///
+    /// # Errors
+    /// `Error::Device` where it was not made to be drawn.
+    pub fn take_buffers(&mut self, gpu: &Gpu, engine: &GpuEngine) -> Result<()> {
+        let [displacement, fields] = drawn_buffers(engine)?;
+        let buffers = [&self.view, &self.table, displacement, &self.rest, fields];
+        self.tissue_bindings = bindings(&gpu.device, &self.tissue, &buffers);
+        Ok(())
     }
 
     /// Takes away what lies beyond a plane.
@@ -308,6 +309,27 @@ impl SceneView {
             }
         }
     }
+}
+
+/// Displacements and fields of an engine that was made to be drawn.
+fn drawn_buffers(engine: &GpuEngine) -> Result<[&wgpu::Buffer; 2]> {
+    let of_engine = |name: &str| {
+        engine.buffer(name).ok_or_else(|| Error::Device(format!("the engine was not made to be drawn: no {name}")))
+    };
+    Ok([of_engine("node_displacement")?, of_engine("drawn_nodes")?])
+}
+
+/// Binds buffers in the order of the shader.
+fn bindings(device: &wgpu::Device, pipeline: &wgpu::RenderPipeline, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
+    let entries: Vec<wgpu::BindGroupEntry> = (0..)
+        .zip(buffers)
+        .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+        .collect();
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &entries,
+    })
 }
 
 /// Corners in a buffer of the device, and how many.

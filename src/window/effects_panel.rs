@@ -1,0 +1,105 @@
+//! Effects with a switch each, and a slider for every number of those that are on.
+
+use super::texts;
+use super::tuning::{Pace, Tuning};
+use crate::effects::parameter::Parameter;
+use crate::effects::{EFFECTS, Effect};
+use crate::scene::Scene;
+use crate::solver::change::Reach;
+
+/// Width of a slider, in points.
+const SLIDER: f32 = 96.0;
+
+/// Draws the switches and sliders of `scene`, which runs; what the user wants goes to `tuning`.
+pub fn effects(ui: &mut egui::Ui, scene: &Scene, tuning: &mut Tuning) {
+    ui.spacing_mut().slider_width = SLIDER;
+    let on = scene.effects.keys();
+    let mut wishes = Vec::new();
+    // A switch shows what runs; until a change has come there is no other to make.
+    ui.add_enabled_ui(!tuning.is_busy(), |ui| {
+        for effect in &EFFECTS {
+            let was = on.contains(&effect.key);
+            let mut is = was;
+            ui.checkbox(&mut is, effect.key.replace('_', " ")).on_hover_text(told(effect));
+            if is != was {
+                wishes.push(switched(&on, effect.key, is));
+            }
+            if was && !effect.parameters.is_empty() {
+                egui::CollapsingHeader::new(texts::NUMBERS).id_salt(effect.key).show(ui, |ui| {
+                    for parameter in effect.parameters {
+                        sliders(ui, scene, parameter, &mut wishes);
+                    }
+                });
+            }
+        }
+    });
+    if !wishes.is_empty() {
+        tuning.wish(&wishes);
+    }
+    if let Some(refusal) = &tuning.refusal {
+        ui.colored_label(ui.visuals().error_fg_color, refusal);
+    }
+    ui.small(match (tuning.is_busy(), tuning.last) {
+        (true, _) => texts::CHANGING.into(),
+        (false, Some(pace)) => paced(pace),
+        (false, None) => texts::UNCHANGED.to_string(),
+    });
+}
+
+/// One slider per component.
+fn sliders(ui: &mut egui::Ui, scene: &Scene, parameter: &Parameter, wishes: &mut Vec<String>) {
+    let [low, high] = parameter.range;
+    for (index, value) in parameter.values(scene).into_iter().enumerate() {
+        let mut wanted = value;
+        let unit = if parameter.unit == "-" { String::new() } else { format!(" {}", parameter.unit) };
+        let slider = egui::Slider::new(&mut wanted, low..=high)
+            .logarithmic(parameter.logarithmic)
+            .clamping(egui::SliderClamping::Never)
+            .max_decimals(4)
+            .suffix(unit);
+        let slider = if parameter.unit == "count" { slider.integer() } else { slider };
+        ui.small(parameter.name);
+        if ui.add(slider).on_hover_text(format!("{}\n{}", parameter.key, parameter.source)).changed() {
+            wishes.extend(parameter.overrides(scene, index, wanted));
+        }
+    }
+}
+
+fn told(effect: &Effect) -> String {
+    format!("{}\n{}\n{}", effect.summary, effect.source, effect.cost)
+}
+
+/// The override that switches one effect.
+fn switched(on: &[&str], key: &str, is: bool) -> String {
+    let keys: Vec<&str> =
+        EFFECTS.iter().map(|e| e.key).filter(|k| if *k == key { is } else { on.contains(k) }).collect();
+    format!("effects={keys:?}")
+}
+
+fn paced(pace: Pace) -> String {
+    let what = match pace.reach {
+        Reach::Constants => texts::CHANGED_NUMBERS,
+        Reach::Kernels => texts::CHANGED_EFFECTS,
+        Reach::Start => texts::CHANGED_START,
+    };
+    format!(
+        "{what} {:.0} ms ({} {:.0} ms)",
+        1e3 * pace.whole.as_secs_f64(),
+        texts::HALTED,
+        1e3 * pace.halted.as_secs_f64()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_switch_names_all_effects_that_shall_be_on() {
+        assert_eq!(
+            switched(&["friction", "puncture"], "gravity", true),
+            r#"effects=["gravity", "puncture", "friction"]"#
+        );
+        assert_eq!(switched(&["friction", "puncture"], "friction", false), r#"effects=["puncture"]"#);
+    }
+}

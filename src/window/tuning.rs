@@ -1,0 +1,208 @@
+//! Changes of the scene while an attempt goes on: what is wanted, what is being made ready, what came of it.
+//!
+//! Numbers are in the next frame. Other effects, another mesh or another file are made ready on a thread of their own, while the old
+//! tissue goes on.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::{Duration, Instant};
+
+use crate::effects::parameter::with_overrides;
+use crate::gpu::Gpu;
+use crate::scene::Scene;
+use crate::solver::change::{Change, Reach};
+use crate::solver::engine::Engine;
+use crate::solver::simulation::{Purpose, Simulation};
+use crate::{Error, Result};
+
+/// A scene file as it was read, with what replaces its values.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Source {
+    pub path: PathBuf,
+    pub text: String,
+    pub overrides: Vec<String>,
+}
+
+impl Source {
+    /// # Errors
+    /// Those of [`Scene::load`], for a file that cannot be read too.
+    pub fn read(path: PathBuf, overrides: Vec<String>) -> Result<(Self, Scene)> {
+        let scene = Scene::load(&path, &overrides)?;
+        let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
+        Ok((Source { path, text, overrides }, scene))
+    }
+
+    /// # Errors
+    /// Those of [`Scene::parse`].
+    pub fn scene(&self) -> Result<Scene> {
+        Scene::parse(&self.path, &self.text, &self.overrides)
+    }
+
+    /// The same with more overrides.
+    pub fn with(&self, more: &[String]) -> Self {
+        Source { overrides: with_overrides(&self.overrides, more), ..self.clone() }
+    }
+}
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq)]
+struct Wanted {
+    source: Source,
+    /// At least this, even where nothing seems to have changed.
+    least: Reach,
+}
+
+/// What a thread makes ready.
+enum Made {
+    Engine(Box<dyn Engine>),
+    Simulation(Box<Simulation>),
+}
+
+struct Job {
+    source: Source,
+    change: Arc<Change>,
+    made: Receiver<Result<Made>>,
+    since: Instant,
+}
+
+/// What has taken the place of what was there.
+pub enum Taken {
+    Nothing,
+    /// The buffers are the same.
+    Constants,
+    /// The buffers are new.
+    Engine,
+    /// A simulation at its beginning.
+    Simulation(Source, Box<Simulation>),
+}
+
+/// How the last change went: for people who watch frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    pub reach: Reach,
+    /// From the wish to the frame that has it.
+    pub whole: Duration,
+    /// For which no frame could run.
+    pub halted: Duration,
+}
+
+/// The changes of one window.
+pub struct Tuning {
+    /// What runs.
+    pub source: Source,
+    wanted: Option<(Wanted, Instant)>,
+    job: Option<Job>,
+    /// Why the last wish could not be granted.
+    pub refusal: Option<String>,
+    pub last: Option<Pace>,
+}
+
+impl Tuning {
+    pub fn new(source: Source) -> Self {
+        Tuning { source, wanted: None, job: None, refusal: None, last: None }
+    }
+
+    /// Overrides as they will be when everything wanted has come.
+    pub fn coming(&self) -> &Source {
+        match (&self.wanted, &self.job) {
+            (Some((wanted, _)), _) => &wanted.source,
+            (None, Some(job)) => &job.source,
+            (None, None) => &self.source,
+        }
+    }
+
+    /// True while something is being made ready.
+    pub fn is_busy(&self) -> bool {
+        self.job.is_some()
+    }
+
+    /// Asks for more overrides.
+    pub fn wish(&mut self, more: &[String]) {
+        self.wish_for(self.coming().with(more), Reach::Constants);
+    }
+
+    /// Asks for another scene text, or for what is there to be made anew.
+    pub fn wish_for(&mut self, source: Source, least: Reach) {
+        let since = self.wanted.take().map_or_else(Instant::now, |(_, since)| since);
+        self.wanted = Some((Wanted { source, least }, since));
+    }
+
+    /// Takes what is ready; call it between frames.
+    ///
+    /// # Errors
+    /// What befalls the running engine. A wish that cannot be granted is a refusal.
+    pub fn take(&mut self, simulation: &mut Simulation, gpu: &Gpu, purpose: Purpose) -> Result<Taken> {
+        if let Some(job) = &self.job {
+            match job.made.try_recv() {
+                Err(TryRecvError::Empty) => return Ok(Taken::Nothing),
+                Err(TryRecvError::Disconnected) => self.refuse(Error::Device("the change could not be made".into())),
+                Ok(Err(error)) => self.refuse(error),
+                Ok(Ok(made)) => return self.arrived(made, simulation),
+            }
+        }
+        let Some((wanted, since)) = self.wanted.take() else { return Ok(Taken::Nothing) };
+        let begin = Instant::now();
+        let scene = match wanted.source.scene() {
+            Ok(scene) => scene,
+            Err(error) => {
+                self.refuse(error);
+                return Ok(Taken::Nothing);
+            }
+        };
+        let change = match simulation.plan_change(scene.clone()) {
+            Ok(change) => change,
+            Err(error) => {
+                self.refuse(error);
+                return Ok(Taken::Nothing);
+            }
+        };
+        let reach = match (wanted.least, change.reach) {
+            (Reach::Start, _) | (_, Reach::Start) => Reach::Start,
+            (Reach::Kernels, _) | (_, Reach::Kernels) => Reach::Kernels,
+            _ => Reach::Constants,
+        };
+        if reach == Reach::Constants && simulation.retune(&change)? {
+            self.refusal = None;
+            self.source = wanted.source;
+            self.last = Some(Pace { reach, whole: since.elapsed(), halted: begin.elapsed() });
+            return Ok(Taken::Constants);
+        }
+        let (sender, made) = channel();
+        let change = Arc::new(change);
+        let (shared, gpu) = (change.clone(), gpu.clone());
+        std::thread::spawn(move || {
+            let result = match reach {
+                Reach::Start => {
+                    Simulation::for_purpose(scene, Some(gpu), purpose).map(|s| Made::Simulation(Box::new(s)))
+                }
+                _ => shared.engine().map(Made::Engine),
+            };
+            // Nobody waits any more where the window was closed.
+            let _ = sender.send(result);
+        });
+        self.job = Some(Job { source: wanted.source, change, made, since });
+        Ok(Taken::Nothing)
+    }
+
+    fn arrived(&mut self, made: Made, simulation: &mut Simulation) -> Result<Taken> {
+        let Some(job) = self.job.take() else { return Ok(Taken::Nothing) };
+        let begin = Instant::now();
+        self.refusal = None;
+        let (taken, reach) = match made {
+            Made::Engine(engine) => {
+                simulation.adopt(&job.change, engine)?;
+                self.source = job.source;
+                (Taken::Engine, Reach::Kernels)
+            }
+            Made::Simulation(next) => (Taken::Simulation(job.source, next), Reach::Start),
+        };
+        self.last = Some(Pace { reach, whole: job.since.elapsed(), halted: begin.elapsed() });
+        Ok(taken)
+    }
+
+    fn refuse(&mut self, error: Error) {
+        self.job = None;
+        self.refusal = Some(error.to_string());
+    }
+}
