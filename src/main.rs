@@ -137,6 +137,9 @@ struct ViewArgs {
     /// Folder of the trainees' attempts
     #[arg(long, value_name = "FOLDER", default_value = "history")]
     history: PathBuf,
+    /// Take the shaders from this folder, and again whenever they change
+    #[arg(long, value_name = "FOLDER")]
+    shaders: Option<PathBuf>,
     /// Size of the window in points
     #[arg(long, value_names = ["WIDTH", "HEIGHT"], num_args = 2)]
     size: Option<Vec<u32>>,
@@ -552,6 +555,7 @@ fn view(args: ViewArgs, start: Instant) -> Result<String> {
         reference: args.reference,
         trainee: args.trainee,
         history: args.history,
+        shaders: args.shaders,
         size: args.size.and_then(|size| Some([*size.first()?, *size.get(1)?])),
     };
     let seen = stylet::window::view(&options, start)?;

@@ -4,6 +4,8 @@
 //! Compiler messages are mapped back to file and line.
 
 use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::{PoisonError, RwLock};
 
 use crate::error::{Error, Result};
 
@@ -126,9 +128,40 @@ impl Composed {
     }
 }
 
+/// Sources that stand in for the built-in ones, for somebody who works on them.
+static EDITED: RwLock<Vec<(&'static str, String)>> = RwLock::new(Vec::new());
+
+/// Takes the sources from a folder like `shaders/` from now on; a file that it lacks stays the built-in one.
+///
+/// # Errors
+/// `Error::Input` for a folder that holds none of them.
+pub fn read_sources(folder: &Path) -> Result<()> {
+    let read =
+        |name: &'static str| Some((name, std::fs::read_to_string(folder.join(name).with_extension("wgsl")).ok()?));
+    let found: Vec<(&'static str, String)> = SOURCES.iter().filter_map(|(name, _)| read(name)).collect();
+    if found.is_empty() {
+        return Err(Error::input(
+            format!("{}: there is no shader of this program in it", folder.display()),
+            "give the folder shaders/ of the sources, which holds stages/element_forces.wgsl",
+        ));
+    }
+    *EDITED.write().unwrap_or_else(PoisonError::into_inner) = found;
+    Ok(())
+}
+
 /// Composes the file `root` (path under `shaders/`, no extension) with the given defines.
 pub fn compose(root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed> {
-    compose_from(SOURCES, root, defines)
+    let edited = EDITED.read().unwrap_or_else(PoisonError::into_inner);
+    if edited.is_empty() {
+        return compose_from(SOURCES, root, defines);
+    }
+    let text = |(name, text): &(&'static str, &'static str)| {
+        let own = edited.iter().find(|(other, _)| other == name);
+        (*name, own.map_or(*text, |(_, own)| own.as_str()).to_string())
+    };
+    let files: Vec<(&'static str, String)> = SOURCES.iter().map(text).collect();
+    let files: Vec<(&'static str, &str)> = files.iter().map(|(name, text)| (*name, text.as_str())).collect();
+    compose_from(&files, root, defines)
 }
 
 /// The same from sources in which no effect was ever written: their files and their `#ifdef` blocks are taken out

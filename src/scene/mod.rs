@@ -5,6 +5,7 @@
 
 mod convert;
 pub(crate) mod document;
+pub mod edit;
 pub mod file;
 pub mod motion;
 pub mod presets;

@@ -1,6 +1,6 @@
 //! The window itself: events in, pictures out, one device for tissue and drawing.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -22,9 +22,12 @@ use super::section::RestPlane;
 use super::texts;
 use super::tool_shape::{self, ToolPlace};
 use super::tuning::Source;
+use super::watch::Watch;
 use crate::gpu::Gpu;
+use crate::gpu::compose::{SOURCES, read_sources};
 use crate::scene::Scene;
 use crate::session::Session;
+use crate::solver::change::Reach;
 use crate::training::history::{History, progress};
 use crate::training::score::Score;
 use crate::{Error, Result};
@@ -83,6 +86,9 @@ pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome
             (source, scene, Some(session))
         }
     };
+    if let Some(folder) = &options.shaders {
+        read_sources(folder)?;
+    }
     for notice in &scene.notices {
         eprintln!("note: {notice}");
     }
@@ -197,6 +203,9 @@ struct Open {
     scale: f32,
     /// The panels are drawn on the next picture.
     stale: bool,
+    /// Scene and shaders, to be read anew when they change.
+    scene_file: Watch,
+    shader_files: Watch,
     /// Ctrl is held.
     control: bool,
     /// What the attempt was worth, with those before it, while that is shown.
@@ -358,6 +367,8 @@ impl App {
             area: egui::Rect::NOTHING,
             scale: 1.0,
             stale: true,
+            scene_file: Watch::new([self.source.path.clone()]),
+            shader_files: Watch::new(self.options.shaders.iter().flat_map(|folder| shader_files(folder))),
             control: false,
             debriefing: None,
         };
@@ -397,6 +408,7 @@ impl App {
             open.practice.again(leader)?;
             open.rebind()?;
         }
+        open.read_anew(self.options.shaders.as_deref());
         match open.practice.take_changes()? {
             Renewed::Nothing | Renewed::Constants => {}
             Renewed::Buffers => open.take_buffers()?,
@@ -480,6 +492,25 @@ impl Open {
         self.cut();
         self.due = 0.0;
         Ok(())
+    }
+
+    /// Asks for what somebody has written into the files meanwhile.
+    fn read_anew(&mut self, shaders: Option<&Path>) {
+        let tuning = &mut self.practice.tuning;
+        if self.recorded.is_none() && self.scene_file.has_changed() {
+            match std::fs::read_to_string(&tuning.source.path) {
+                Ok(text) => tuning.wish_for(Source { text, ..tuning.coming().clone() }, Reach::Start),
+                Err(error) => tuning.refusal = Some(Error::file(&tuning.source.path, error).to_string()),
+            }
+        }
+        if let Some(folder) = shaders
+            && self.shader_files.has_changed()
+        {
+            match read_sources(folder) {
+                Ok(()) => tuning.wish_for(tuning.coming().clone(), Reach::Kernels),
+                Err(error) => tuning.refusal = Some(error.to_string()),
+            }
+        }
     }
 
     /// After a change of effects: the engine is new, the mesh and all that is drawn of it the same.
@@ -743,6 +774,11 @@ impl Open {
         }
         crate::render::write_png(path, &pixels, size.width, size.height)
     }
+}
+
+/// The shaders of a folder.
+fn shader_files(folder: &Path) -> Vec<PathBuf> {
+    SOURCES.iter().map(|(name, _)| folder.join(name).with_extension("wgsl")).collect()
 }
 
 /// A texture as large as the window.

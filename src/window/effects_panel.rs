@@ -46,6 +46,25 @@ pub fn effects(ui: &mut egui::Ui, scene: &Scene, tuning: &mut Tuning) {
     });
 }
 
+/// Saves the scene that runs under a name, and goes back to the one that was opened.
+pub fn saving(ui: &mut egui::Ui, tuning: &mut Tuning, name: &mut String) {
+    if name.is_empty() {
+        *name = tuning.source.path.with_extension("tuned.toml").display().to_string();
+    }
+    ui.add(egui::TextEdit::singleline(name).desired_width(f32::INFINITY));
+    ui.horizontal(|ui| {
+        if ui.button(texts::SAVE_SCENE).clicked() {
+            tuning.save(std::path::Path::new(name.as_str()));
+        }
+        if ui.add_enabled(tuning.is_changed() && !tuning.is_busy(), egui::Button::new(texts::AS_IN_FILE)).clicked() {
+            tuning.go_back();
+        }
+    });
+    if let Some(saved) = &tuning.saved {
+        ui.small(format!("{} {}", texts::SAVED, saved.display()));
+    }
+}
+
 /// One slider per component.
 fn sliders(ui: &mut egui::Ui, scene: &Scene, parameter: &Parameter, wishes: &mut Vec<String>) {
     let [low, high] = parameter.range;

@@ -4,6 +4,7 @@
 //! [`camera`] say what is drawn, [`scene_view`] draws it from the solver's own buffers, [`panels`] stand around it, [`app`] is the
 //! window itself. The window owns no physics: it sends poses and reads records.
 
+pub mod accuracy;
 pub mod app;
 pub mod camera;
 pub mod effects_panel;
@@ -15,6 +16,7 @@ pub mod section;
 pub mod texts;
 pub mod tool_shape;
 pub mod tuning;
+pub mod watch;
 
 use std::path::PathBuf;
 
@@ -43,4 +45,6 @@ pub struct ViewOptions {
     pub history: PathBuf,
     /// Size of the window in points.
     pub size: Option<[u32; 2]>,
+    /// Folder whose shaders stand in for the built-in ones, and are read anew when they change.
+    pub shaders: Option<PathBuf>,
 }

@@ -2,6 +2,7 @@
 
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
+use super::accuracy::Accuracy;
 use super::camera::{Camera, Preset};
 use super::hand::Desk;
 use super::practice::{Leader, Practice, State};
@@ -11,7 +12,6 @@ use crate::observables::ForceParts;
 use crate::training::score::Score;
 
 /// What the user has chosen.
-#[derive(Debug, Clone, PartialEq)]
 pub struct Choices {
     pub scale: Scale,
     /// Ends of the scale follow the largest value seen.
@@ -21,6 +21,10 @@ pub struct Choices {
     /// Simulated time over wall time that is aimed at.
     pub pace: f64,
     pub show_parts: bool,
+    /// File that the scene is saved as; empty: beside the one that runs.
+    pub save_as: String,
+    /// Made when it is looked at first.
+    pub accuracy: Option<Accuracy>,
 }
 
 impl Choices {
@@ -31,6 +35,8 @@ impl Choices {
             cut,
             pace: 1.0,
             show_parts: false,
+            save_as: String::new(),
+            accuracy: None,
         }
     }
 }
@@ -101,6 +107,13 @@ pub fn controls(
     egui::CollapsingHeader::new(texts::EFFECTS).show(ui, |ui| {
         let (scene, tuning) = practice.tunable();
         super::effects_panel::effects(ui, scene, tuning);
+        super::effects_panel::saving(ui, tuning, &mut choices.save_as);
+    });
+    egui::CollapsingHeader::new(texts::ACCURACY).show(ui, |ui| {
+        let now = (practice.simulation.model.mesh.cell_count() as u64, practice.simulation.steps_per_frame());
+        let timing = practice.timing;
+        let (scene, tuning) = practice.tunable();
+        choices.accuracy.get_or_insert_with(|| Accuracy::new(scene)).show(ui, scene, tuning, &timing, now);
     });
     ui.separator();
     egui::ComboBox::from_label(texts::FIELD).selected_text(choices.scale.field.name()).show_ui(ui, |ui| {

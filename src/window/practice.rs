@@ -248,7 +248,10 @@ impl Practice {
             n => PathBuf::from(format!("{}_{n}", out.display())),
         });
         self.written = None;
-        let next = Practice::with(simulation, scene, source, gpu, leader, folder.as_deref(), true)?;
+        // What the window was opened with stays what one goes back to.
+        let first = self.tuning.opened_with();
+        let mut next = Practice::with(simulation, scene, source, gpu, leader, folder.as_deref(), true)?;
+        next.tuning.set_opened_with(first);
         *self = Practice { out, attempt, latency: self.latency, ..next };
         Ok(())
     }

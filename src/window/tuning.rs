@@ -3,7 +3,7 @@
 //! Numbers are in the next frame. Other effects, another mesh or another file are made ready on a thread of their own, while the old
 //! tissue goes on.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
@@ -91,6 +91,10 @@ pub struct Pace {
 pub struct Tuning {
     /// What runs.
     pub source: Source,
+    /// Overrides that the window was opened with.
+    first: Vec<String>,
+    /// Where the scene was saved last.
+    pub saved: Option<PathBuf>,
     wanted: Option<(Wanted, Instant)>,
     job: Option<Job>,
     /// Why the last wish could not be granted.
@@ -100,7 +104,15 @@ pub struct Tuning {
 
 impl Tuning {
     pub fn new(source: Source) -> Self {
-        Tuning { source, wanted: None, job: None, refusal: None, last: None }
+        Tuning {
+            first: source.overrides.clone(),
+            saved: None,
+            source,
+            wanted: None,
+            job: None,
+            refusal: None,
+            last: None,
+        }
     }
 
     /// Overrides as they will be when everything wanted has come.
@@ -120,6 +132,43 @@ impl Tuning {
     /// Asks for more overrides.
     pub fn wish(&mut self, more: &[String]) {
         self.wish_for(self.coming().with(more), Reach::Constants);
+    }
+
+    /// Overrides that the window was opened with.
+    pub fn opened_with(&self) -> Vec<String> {
+        self.first.clone()
+    }
+
+    pub fn set_opened_with(&mut self, overrides: Vec<String>) {
+        self.first = overrides;
+    }
+
+    /// True where something was changed since the window was opened.
+    pub fn is_changed(&self) -> bool {
+        self.coming().overrides != self.first
+    }
+
+    /// Asks for what the window was opened with.
+    pub fn go_back(&mut self) {
+        self.wish_for(Source { overrides: self.first.clone(), ..self.coming().clone() }, Reach::Constants);
+    }
+
+    /// Writes the scene that runs into a file of its own; a file that is there already is not touched.
+    pub fn save(&mut self, path: &Path) {
+        match self.try_save(path) {
+            Ok(()) => (self.saved, self.refusal) = (Some(path.to_path_buf()), None),
+            Err(error) => self.refusal = Some(error.to_string()),
+        }
+    }
+
+    fn try_save(&self, path: &Path) -> Result<()> {
+        if path.exists() {
+            return Err(Error::input(format!("{} is there already", path.display()), "give another name"));
+        }
+        let text = crate::scene::edit::written(&self.source.text, &self.source.overrides)?;
+        // Files that it names start from its folder: what cannot be read there is not written.
+        Scene::parse(path, &text, &[])?;
+        crate::output::whole_file::write(path, text.as_bytes())
     }
 
     /// Asks for another scene text, or for what is there to be made anew.

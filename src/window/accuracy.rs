@@ -1,0 +1,131 @@
+//! Accuracy against time: mesh and mass scaling with what they are predicted to cost, and the error where a study has measured it.
+
+use std::path::Path;
+
+use super::practice::Timing;
+use super::texts;
+use super::tuning::Tuning;
+use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::output::folder::safe_name;
+use crate::scene::Scene;
+use crate::solver::stable_dt::wave_speed_bound;
+use crate::study::Settings;
+use crate::study::advice::Candidate;
+use crate::study::analysis::Analysis;
+use crate::study::plan::{MeshSize, UnitCost};
+use crate::study::runner::predicted_factor;
+use crate::study::store::Store;
+
+/// What the sliders stand at, and what is known of it.
+pub struct Accuracy {
+    edge_mm: f64,
+    mass_scaling: f64,
+    /// Size of the mesh with an edge [mm].
+    size: Option<(f64, Result<MeshSize, String>)>,
+    /// Runs of a study of the scene, with their errors.
+    studied: Vec<Candidate>,
+}
+
+impl Accuracy {
+    /// At what the scene has.
+    pub fn new(scene: &Scene) -> Self {
+        Accuracy {
+            edge_mm: scene.tissue.cell_size * 1e3,
+            mass_scaling: scene.effects.mass_scaling.map_or(1.0, |m| m.factor),
+            size: None,
+            studied: studied(scene),
+        }
+    }
+
+    /// Draws the sliders for the scene that runs.
+    pub fn show(&mut self, ui: &mut egui::Ui, scene: &Scene, tuning: &mut Tuning, timing: &Timing, now: (u64, u64)) {
+        let base = scene.tissue.cell_size * 1e3;
+        let block = scene.mesh.is_none();
+        ui.add_enabled_ui(block, |ui| {
+            let slider = egui::Slider::new(&mut self.edge_mm, 0.3..=2.0).step_by(0.05).suffix(" mm");
+            ui.add(slider.text(texts::EDGE));
+        });
+        let slider = egui::Slider::new(&mut self.mass_scaling, 1.0..=1e5).logarithmic(true).max_decimals(0);
+        ui.add_enabled(scene.effects.mass_scaling.is_some(), slider.text(texts::MASS_SCALING));
+        if self.size.as_ref().is_none_or(|(edge, _)| *edge != self.edge_mm) {
+            self.size = Some((self.edge_mm, self.measured_size(scene)));
+        }
+        let Some((_, size)) = &self.size else { return };
+        match size {
+            Ok(size) => {
+                let factor = self.predicted(*size, scene, timing, now);
+                ui.label(format!("{} {}, {} {factor:.2}", size.cells, texts::CELLS, texts::PREDICTED));
+            }
+            Err(reason) => {
+                ui.colored_label(ui.visuals().error_fg_color, reason);
+            }
+        }
+        ui.label(self.error_in_words(scene));
+        let same_mesh = (self.edge_mm - base).abs() < 1e-9;
+        let factor = scene.effects.mass_scaling.map(|m| m.factor);
+        let same = same_mesh && factor.is_none_or(|f| (f / self.mass_scaling - 1.0).abs() < 1e-3);
+        let text = if same_mesh { texts::APPLY } else { texts::APPLY_ANEW };
+        if ui.add_enabled(!same && size.is_ok() && !tuning.is_busy(), egui::Button::new(text)).clicked() {
+            let mut wishes = Vec::new();
+            if !same_mesh {
+                wishes.push(format!("tissue.cell_size_mm={}", self.edge_mm));
+            }
+            if factor.is_some() {
+                wishes.push(format!("solver.mass_scaling={}", self.mass_scaling.round().max(1.0)));
+            }
+            tuning.wish(&wishes);
+        }
+    }
+
+    fn measured_size(&self, scene: &Scene) -> Result<MeshSize, String> {
+        let mut scene = scene.clone();
+        scene.tissue.cell_size = self.edge_mm * 1e-3;
+        let model = Model::new(scene.clone(), Mesh::of_scene(&scene));
+        let unit_step_s = wave_speed_bound(&model) / model.mass_scaling().sqrt();
+        Ok(MeshSize { cells: model.mesh.cell_count() as u64, unit_step_s })
+    }
+
+    /// Real-time factor of the tissue alone, from what a frame of `now` (cells, steps) takes here.
+    fn predicted(&self, size: MeshSize, scene: &Scene, timing: &Timing, (cells, steps): (u64, u64)) -> f64 {
+        let cost = UnitCost { step_s: 0.0, cell_step_s: timing.physics / (cells * steps).max(1) as f64 };
+        predicted_factor(size, &self.settings(scene), &cost, scene.solver.frame_rate)
+    }
+
+    fn settings(&self, scene: &Scene) -> Settings {
+        Settings {
+            cell_size_mm: self.edge_mm,
+            mass_scaling: self.mass_scaling,
+            safety: scene.solver.safety,
+            engine: crate::study::Engine::Gpu,
+            effects: scene.effects.keys().into_iter().map(String::from).collect(),
+            repetition: 0,
+        }
+    }
+
+    /// The error that the study measured nearest to what the sliders stand at.
+    fn error_in_words(&self, scene: &Scene) -> String {
+        let far = |c: &Candidate| {
+            (c.settings.cell_size_mm / self.edge_mm).ln().abs()
+                + 0.25 * (c.settings.mass_scaling / self.mass_scaling).ln().abs()
+        };
+        match self.studied.iter().filter(|c| c.error.is_finite()).min_by(|a, b| far(a).total_cmp(&far(b))) {
+            Some(c) => format!(
+                "{} {:.1} % {} {} mm, S {:.0}",
+                texts::ERROR,
+                100.0 * c.error,
+                texts::MEASURED_AT,
+                c.settings.cell_size_mm,
+                c.settings.mass_scaling
+            ),
+            None => format!("{} stylet study {}", texts::NO_STUDY, scene.path.display()),
+        }
+    }
+}
+
+/// What a study of the scene in its usual folder found.
+fn studied(scene: &Scene) -> Vec<Candidate> {
+    let folder = format!("out/study_{}", safe_name(&scene.name));
+    let Ok((store, plan)) = Store::existing(Path::new(&folder)) else { return Vec::new() };
+    Analysis::read(&store, &plan).map(|analysis| analysis.candidates()).unwrap_or_default()
+}
