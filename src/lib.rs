@@ -9,6 +9,8 @@ pub mod commands;
 pub mod effects;
 pub mod error;
 pub mod gpu;
+#[cfg(feature = "link")]
+pub mod link;
 pub mod material;
 pub mod material_point;
 pub mod material_test;

@@ -39,7 +39,7 @@ const UNPACKED: usize = 1032 * 4 * 3;
 const PROMISED: usize = 4 << 20;
 
 /// All readers.
-pub const READERS: [Reader; 15] = [
+pub const READERS: &[Reader] = &[
     Reader { name: "scene", read: scene, memory: (GRID_LINES, 1024) },
     Reader { name: "overrides", read: overrides, memory: (GRID_LINES, 1024) },
     Reader { name: "materials", read: materials, memory: (FEW, 256) },
@@ -56,6 +56,11 @@ pub const READERS: [Reader; 15] = [
     Reader { name: "study_run", read: study_run, memory: (FEW, 128) },
     Reader { name: "attempt", read: attempt, memory: (FEW, 128) },
     Reader { name: "session", read: session, memory: (FEW, 128) },
+    // A body that is kept has at most 128 KiB, however much is promised; the others are skipped.
+    #[cfg(feature = "link")]
+    Reader { name: "link", read: link, memory: (FEW, 8) },
+    #[cfg(feature = "link")]
+    Reader { name: "link_message", read: link_message, memory: (FEW, 8) },
 ];
 
 impl Reader {
@@ -183,4 +188,16 @@ fn attempt(bytes: &[u8]) -> Result<()> {
 fn session(bytes: &[u8]) -> Result<()> {
     Session::from_bytes(&place("session.json"), bytes)?;
     Ok(())
+}
+
+/// What a client of the OpenIGTLink server may send: messages until the bytes end.
+#[cfg(feature = "link")]
+fn link(bytes: &[u8]) -> Result<()> {
+    crate::link::read::all(bytes, true).map(drop)
+}
+
+/// What such messages hold: their checksums keep damage from getting here.
+#[cfg(feature = "link")]
+fn link_message(bytes: &[u8]) -> Result<()> {
+    crate::link::read::all(bytes, false).map(drop)
 }

@@ -398,6 +398,33 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
                 .collect();
             vec![serde_json::to_vec(&session).unwrap()]
         }
+        #[cfg(feature = "link")]
+        "link" | "link_message" => {
+            use stylet::link::message::{Content, Kind, NEWTON, Sensor, Status, Transform, Verb};
+            let transform =
+                Transform { rotation: glam::DMat3::IDENTITY, translation: glam::DVec3::new(1.0, -2.0, -30.0) };
+            let status = Status { code: 1, subcode: 0, name: "running".into(), text: "a text".into() };
+            let contents = [
+                Content::Transform(transform),
+                Content::Position(transform.translation, glam::DQuat::IDENTITY),
+                Content::Status(status),
+                Content::Sensor(Sensor { unit: NEWTON, values: vec![0.5, -0.25] }),
+                Content::Text("0.5 N".into()),
+                Content::Request(Verb::Start, Kind::Sensor),
+                Content::Answer(Kind::Sensor, true),
+            ];
+            let messages = contents.map(|content| content.encode("device", 1 << 62));
+            // A TRANSFORM with the header of version 2: extended header before the content, empty metadata behind it.
+            let mut body = vec![0, 12, 0, 2, 0, 0, 0, 0, 0, 0, 0, 1];
+            body.extend(&messages[0][58..]);
+            body.extend([0, 0]);
+            let mut second = messages[0][..58].to_vec();
+            second[1] = 2;
+            second[42..50].copy_from_slice(&(body.len() as u64).to_be_bytes());
+            second[50..58].copy_from_slice(&stylet::link::crc::crc64(&body).to_be_bytes());
+            second.extend(body);
+            vec![messages.concat(), second]
+        }
         other => panic!("no sample for the reader {other}"),
     }
 }
