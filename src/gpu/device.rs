@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
+use super::kernel::KernelCache;
 use crate::error::{Error, Result};
 
 /// An opened device and what is known about its adapter.
@@ -12,6 +13,8 @@ pub struct Gpu {
     pub info: wgpu::AdapterInfo,
     /// First error that the device reported outside a call of ours, if any.
     pub failure: Arc<Mutex<Option<String>>>,
+    /// What was compiled for this device so far.
+    pub kernels: KernelCache,
 }
 
 /// One line about an adapter.
@@ -133,7 +136,7 @@ impl Gpu {
                 note(format!("lost ({reason:?}): {text}"));
             }
         });
-        Ok(Gpu { device, queue, info, failure })
+        Ok(Gpu { device, queue, info, failure, kernels: KernelCache::default() })
     }
 
     /// Opens the first adapter of an instance that can draw on a surface; `WGPU_ADAPTER_NAME` names another.

@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::device::Gpu;
-use super::kernel::{Kernel, Reflected, STEP_INPUT, reflect};
+use super::kernel::{Compiled, Kernel, STEP_INPUT};
 use super::layout::Layout;
 use super::structs::*;
 use crate::effects::EffectSet;
@@ -216,15 +216,15 @@ impl GpuEngine {
         let features = Features { drawn, ..Features::of(&model) };
         let defines = defines(&model.effects, &features);
         // Composing, validating and compiling go side by side: they are most of the time to the first step.
-        let reflected = stages(&model.effects, &features)
+        let compiled = stages(&model.effects, &features)
             .into_par_iter()
-            .map(|stage| reflect(stage, &defines))
-            .collect::<Result<Vec<Reflected>>>()?;
+            .map(|stage| gpu.kernels.compiled(&gpu.device, stage, &defines))
+            .collect::<Result<Vec<Arc<Compiled>>>>()?;
         let measure_threads = measure_threads(&model);
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let mut buffers = BTreeMap::new();
         let mut bytes = 0;
-        for binding in reflected.iter().flat_map(|r| &r.bindings) {
+        for binding in compiled.iter().flat_map(|r| &r.bindings) {
             let Some(name) = BUFFERS.iter().find(|n| **n == binding.name) else {
                 return Err(Error::Shader {
                     stage: "bindings".into(),
@@ -243,10 +243,10 @@ impl GpuEngine {
         let kept: Vec<&'static str> = BUFFERS
             .into_iter()
             .filter(|name| !FRAME_RESULTS.contains(name) && !DRAWN.contains(name))
-            .filter(|name| reflected.iter().flat_map(|r| &r.bindings).any(|b| b.writable && b.name == *name))
+            .filter(|name| compiled.iter().flat_map(|r| &r.bindings).any(|b| b.writable && b.name == *name))
             .collect();
-        let kernels = reflected
-            .into_par_iter()
+        let kernels = compiled
+            .into_iter()
             .map(|r| {
                 let threads = threads(r.stage, &model, &layout, measure_threads);
                 Kernel::new(&gpu.device, r, &buffers, size_of::<StepInput>() as u64, threads)

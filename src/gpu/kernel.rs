@@ -1,6 +1,7 @@
 //! From a stage's name to a pipeline: compose, validate, find bindings by name.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
@@ -30,7 +31,10 @@ pub struct Reflected {
 
 /// Composes and validates a stage and lists the resources that its entry point uses.
 pub fn reflect(stage: Stage, defines: &BTreeSet<&'static str>) -> Result<Reflected> {
-    let composed = compose(&format!("stages/{}", stage.name()), defines)?;
+    validated(stage, compose(&format!("stages/{}", stage.name()), defines)?)
+}
+
+fn validated(stage: Stage, composed: Composed) -> Result<Reflected> {
     let fail = |message: String| Error::Shader { stage: stage.name().into(), message };
     let module = naga::front::wgsl::parse_str(&composed.source).map_err(|e| {
         let line = e.location(&composed.source).map_or(0, |l| l.line_number as usize);
@@ -70,26 +74,17 @@ pub fn reflect(stage: Stage, defines: &BTreeSet<&'static str>) -> Result<Reflect
 /// Name of the uniform that changes from step to step and is bound with a dynamic offset.
 pub const STEP_INPUT: &str = "step_input";
 
-/// A pipeline with its bind group.
-pub struct Kernel {
+/// A pipeline and what it binds; buffers and threads are those of an engine.
+pub struct Compiled {
     pub stage: Stage,
-    pipeline: wgpu::ComputePipeline,
-    group: wgpu::BindGroup,
-    /// True where the group takes the dynamic offset of the step.
-    dynamic: bool,
+    pub bindings: Vec<Binding>,
     workgroup_size: u32,
-    threads: u32,
+    group_layout: wgpu::BindGroupLayout,
+    pipeline: wgpu::ComputePipeline,
 }
 
-impl Kernel {
-    /// Builds the pipeline of a stage that runs `threads` threads, binding `buffers` by name.
-    pub fn new(
-        device: &wgpu::Device,
-        reflected: Reflected,
-        buffers: &BTreeMap<&'static str, wgpu::Buffer>,
-        step_input_size: u64,
-        threads: u32,
-    ) -> Result<Self> {
+impl Compiled {
+    fn new(device: &wgpu::Device, reflected: Reflected) -> Self {
         let Reflected { stage, mut module, bindings, workgroup_size, .. } = reflected;
         let label = Some(stage.name());
         // The groups of the source tell what a binding is for. On the device all bindings of a stage lie in one group:
@@ -101,37 +96,22 @@ impl Kernel {
             unused += u32::from(place.is_none());
             variable.binding = Some(naga::ResourceBinding { group: 0, binding });
         }
-        let mut entries = Vec::new();
-        let mut resources = Vec::new();
-        for (binding, b) in (0..).zip(&bindings) {
-            entries.push(wgpu::BindGroupLayoutEntry {
-                binding,
-                visibility: wgpu::ShaderStages::COMPUTE,
-                ty: wgpu::BindingType::Buffer {
-                    ty: match b.uniform {
-                        true => wgpu::BufferBindingType::Uniform,
-                        false => wgpu::BufferBindingType::Storage { read_only: !b.writable },
-                    },
-                    has_dynamic_offset: b.name == STEP_INPUT,
-                    min_binding_size: None,
+        let entry = |(binding, b): (u32, &Binding)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: match b.uniform {
+                    true => wgpu::BufferBindingType::Uniform,
+                    false => wgpu::BufferBindingType::Storage { read_only: !b.writable },
                 },
-                count: None,
-            });
-            let buffer = buffers.get(b.name.as_str()).ok_or_else(|| Error::Shader {
-                stage: stage.name().into(),
-                message: format!("no buffer for binding `{}`", b.name),
-            })?;
-            let size = (b.name == STEP_INPUT).then_some(step_input_size).and_then(wgpu::BufferSize::new);
-            resources.push(wgpu::BindGroupEntry {
-                binding,
-                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }),
-            });
-        }
+                has_dynamic_offset: b.name == STEP_INPUT,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..).zip(&bindings).map(entry).collect();
         let group_layout =
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
-        let group =
-            device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout: &group_layout, entries: &resources });
-        let dynamic = bindings.iter().any(|b| b.name == STEP_INPUT);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label,
             bind_group_layouts: &[Some(&group_layout)],
@@ -153,7 +133,79 @@ impl Kernel {
             },
             cache: None,
         });
-        Ok(Kernel { stage, pipeline, group, dynamic, workgroup_size, threads })
+        Compiled { stage, bindings, workgroup_size, group_layout, pipeline }
+    }
+}
+
+/// The kernels that a device has compiled, by their source: an engine with other effects or another mesh shares those that are the same.
+#[derive(Clone, Default)]
+pub struct KernelCache(Arc<Mutex<BTreeMap<(&'static str, String), Arc<Compiled>>>>);
+
+impl KernelCache {
+    /// The kernel of a stage with these defines.
+    ///
+    /// # Errors
+    /// `Error::Shader` for a source that does not validate.
+    pub fn compiled(
+        &self,
+        device: &wgpu::Device,
+        stage: Stage,
+        defines: &BTreeSet<&'static str>,
+    ) -> Result<Arc<Compiled>> {
+        let composed = compose(&format!("stages/{}", stage.name()), defines)?;
+        let key = (stage.name(), composed.source.clone());
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = lock().get(&key) {
+            return Ok(known.clone());
+        }
+        let compiled = Arc::new(Compiled::new(device, validated(stage, composed)?));
+        lock().insert(key, compiled.clone());
+        Ok(compiled)
+    }
+}
+
+/// A pipeline with its bind group.
+pub struct Kernel {
+    pub stage: Stage,
+    compiled: Arc<Compiled>,
+    group: wgpu::BindGroup,
+    /// True where the group takes the dynamic offset of the step.
+    dynamic: bool,
+    threads: u32,
+}
+
+impl Kernel {
+    /// A kernel that runs `threads` threads, with `buffers` bound by name.
+    ///
+    /// # Errors
+    /// `Error::Shader` for a binding without a buffer.
+    pub fn new(
+        device: &wgpu::Device,
+        compiled: Arc<Compiled>,
+        buffers: &BTreeMap<&'static str, wgpu::Buffer>,
+        step_input_size: u64,
+        threads: u32,
+    ) -> Result<Self> {
+        let stage = compiled.stage;
+        let mut entries = Vec::new();
+        for (binding, b) in (0..).zip(&compiled.bindings) {
+            let buffer = buffers.get(b.name.as_str()).ok_or_else(|| Error::Shader {
+                stage: stage.name().into(),
+                message: format!("no buffer for binding `{}`", b.name),
+            })?;
+            let size = (b.name == STEP_INPUT).then_some(step_input_size).and_then(wgpu::BufferSize::new);
+            entries.push(wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }),
+            });
+        }
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(stage.name()),
+            layout: &compiled.group_layout,
+            entries: &entries,
+        });
+        let dynamic = compiled.bindings.iter().any(|b| b.name == STEP_INPUT);
+        Ok(Kernel { stage, compiled, group, dynamic, threads })
     }
 
     pub fn threads(&self) -> u32 {
@@ -162,11 +214,11 @@ impl Kernel {
 
     /// Records the dispatch. `step_offset` is the byte offset of the step's input.
     pub fn encode(&self, pass: &mut wgpu::ComputePass<'_>, step_offset: u32) {
-        pass.set_pipeline(&self.pipeline);
+        pass.set_pipeline(&self.compiled.pipeline);
         let offsets: &[u32] = if self.dynamic { &[step_offset] } else { &[] };
         pass.set_bind_group(0, &self.group, offsets);
         // 65,535 workgroups per dimension are the portable limit; shaders undo the wrap with `thread_index`.
-        let groups = self.threads.div_ceil(self.workgroup_size).max(1);
+        let groups = self.threads.div_ceil(self.compiled.workgroup_size).max(1);
         let rows = groups.div_ceil(65_535);
         pass.dispatch_workgroups(groups.div_ceil(rows), rows, 1);
     }

@@ -42,8 +42,8 @@ const NOTCH: f64 = 0.25e-3;
 const DESK_SPEED: f64 = 5e-3;
 /// Size of the window at the start, in points.
 const SIZE: [u32; 2] = [1280, 800];
-/// Pictures between two looks at the range of the field.
-const LOOK_AT_RANGE: u64 = 20;
+/// Time between two looks at the range of the field [s].
+const LOOK_AT_RANGE: f64 = 0.4;
 /// What the progress of a trainee is shown of.
 const PROGRESS_KEY: &str = "peak_axial_force";
 /// Pictures from one on which a software adapter draws the panels to the next.
@@ -201,6 +201,8 @@ struct Open {
     /// Where the tissue is drawn [points], and pixels per point, since the panels were drawn last.
     area: egui::Rect,
     scale: f32,
+    /// When the range of the field was looked at last.
+    ranged: Option<Instant>,
     /// The panels are drawn on the next picture.
     stale: bool,
     /// Scene and shaders, to be read anew when they change.
@@ -366,6 +368,7 @@ impl App {
             canvas,
             area: egui::Rect::NOTHING,
             scale: 1.0,
+            ranged: None,
             stale: true,
             scene_file: Watch::new([self.source.path.clone()]),
             shader_files: Watch::new(self.options.shaders.iter().flat_map(|folder| shader_files(folder))),
@@ -588,7 +591,8 @@ impl Open {
             self.practice.drawn();
         }
         self.gpu.check()?;
-        if self.choices.automatic && self.pictures % LOOK_AT_RANGE == 1 {
+        if self.choices.automatic && self.ranged.is_none_or(|at| at.elapsed().as_secs_f64() >= LOOK_AT_RANGE) {
+            self.ranged = Some(begin);
             self.follow_range()?;
         }
         Ok(wishes)

@@ -51,7 +51,7 @@ pub fn saving(ui: &mut egui::Ui, tuning: &mut Tuning, name: &mut String) {
     if name.is_empty() {
         *name = tuning.source.path.with_extension("tuned.toml").display().to_string();
     }
-    ui.add(egui::TextEdit::singleline(name).desired_width(f32::INFINITY));
+    ui.add(egui::TextEdit::singleline(name).hint_text(texts::SAVE_SCENE).desired_width(f32::INFINITY));
     ui.horizontal(|ui| {
         if ui.button(texts::SAVE_SCENE).clicked() {
             tuning.save(std::path::Path::new(name.as_str()));
@@ -77,8 +77,9 @@ fn sliders(ui: &mut egui::Ui, scene: &Scene, parameter: &Parameter, wishes: &mut
             .max_decimals(4)
             .suffix(unit);
         let slider = if parameter.unit == "count" { slider.integer() } else { slider };
-        ui.small(parameter.name);
-        if ui.add(slider).on_hover_text(format!("{}\n{}", parameter.key, parameter.source)).changed() {
+        let name = ui.small(parameter.name).id;
+        if ui.add(slider).labelled_by(name).on_hover_text(format!("{}\n{}", parameter.key, parameter.source)).changed()
+        {
             wishes.extend(parameter.overrides(scene, index, wanted));
         }
     }

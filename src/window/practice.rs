@@ -157,6 +157,8 @@ pub struct Practice {
     /// Input that the frame under way has, with the frames that had ended when it came.
     fresh: Option<(Instant, u64)>,
     pub latency: Latency,
+    /// The next frame is the first after a change: what it takes longer is part of it.
+    freshly_changed: bool,
     last_drawn: Option<Instant>,
 }
 
@@ -222,6 +224,7 @@ impl Practice {
             started: None,
             fresh: None,
             latency: Latency::default(),
+            freshly_changed: false,
             last_drawn: None,
             scene,
         })
@@ -303,6 +306,7 @@ impl Practice {
         self.session.changes.push(SceneChange { frame, overrides: self.tuning.source.overrides.clone() });
         self.scene = self.tuning.source.scene()?;
         self.speed_limit = speed_limit(&self.simulation);
+        self.freshly_changed = true;
         self.timing.simulated = self.simulation.steps_per_frame() as f64 * self.simulation.dt();
         Ok(renewed)
     }
@@ -371,6 +375,12 @@ impl Practice {
                     self.save()?;
                 }
                 if let Some(begin) = self.started.take() {
+                    if std::mem::take(&mut self.freshly_changed)
+                        && let Some(pace) = &mut self.tuning.last
+                    {
+                        pace.halted += begin.elapsed();
+                        pace.whole += begin.elapsed();
+                    }
                     Timing::smooth(&mut self.timing.physics, begin.elapsed().as_secs_f64());
                 }
             }

@@ -81,9 +81,9 @@ pub enum Taken {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
     pub reach: Reach,
-    /// From the wish to the frame that has it.
+    /// From the wish to the results of the frame that has it.
     pub whole: Duration,
-    /// For which no frame could run.
+    /// From the last frame before to the results of that frame: the work of the change, first use of its kernels, the frame.
     pub halted: Duration,
 }
 
