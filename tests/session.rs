@@ -73,6 +73,58 @@ impl Place {
     }
 }
 
+/// Sliders and effects that were changed on the way are part of the session: the replay has them in the same frames.
+#[test]
+fn changes_are_replayed_in_their_frames() {
+    let mut simulation =
+        Simulation::for_purpose(scene(), gpu(), Purpose { led: true, drawn: gpu().is_some() }).unwrap();
+    let overrides: Vec<String> = OVERRIDES.map(String::from).to_vec();
+    let mut session = Session::new(&scene(), &overrides, simulation.engine().info());
+    // Absolute, so that the replay finds it from everywhere.
+    let steps = [
+        (12, vec!["friction.coefficient=0.7"]),
+        (25, vec!["friction.coefficient=0.7", "solver.mass_scaling=1500"]),
+        (40, vec![r#"effects=["mass_scaling", "viscoelastic", "puncture", "friction"]"#, "solver.mass_scaling=1500"]),
+        (55, vec![r#"effects=["mass_scaling", "puncture"]"#]),
+    ];
+    let mut records = Vec::new();
+    for frame in 0..70 {
+        if let Some((_, more)) = steps.iter().find(|(at, _)| *at == frame) {
+            let all: Vec<String> = overrides.iter().cloned().chain(more.iter().map(|s| s.to_string())).collect();
+            session.changes.push(stylet::session::SceneChange { frame: frame as u64, overrides: all });
+            session.change(&mut simulation, frame as u64).unwrap();
+        }
+        let now = simulation.hand().unwrap();
+        session.poses.push(stylet::scene::motion::HandPose { depth: wanted(frame), ..now });
+        simulation.lead(session.poses.last().unwrap());
+        records.push(simulation.next_frame().unwrap().unwrap());
+    }
+    let place = Place::new();
+    let file = place.path("session.json");
+    session.write(&file).unwrap();
+    assert_eq!(Session::read(&file).unwrap(), session);
+    let output = place.replay(&file, "again");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = std::fs::read_to_string(place.path("again").join("force.csv")).unwrap();
+    let forces: Vec<f64> = table.lines().skip(1).map(|row| row.split(',').nth(3).unwrap().parse().unwrap()).collect();
+    assert_eq!(forces.len(), records.len());
+    for (force, record) in forces.iter().zip(&records) {
+        // The table has nine digits.
+        assert!(
+            (force - record.force.axial).abs() <= 1e-8 * record.force.axial.abs().max(1e-3),
+            "{force} {}",
+            record.force.axial
+        );
+    }
+    let last = records.last().unwrap();
+    assert_eq!(last.force.friction, 0.0, "friction was switched off");
+    assert!(last.energy.imbalance().abs() < 0.05, "{}", last.energy.imbalance());
+    // Changes out of order, or after the end, are no session.
+    session.changes[0].frame = 99;
+    session.write(&file).unwrap();
+    assert!(Session::read(&file).is_err());
+}
+
 #[test]
 fn a_hand_that_goes_as_the_script_does_feels_the_same() {
     let mut scene = scene();

@@ -192,3 +192,126 @@ fn without_a_display_there_is_a_message() {
     assert_eq!(output.status.code(), Some(2), "{told}");
     assert!(told.contains("way out") && told.contains("stylet run") && !told.contains("panicked"), "{told}");
 }
+
+/// Depth of the tip in the last row [m], 0 where there is none.
+fn depth(out: &Path) -> f64 {
+    let text = std::fs::read_to_string(out.join("force.csv")).unwrap_or_default();
+    let last = text.lines().skip(1).last().and_then(|row| row.split(',').nth(1)?.parse().ok());
+    last.unwrap_or(0.0)
+}
+
+fn until(patience: u64, mut done: impl FnMut() -> bool) -> bool {
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(patience) {
+        if done() {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(30));
+    }
+    false
+}
+
+fn scene(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
+}
+
+/// From the briefing to the scores with keys and mouse; the window is resized, hidden and shown again on the way.
+#[test]
+fn a_task_is_done_from_briefing_to_debriefing() {
+    let Some(display) = Display::open() else { return };
+    let (out, history) = (display.path("attempt"), display.path("history"));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env("DISPLAY", &display.name)
+        .env_remove("WAYLAND_DISPLAY")
+        .arg("view")
+        .arg(scene("training/hit_target.toml"))
+        .args(["--set", "tissue.cell_size_mm=1.2", "--set", "target.0.position_mm=[0, 0, -4.6]"])
+        .args(["--trainee", "ada", "--history", history.to_str().unwrap(), "--out", out.to_str().unwrap()])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    display.wait();
+    let started = until(30, || {
+        if depth(&out) == 0.0 {
+            display.xdotool(&["key", "space"]);
+            display.xdotool(&["keydown", "Down"]);
+            std::thread::sleep(Duration::from_millis(900));
+        }
+        depth(&out) > 0.0
+    });
+    assert!(started, "the keys did not lead the needle");
+    display.xdotool(&["search", "--name", "Stylet", "windowsize", "900", "620"]);
+    assert!(until(60, || depth(&out) > 2e-3), "stuck at {} m", depth(&out));
+    // Nothing to draw on for a while; the keyboard is gone with it.
+    display.xdotool(&["search", "--name", "Stylet", "windowunmap"]);
+    std::thread::sleep(Duration::from_millis(700));
+    display.xdotool(&["search", "--name", "Stylet", "windowmap"]);
+    display.xdotool(&["search", "--name", "Stylet", "windowsize", "1280", "800"]);
+    display.wait();
+    display.xdotool(&["keyup", "Down"]);
+    display.xdotool(&["keydown", "Down"]);
+    assert!(until(90, || depth(&out) > 4.75e-3), "stuck at {} m", depth(&out));
+    display.xdotool(&["keyup", "Down"]);
+    std::thread::sleep(Duration::from_millis(500));
+    // "Finish" is the last button of the first row; where it lies depends on the fonts, not on the machine.
+    let scored = until(30, || {
+        display.xdotool(&["mousemove", "207", "57", "click", "1"]);
+        std::thread::sleep(Duration::from_millis(700));
+        out.join("score.json").is_file()
+    });
+    assert!(scored, "no scores");
+    display.xdotool(&["key", "ctrl+q"]);
+    let ended = until(20, || child.try_wait().unwrap().is_some());
+    if !ended {
+        let _ = child.kill();
+    }
+    let output = child.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(ended && output.status.success(), "{told}");
+    assert!(told.contains("force after 1 frame(s)"), "input to force: {told}");
+    assert!(told.contains("Passed"), "{told}");
+    assert!(std::fs::read_dir(&history).unwrap().count() > 0, "the history of the trainee");
+}
+
+/// A scene that is edited while its window is open: broken text is told and changes nothing, good text begins anew.
+#[test]
+fn an_edited_scene_is_read_anew() {
+    let Some(display) = Display::open() else { return };
+    let file = display.path("mine.toml");
+    let text = std::fs::read_to_string(scene("training/hit_target.toml")).unwrap();
+    let text = text.replace("cell_size_mm = 0.6", "cell_size_mm = 1.2");
+    std::fs::write(&file, &text).unwrap();
+    let out = display.path("run");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env("DISPLAY", &display.name)
+        .env_remove("WAYLAND_DISPLAY")
+        .args(["view", file.to_str().unwrap(), "--script", "--out", out.to_str().unwrap()])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    display.wait();
+    assert!(until(60, || depth(&out) > 2e-4), "the script does not run");
+    let save = |text: &str, later: u64| {
+        std::fs::write(&file, text).unwrap();
+        let at = std::time::SystemTime::now() + Duration::from_secs(later);
+        std::fs::File::options().write(true).open(&file).unwrap().set_modified(at).unwrap();
+    };
+    save("[tissue", 10);
+    std::thread::sleep(Duration::from_millis(1500));
+    let before = depth(&out);
+    assert!(until(60, || depth(&out) > before + 2e-4), "a broken file stopped the run");
+    save(&text.replace("coefficient = 0.3", "coefficient = 0.5"), 20);
+    let second = display.path("run_2");
+    assert!(until(60, || depth(&second) > 1e-4), "the edited scene did not begin anew");
+    display.xdotool(&["search", "--name", "Stylet", "windowfocus"]);
+    display.xdotool(&["key", "ctrl+q"]);
+    if !until(20, || child.try_wait().unwrap().is_some()) {
+        let _ = child.kill();
+    }
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
