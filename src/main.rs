@@ -143,6 +143,9 @@ struct ViewArgs {
     /// Size of the window in points
     #[arg(long, value_names = ["WIDTH", "HEIGHT"], num_args = 2)]
     size: Option<Vec<u32>>,
+    /// Show an ultrasound-like slice from the start on
+    #[arg(long)]
+    ultrasound: bool,
     /// Start at once and close after so many pictures
     #[arg(long)]
     frames: Option<u64>,
@@ -550,6 +553,7 @@ fn view(args: ViewArgs, start: Instant) -> Result<String> {
         session: args.session.map(|path| commands::replay::session_file(&path)),
         out: args.out,
         force: args.force,
+        ultrasound: args.ultrasound,
         frames: args.frames,
         screenshot: args.screenshot,
         reference: args.reference,

@@ -5,8 +5,8 @@ struct View {
     eye: vec4<f32>,
     // Low and high end of the field, its lane, 1 where the scale is logarithmic.
     range: vec4<f32>,
-    // Colour of what has no field.
-    plain: vec4<f32>,
+    // How much of the tissue's surface is drawn, 0..1; y, z, w unused.
+    surface: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -38,15 +38,19 @@ fn on_scale(value: f32) -> f32 {
     return clamp(select(linear, logarithmic, view.range.w > 0.5), 0.0, 1.0);
 }
 
-@vertex
-fn tissue_corner(@location(0) nodes: vec2<u32>, @location(1) part: f32) -> TissueCorner {
+fn placed_corner(nodes: vec2<u32>, part: f32, value: f32) -> TissueCorner {
     var out: TissueCorner;
     out.place = mix(node_place(nodes.x), node_place(nodes.y), part);
     out.clip = view.view_projection * vec4<f32>(out.place, 1.0);
-    let lane = u32(view.range.z);
     // On the scale already here: a software adapter pays for every pixel.
-    out.field = on_scale(mix(drawn_nodes[nodes.x][lane], drawn_nodes[nodes.y][lane], part));
+    out.field = on_scale(value);
     return out;
+}
+
+@vertex
+fn tissue_corner(@location(0) nodes: vec2<u32>, @location(1) part: f32) -> TissueCorner {
+    let lane = u32(view.range.z);
+    return placed_corner(nodes, part, mix(drawn_nodes[nodes.x][lane], drawn_nodes[nodes.y][lane], part));
 }
 
 // Light from the eye, on both sides of a face; a factor on bytes as the target keeps them (sRGB), which spares every pixel three
@@ -60,6 +64,26 @@ fn shade(place: vec3<f32>, normal: vec3<f32>) -> f32 {
 fn tissue_colour(corner: TissueCorner) -> @location(0) vec4<f32> {
     let colour = colour_table[u32(corner.field * 255.0 + 0.5)];
     let normal = normalize(cross(dpdx(corner.place), dpdy(corner.place)));
+    return vec4<f32>(colour.rgb * shade(corner.place, normal), 1.0);
+}
+
+// Whether a pixel of a surface is drawn of which `part` is to be seen: a screen door of 4 x 4 pixels [Bayer1973]. Nothing has to be
+// sorted, and what is seen through is sharp.
+fn is_drawn(clip: vec4<f32>, part: f32) -> bool {
+    let at = vec2<u32>(clip.xy) & vec2<u32>(3u);
+    let mixed = at.x ^ at.y;
+    let rank = ((mixed & 1u) << 3u) | ((at.y & 1u) << 2u) | (mixed & 2u) | (at.y >> 1u);
+    return (f32(rank) + 0.5) / 16.0 < part;
+}
+
+// The surface where it is seen through; the faces of a cut stay whole.
+@fragment
+fn veil_colour(corner: TissueCorner) -> @location(0) vec4<f32> {
+    let normal = normalize(cross(dpdx(corner.place), dpdy(corner.place)));
+    if (!is_drawn(corner.clip, view.surface.x)) {
+        discard;
+    }
+    let colour = colour_table[u32(corner.field * 255.0 + 0.5)];
     return vec4<f32>(colour.rgb * shade(corner.place, normal), 1.0);
 }
 
@@ -78,14 +102,23 @@ struct ToolCorner {
     @builtin(position) clip: vec4<f32>,
     @location(0) place: vec3<f32>,
     @location(1) normal: vec3<f32>,
+    // In w how much of it is drawn.
+    @location(2) colour: vec4<f32>,
 }
 
 @vertex
-fn tool_corner(@location(0) place: vec3<f32>, @location(1) normal: vec3<f32>) -> ToolCorner {
-    return ToolCorner(view.view_projection * vec4<f32>(place, 1.0), place, normal);
+fn tool_corner(
+    @location(0) place: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) colour: vec4<f32>,
+) -> ToolCorner {
+    return ToolCorner(view.view_projection * vec4<f32>(place, 1.0), place, normal, colour);
 }
 
 @fragment
 fn tool_colour(corner: ToolCorner) -> @location(0) vec4<f32> {
-    return vec4<f32>(view.plain.rgb * shade(corner.place, normalize(corner.normal)), 1.0);
+    if (!is_drawn(corner.clip, corner.colour.w)) {
+        discard;
+    }
+    return vec4<f32>(corner.colour.rgb * shade(corner.place, normalize(corner.normal)), 1.0);
 }

@@ -15,8 +15,10 @@ use winit::window::{Window, WindowId};
 use super::ViewOptions;
 use super::camera::Camera;
 use super::hand::{Desk, InputDevice, Recording};
+use super::marks;
 use super::panels::{self, Choices, ReferenceCurve, Wishes};
 use super::practice::{Latency, Leader, Practice, Renewed, State};
+use super::scan::{self, Scan};
 use super::scene_view::{Area, Field, SceneView};
 use super::section::RestPlane;
 use super::texts;
@@ -183,6 +185,7 @@ struct Open {
     egui: egui_winit::State,
     painter: egui_wgpu::Renderer,
     view: SceneView,
+    scan: Scan,
     practice: Practice,
     desk: Desk,
     recording: Option<Recording>,
@@ -332,11 +335,11 @@ impl App {
             RendererOptions { dithering: false, ..Default::default() },
         );
         let mut practice = practice;
-        let mesh = practice.simulation.model.mesh.clone();
+        let model = practice.simulation.model.clone();
         let engine = practice.simulation.engine().on_device();
         let engine = engine.ok_or_else(|| Error::Device("the window needs the engine of a device".into()))?;
-        let view = SceneView::new(&gpu, engine, &mesh, config.format)?;
-        let (low, high) = mesh.bounds();
+        let view = SceneView::new(&gpu, engine, &model, config.format)?;
+        let (low, high) = model.mesh.bounds();
         let centre = 0.5 * (low + high);
         let camera = Camera::around(centre.as_vec3(), (0.62 * (high - low).length()) as f32);
         // Open through the entry point, so that the needle is seen.
@@ -354,6 +357,7 @@ impl App {
             egui,
             painter,
             view,
+            scan: Scan::default(),
             practice,
             desk,
             recording: self.recorded.as_ref().map(|session| Recording::new(session.poses.clone())),
@@ -375,6 +379,7 @@ impl App {
             control: false,
             debriefing: None,
         };
+        open.choices.look.probe.on = self.options.ultrasound;
         open.cut();
         Ok(open)
     }
@@ -488,10 +493,11 @@ impl Open {
 
     /// After a restart: the buffers are new.
     fn rebind(&mut self) -> Result<()> {
-        let mesh = self.practice.simulation.model.mesh.clone();
+        let model = self.practice.simulation.model.clone();
         if let Some(engine) = self.practice.simulation.engine().on_device() {
-            self.view = SceneView::new(&self.gpu, engine, &mesh, self.config.format)?;
+            self.view = SceneView::new(&self.gpu, engine, &model, self.config.format)?;
         }
+        self.scan.close(&mut self.painter);
         self.cut();
         self.due = 0.0;
         Ok(())
@@ -518,6 +524,7 @@ impl Open {
 
     /// After a change of effects: the engine is new, the mesh and all that is drawn of it the same.
     fn take_buffers(&mut self) -> Result<()> {
+        self.scan.close(&mut self.painter);
         match self.practice.simulation.engine().on_device() {
             Some(engine) => self.view.take_buffers(&self.gpu, engine),
             None => Ok(()),
@@ -561,7 +568,7 @@ impl Open {
         let mut wishes = Wishes::default();
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let panels = self.panels_are_due().then(|| self.run_panels(reference, &mut wishes));
-        self.draw(&mut encoder, panels);
+        self.draw(&mut encoder, panels)?;
         // Nothing to show it on: the tissue goes on, the picture is left out.
         let shown = match self.surface.get_current_texture() {
             wgpu::CurrentSurfaceTexture::Success(texture) | wgpu::CurrentSurfaceTexture::Suboptimal(texture) => {
@@ -635,6 +642,7 @@ impl Open {
     fn run_panels(&mut self, reference: &[ReferenceCurve], wishes: &mut Wishes) -> Panels {
         let input = self.egui.take_egui_input(&self.window);
         let context = self.egui.egui_ctx().clone();
+        let mut turned = false;
         let output = context.run_ui(input, |ui| {
             if let Some(Debriefing { score, before }) = &self.debriefing
                 && !panels::debriefing(ui.ctx(), score, before)
@@ -650,6 +658,12 @@ impl Open {
             egui::Panel::right("readings").default_size(330.0).show(ui, |ui| {
                 panels::readings(ui, &self.practice, &mut self.choices, reference);
             });
+            if self.choices.look.probe.on {
+                egui::Panel::bottom("ultrasound").default_size(270.0).resizable(true).show(ui, |ui| {
+                    let (scene, mesh) = (self.practice.scene(), &self.practice.simulation.model.mesh);
+                    turned = self.scan.panel(ui, &mut self.choices.look.probe, scene, mesh);
+                });
+            }
             egui::CentralPanel::no_frame().show(ui, |ui| {
                 self.area = ui.available_rect_before_wrap();
                 let response = ui.allocate_rect(self.area, egui::Sense::click_and_drag());
@@ -660,6 +674,7 @@ impl Open {
         // What moves goes on moving on the next picture.
         self.stale = output.viewport_output.values().any(|v| v.repaint_delay.is_zero())
             || egui::Popup::is_any_open(&context)
+            || turned
             || self.debriefing.is_some();
         self.egui.handle_platform_output(&self.window, output.platform_output);
         if wishes.recut {
@@ -669,8 +684,8 @@ impl Open {
     }
 
     /// Draws the tissue on the canvas, and the panels where they were asked.
-    fn draw(&mut self, encoder: &mut wgpu::CommandEncoder, panels: Option<Panels>) {
-        self.place_tool();
+    fn draw(&mut self, encoder: &mut wgpu::CommandEncoder, panels: Option<Panels>) -> Result<()> {
+        let place = self.place_tool();
         if let Some(engine) = self.practice.simulation.engine().on_device() {
             engine.encode_fields(encoder);
         }
@@ -681,8 +696,11 @@ impl Open {
             width: self.area.width() * self.scale,
             height: self.area.height() * self.scale,
         };
-        self.view.draw(&self.gpu, encoder, (&view, size), pixels, (&self.camera, &self.choices.scale));
-        let Some(mut panels) = panels else { return };
+        let look = &self.choices.look;
+        self.view.draw(&self.gpu, encoder, (&view, size), pixels, (&self.camera, &self.choices.scale, look));
+        let Some(mut panels) = panels else { return Ok(()) };
+        let probe = (&look.probe, place.as_ref());
+        self.scan.draw(&self.gpu, &mut self.painter, encoder, &mut self.practice, probe)?;
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         for (id, deltas) in panels.textures.set.drain() {
             for delta in &deltas {
@@ -707,6 +725,7 @@ impl Open {
         for id in panels.textures.free.drain() {
             self.painter.free_texture(&id);
         }
+        Ok(())
     }
 
     /// Brings the ends of the scale to what the field holds now.
@@ -735,13 +754,23 @@ impl Open {
         Ok(())
     }
 
-    fn place_tool(&mut self) {
-        let Some(tool) = &self.practice.scene().tool else { return };
-        let Some((tip, direction)) = self.practice.tool_place() else { return };
+    /// Puts tool, targets and the frame of the slice to their places; the tool's place is returned.
+    fn place_tool(&mut self) -> Option<ToolPlace> {
+        let (scene, look) = (self.practice.scene(), &self.choices.look);
+        let last = self.practice.records.last();
         let line = self.practice.simulation.centre_line();
-        let offset = |s: f64| line.as_ref().map_or(DVec3::ZERO, |line| line.at(s, 0.0).offset);
-        let corners = tool_shape::triangles(tool, &ToolPlace { tip, direction, offset: &offset });
+        let core = last.and_then(|r| r.core).map_or(0.0, |core| core.length);
+        let place = self.practice.tool_place().map(|(tip, direction)| ToolPlace { tip, direction, line, core });
+        let mut corners = scan::frame(&look.probe, scene, &self.practice.simulation.model.mesh);
+        if let Some((tool, place)) = scene.tool.as_ref().zip(place.as_ref()) {
+            corners.extend(tool_shape::triangles(tool, place));
+        }
+        for (n, target) in scene.targets.iter().enumerate().filter(|_| look.targets) {
+            let moved = last.and_then(|r| r.targets.get(n)).map_or(DVec3::ZERO, |t| t.displacement);
+            corners.extend(marks::target(target.position + moved, target.radius));
+        }
         self.view.place_tool(&self.gpu, &corners);
+        place
     }
 
     /// Draws the canvas once more, and writes it.
@@ -749,7 +778,7 @@ impl Open {
         let size = self.canvas.size();
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let panels = self.run_panels(reference, &mut Wishes::default());
-        self.draw(&mut encoder, Some(panels));
+        self.draw(&mut encoder, Some(panels))?;
         let row = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("screenshot"),

@@ -1,21 +1,27 @@
 //! The window: an insertion is practised by hand, or watched, while the device solves the tissue and draws it.
 //!
-//! [`practice`] holds one attempt: simulation, who leads, records. [`hand`] is what a hand holds. [`section`], [`tool_shape`] and
-//! [`camera`] say what is drawn, [`scene_view`] draws it from the solver's own buffers, [`panels`] stand around it, [`app`] is the
-//! window itself. The window owns no physics: it sends poses and reads records.
+//! [`practice`] holds one attempt: simulation, who leads, records. [`hand`] is what a hand holds. [`section`], [`tool_shape`],
+//! [`marks`] and [`camera`] say what is drawn, [`scene_view`] draws it from the solver's own buffers as [`appearance`] chooses,
+//! [`panels`] stand around it, [`app`] is the window itself. [`probe`] says where an ultrasound slice stands, [`ultrasound`] draws it
+//! and [`scan`] shows it. The window owns no physics: it sends poses and reads records.
 
 pub mod accuracy;
 pub mod app;
+pub mod appearance;
 pub mod camera;
 pub mod effects_panel;
 pub mod hand;
+pub mod marks;
 pub mod panels;
 pub mod practice;
+pub mod probe;
+pub mod scan;
 pub mod scene_view;
 pub mod section;
 pub mod texts;
 pub mod tool_shape;
 pub mod tuning;
+pub mod ultrasound;
 pub mod watch;
 
 use std::path::PathBuf;
@@ -34,6 +40,8 @@ pub struct ViewOptions {
     /// Folder of the tables and the session.
     pub out: Option<PathBuf>,
     pub force: bool,
+    /// The ultrasound slice is shown from the start on.
+    pub ultrasound: bool,
     /// Close after so many pictures.
     pub frames: Option<u64>,
     /// Write the last picture to this file.

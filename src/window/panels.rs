@@ -3,10 +3,11 @@
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
 use super::accuracy::Accuracy;
+use super::appearance::{self, ColourMap, Look};
 use super::camera::{Camera, Preset};
 use super::hand::Desk;
 use super::practice::{Leader, Practice, State};
-use super::scene_view::{Field, Scale, colour_bytes};
+use super::scene_view::{Field, Scale};
 use super::texts;
 use crate::observables::ForceParts;
 use crate::training::score::Score;
@@ -25,6 +26,7 @@ pub struct Choices {
     pub save_as: String,
     /// Made when it is looked at first.
     pub accuracy: Option<Accuracy>,
+    pub look: Look,
 }
 
 impl Choices {
@@ -37,6 +39,7 @@ impl Choices {
             show_parts: false,
             save_as: String::new(),
             accuracy: None,
+            look: Look::default(),
         }
     }
 }
@@ -117,7 +120,7 @@ pub fn controls(
     });
     ui.separator();
     egui::ComboBox::from_label(texts::FIELD).selected_text(choices.scale.field.name()).show_ui(ui, |ui| {
-        for field in Field::ALL {
+        for field in Field::ALL.into_iter().filter(|field| field.is_in(practice.scene())) {
             if ui.selectable_label(choices.scale.field == field, field.name()).clicked() {
                 choices.scale = default_scale(field);
             }
@@ -136,7 +139,8 @@ pub fn controls(
     if matches!(choices.scale.field, Field::VonMises) {
         ui.checkbox(&mut choices.scale.logarithmic, texts::LOGARITHMIC);
     }
-    colour_bar(ui, &choices.scale);
+    colour_bar(ui, &choices.scale, choices.look.map);
+    appearance::controls(ui, &mut choices.look, !practice.scene().targets.is_empty());
     ui.separator();
     ui.label(texts::CUT);
     ui.horizontal(|ui| {
@@ -168,18 +172,19 @@ pub fn default_scale(field: Field) -> Scale {
         Field::VonMises => (0.0, 10e3),
         Field::Pressure => (-10e3, 10e3),
         Field::Stretch => (1.0, 1.5),
-        Field::StiffnessLost => (0.0, 1.0),
+        Field::StiffnessLeft => (0.0, 1.0),
+        Field::Opening => (0.0, 2e-3),
     };
     Scale { field, low, high, logarithmic: false }
 }
 
 /// The colours from low to high, with numbers and unit.
-fn colour_bar(ui: &mut egui::Ui, scale: &Scale) {
+fn colour_bar(ui: &mut egui::Ui, scale: &Scale, map: ColourMap) {
     let (rect, _) = ui.allocate_exact_size(egui::vec2(ui.available_width(), 14.0), egui::Sense::hover());
     let painter = ui.painter();
     let count = 64;
     for n in 0..count {
-        let [r, g, b] = colour_bytes((f64::from(n) + 0.5) / f64::from(count));
+        let [r, g, b] = map.colour((f64::from(n) + 0.5) / f64::from(count));
         let width = rect.width() / count as f32;
         let left = rect.left() + width * n as f32;
         let cell = egui::Rect::from_min_size(egui::pos2(left, rect.top()), egui::vec2(width + 0.5, rect.height()));

@@ -3,17 +3,20 @@
 use bytemuck::{Pod, Zeroable};
 use wgpu::util::DeviceExt;
 
+use super::appearance::{ColourMap, Look};
 use super::camera::Camera;
 use super::section::{Outline, RestPlane, TissueCorner};
 use super::tool_shape::ToolCorner;
 use crate::gpu::{Gpu, GpuEngine};
 use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::scene::Scene;
 use crate::{Error, Result};
 
 const SHADER: &str = include_str!("../../shaders/render/tissue.wgsl");
+/// What comes to it where faces may part.
+const PARTED: &str = include_str!("../../shaders/render/parted.wgsl");
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Steel, sRGB.
-const STEEL: [f32; 4] = [0.70, 0.72, 0.76, 1.0];
 
 /// A field that can be shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,12 +24,20 @@ pub enum Field {
     VonMises,
     Pressure,
     Stretch,
-    /// Part of the stiffness that damage and the needle's path have taken.
-    StiffnessLost,
+    /// Part of the stiffness that damage and the needle's path have left.
+    StiffnessLeft,
+    /// How far faces that separate have parted.
+    Opening,
 }
 
 impl Field {
-    pub const ALL: [Field; 4] = [Field::VonMises, Field::Pressure, Field::Stretch, Field::StiffnessLost];
+    pub const ALL: [Field; 5] =
+        [Field::VonMises, Field::Pressure, Field::Stretch, Field::StiffnessLeft, Field::Opening];
+
+    /// Whether a scene has it.
+    pub fn is_in(self, scene: &Scene) -> bool {
+        self != Field::Opening || scene.effects.cohesive.is_some()
+    }
 
     /// For people, with the unit of [`Field::unit`].
     pub fn name(self) -> &'static str {
@@ -34,7 +45,8 @@ impl Field {
             Field::VonMises => "von Mises stress",
             Field::Pressure => "pressure",
             Field::Stretch => "largest stretch",
-            Field::StiffnessLost => "stiffness left",
+            Field::StiffnessLeft => "stiffness left",
+            Field::Opening => "opening of torn faces",
         }
     }
 
@@ -42,11 +54,12 @@ impl Field {
     pub fn unit(self) -> (&'static str, f64) {
         match self {
             Field::VonMises | Field::Pressure => ("kPa", 1e3),
-            Field::Stretch | Field::StiffnessLost => ("-", 1.0),
+            Field::Stretch | Field::StiffnessLeft => ("-", 1.0),
+            Field::Opening => ("mm", 1e-3),
         }
     }
 
-    /// Its place in the fields of a node.
+    /// Its place in the fields of a node; beyond them the shader measures it.
     fn lane(self) -> usize {
         self as usize
     }
@@ -68,7 +81,7 @@ struct View {
     view_projection: [[f32; 4]; 4],
     eye: [f32; 4],
     range: [f32; 4],
-    plain: [f32; 4],
+    surface: [f32; 4],
 }
 
 /// Rectangle of the target that is drawn into [px].
@@ -84,28 +97,30 @@ pub struct Area {
 pub struct SceneView {
     backdrop: wgpu::RenderPipeline,
     tissue: wgpu::RenderPipeline,
+    veil: wgpu::RenderPipeline,
     tool: wgpu::RenderPipeline,
     tissue_bindings: wgpu::BindGroup,
+    veil_bindings: wgpu::BindGroup,
     tool_bindings: wgpu::BindGroup,
     view: wgpu::Buffer,
     table: wgpu::Buffer,
     rest: wgpu::Buffer,
+    /// Other copies of every node, where faces may separate.
+    copies: Option<wgpu::Buffer>,
+    /// What the table holds.
+    map: ColourMap,
     corners: (wgpu::Buffer, u32),
+    /// So many corners belong to the surface, the rest to the cut.
+    surface: u32,
     tool_corners: (wgpu::Buffer, u32),
     outline: Outline,
     depth: Option<(wgpu::Extent3d, wgpu::TextureView)>,
 }
 
-/// Colours of the scale from 0 to 1, sRGB: perceptually uniform, from dark to bright, apart for the colour-blind.
-pub fn colour_table() -> Vec<[f32; 4]> {
+/// Colours of the scale from 0 to 1, sRGB.
+fn colour_table(map: ColourMap) -> Vec<[f32; 4]> {
     let part = |byte: u8| f32::from(byte) / 255.0;
-    (0..256).map(|n| colour_bytes(f64::from(n) / 255.0)).map(|[r, g, b]| [part(r), part(g), part(b), 1.0]).collect()
-}
-
-/// The colour at 0..1 as bytes (sRGB).
-pub fn colour_bytes(at: f64) -> [u8; 3] {
-    let c = colorous::VIRIDIS.eval_continuous(at.clamp(0.0, 1.0));
-    [c.r, c.g, c.b]
+    (0..256).map(|n| map.colour(f64::from(n) / 255.0)).map(|[r, g, b]| [part(r), part(g), part(b), 1.0]).collect()
 }
 
 impl SceneView {
@@ -113,12 +128,13 @@ impl SceneView {
     ///
     /// # Errors
     /// `Error::Device` where the device refuses a pipeline, or the engine holds no fields.
-    pub fn new(gpu: &Gpu, engine: &GpuEngine, mesh: &Mesh, format: wgpu::TextureFormat) -> Result<Self> {
-        let device = &gpu.device;
+    pub fn new(gpu: &Gpu, engine: &GpuEngine, model: &Model, format: wgpu::TextureFormat) -> Result<Self> {
+        let (device, mesh) = (&gpu.device, &model.mesh);
+        let parts = !model.separation.pairs.is_empty();
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("tissue"),
-            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+            source: wgpu::ShaderSource::Wgsl(if parts { format!("{SHADER}{PARTED}").into() } else { SHADER.into() }),
         });
         let pipeline = |vertex: &str, fragment: &str, stride: usize, attributes: &[wgpu::VertexAttribute], cull| {
             let buffers = [Some(wgpu::VertexBufferLayout {
@@ -155,19 +171,27 @@ impl SceneView {
             })
         };
         let backdrop = pipeline("backdrop_corner", "backdrop_colour", 0, &[], None);
+        let tissue_vertex = if parts { "parted_corner" } else { "tissue_corner" };
         let tissue = pipeline(
-            "tissue_corner",
+            tissue_vertex,
             "tissue_colour",
             size_of::<TissueCorner>(),
             &wgpu::vertex_attr_array![0 => Uint32x2, 1 => Float32],
             // The tissue is closed, its faces look outwards.
             Some(wgpu::Face::Back),
         );
+        let veil = pipeline(
+            tissue_vertex,
+            "veil_colour",
+            size_of::<TissueCorner>(),
+            &wgpu::vertex_attr_array![0 => Uint32x2, 1 => Float32],
+            Some(wgpu::Face::Back),
+        );
         let tool = pipeline(
             "tool_corner",
             "tool_colour",
             size_of::<ToolCorner>(),
-            &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
+            &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4],
             None,
         );
         let filled = |label, contents: &[u8], usage| {
@@ -175,7 +199,8 @@ impl SceneView {
         };
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let view = filled("view", bytemuck::bytes_of(&View::zeroed()), uniform);
-        let table = filled("colour_table", bytemuck::cast_slice(&colour_table()), uniform);
+        let map = ColourMap::default();
+        let table = filled("colour_table", bytemuck::cast_slice(&colour_table(map)), uniform);
         let rest: Vec<[f32; 4]> = (0..mesh.node_count())
             .map(|node| {
                 let x = mesh.rest_position(node).as_vec3();
@@ -183,8 +208,13 @@ impl SceneView {
             })
             .collect();
         let rest = filled("node_rest", bytemuck::cast_slice(&rest), wgpu::BufferUsages::STORAGE);
+        let copies = parts
+            .then(|| filled("node_copies", bytemuck::cast_slice(&node_copies(model)), wgpu::BufferUsages::STORAGE));
         let [displacement, fields] = drawn_buffers(engine)?;
-        let tissue_bindings = bindings(device, &tissue, &[&view, &table, displacement, &rest, fields]);
+        let mut buffers = vec![&view, &table, displacement, &rest, fields];
+        buffers.extend(&copies);
+        let tissue_bindings = bindings(device, &tissue, &buffers);
+        let veil_bindings = bindings(device, &veil, &buffers);
         let tool_bindings = bindings(device, &tool, &[&view]);
         let nothing = || {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -196,17 +226,22 @@ impl SceneView {
         };
         let mut drawing = SceneView {
             corners: (nothing(), 0),
+            surface: 0,
             tool_corners: (nothing(), 0),
             outline: Outline::of(mesh),
             depth: None,
             backdrop,
             tissue,
+            veil,
             tool,
             tissue_bindings,
+            veil_bindings,
             tool_bindings,
             view,
             table,
             rest,
+            copies,
+            map,
         };
         drawing.cut(gpu, mesh, None);
         if let Some(error) = pollster::block_on(scope.pop()) {
@@ -221,17 +256,21 @@ impl SceneView {
     /// `Error::Device` where it was not made to be drawn.
     pub fn take_buffers(&mut self, gpu: &Gpu, engine: &GpuEngine) -> Result<()> {
         let [displacement, fields] = drawn_buffers(engine)?;
-        let buffers = [&self.view, &self.table, displacement, &self.rest, fields];
+        let mut buffers = vec![&self.view, &self.table, displacement, &self.rest, fields];
+        buffers.extend(&self.copies);
         self.tissue_bindings = bindings(&gpu.device, &self.tissue, &buffers);
+        self.veil_bindings = bindings(&gpu.device, &self.veil, &buffers);
         Ok(())
     }
 
     /// Takes away what lies beyond a plane.
     pub fn cut(&mut self, gpu: &Gpu, mesh: &Mesh, plane: Option<RestPlane>) {
-        self.corners = vertices(gpu, &self.outline.cut(mesh, plane));
+        let cut = self.outline.cut(mesh, plane);
+        self.corners = vertices(gpu, &cut.corners);
+        self.surface = cut.surface as u32;
     }
 
-    /// Puts the tool to its place.
+    /// Puts the tool, and what else stands in the view, to its place.
     pub fn place_tool(&mut self, gpu: &Gpu, corners: &[ToolCorner]) {
         self.tool_corners = vertices(gpu, corners);
     }
@@ -243,7 +282,7 @@ impl SceneView {
         encoder: &mut wgpu::CommandEncoder,
         (target, size): (&wgpu::TextureView, wgpu::Extent3d),
         area: Area,
-        (camera, scale): (&Camera, &Scale),
+        (camera, scale, look): (&Camera, &Scale, &Look),
     ) {
         if self.depth.as_ref().is_none_or(|(known, _)| *known != size) {
             let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -269,9 +308,13 @@ impl SceneView {
                 scale.field.lane() as f32,
                 f32::from(u8::from(scale.logarithmic)),
             ],
-            plain: STEEL,
+            surface: [look.opacity, 0.0, 0.0, 0.0],
         };
         gpu.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+        if self.map != look.map {
+            gpu.queue.write_buffer(&self.table, 0, bytemuck::cast_slice(&colour_table(look.map)));
+            self.map = look.map;
+        }
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("tissue"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -297,15 +340,22 @@ impl SceneView {
         pass.set_scissor_rect(area.x as u32, area.y as u32, width as u32, height as u32);
         pass.set_pipeline(&self.backdrop);
         pass.draw(0..3, 0..1);
-        for (pipeline, bindings, (buffer, count)) in [
-            (&self.tissue, &self.tissue_bindings, &self.corners),
-            (&self.tool, &self.tool_bindings, &self.tool_corners),
+        // Discarding pixels keeps an adapter from leaving out hidden ones early: only where the surface is seen through.
+        let whole = look.opacity >= 1.0;
+        let (surface, surface_bindings) =
+            if whole { (&self.tissue, &self.tissue_bindings) } else { (&self.veil, &self.veil_bindings) };
+        let (corners, count) = &self.corners;
+        let (tool_corners, tool_count) = &self.tool_corners;
+        for (pipeline, bindings, buffer, range) in [
+            (surface, surface_bindings, corners, 0..self.surface),
+            (&self.tissue, &self.tissue_bindings, corners, self.surface..*count),
+            (&self.tool, &self.tool_bindings, tool_corners, 0..*tool_count),
         ] {
-            if *count > 0 {
+            if !range.is_empty() {
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, bindings, &[]);
                 pass.set_vertex_buffer(0, buffer.slice(..));
-                pass.draw(0..*count, 0..1);
+                pass.draw(range, 0..1);
             }
         }
     }
@@ -330,6 +380,23 @@ fn bindings(device: &wgpu::Device, pipeline: &wgpu::RenderPipeline, buffers: &[&
         layout: &pipeline.get_bind_group_layout(0),
         entries: &entries,
     })
+}
+
+/// The other copies of every node, itself where there are fewer than four.
+fn node_copies(model: &Model) -> Vec<[u32; 4]> {
+    let mut copies: Vec<[u32; 4]> = (0..model.mesh.node_count() as u32).map(|node| [node; 4]).collect();
+    for pair in &model.separation.pairs {
+        let [a, b] = pair.nodes;
+        for (from, to) in [(a, b), (b, a)] {
+            let known = &mut copies[from as usize];
+            if !known.contains(&to)
+                && let Some(free) = known.iter_mut().find(|n| **n == from)
+            {
+                *free = to;
+            }
+        }
+    }
+    copies
 }
 
 /// Corners in a buffer of the device, and how many.

@@ -73,9 +73,8 @@ impl Outline {
     }
 
     /// Triangles of the tissue that is left by a plane: its surface and the cut. Three corners each.
-    pub fn cut(&self, mesh: &Mesh, plane: Option<RestPlane>) -> Vec<TissueCorner> {
-        let beyond = |node: u32| plane.map_or(-1.0, |p| p.normal.dot(mesh.rest_position(node as usize)) - p.offset);
-        let distance: Vec<f64> = (0..mesh.node_count() as u32).map(beyond).collect();
+    pub fn cut(&self, mesh: &Mesh, plane: Option<RestPlane>) -> Cut {
+        let distance = distances(mesh, plane);
         let mut corners = Vec::with_capacity(6 * self.faces.len());
         let mut polygon = Vec::with_capacity(8);
         for face in &self.faces {
@@ -89,30 +88,58 @@ impl Outline {
             }
             fan(&polygon, &mut corners);
         }
-        let Some(plane) = plane else { return corners };
-        let (first, second) = crate::needle::lateral_axes(plane.normal);
-        for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell)) {
-            let nodes = mesh.cell_nodes(cell);
-            let edges: &[[usize; 2]] = if nodes.len() == 8 { &HEXAHEDRON_EDGES } else { &TETRAHEDRON_EDGES };
-            polygon.clear();
-            polygon.extend(edges.iter().filter_map(|[a, b]| crossing(&distance, nodes[*a] as u32, nodes[*b] as u32)));
-            if polygon.len() < 3 {
-                continue;
-            }
-            // A plane cuts a convex cell in a convex polygon: its corners in the order of their angle.
-            let place = |corner: &TissueCorner| {
-                let [a, b] = corner.nodes.map(|n| mesh.rest_position(n as usize));
-                a.lerp(b, f64::from(corner.part))
-            };
-            let centre = polygon.iter().map(place).sum::<DVec3>() / polygon.len() as f64;
-            let angle = |corner: &TissueCorner| {
-                let arm = place(corner) - centre;
-                arm.dot(second).atan2(arm.dot(first))
-            };
-            polygon.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
-            fan(&polygon, &mut corners);
+        let surface = corners.len();
+        if let Some(plane) = plane {
+            slice_into(mesh, plane, &distance, &mut corners);
         }
-        corners
+        Cut { corners, surface }
+    }
+}
+
+/// What a plane leaves of the tissue.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cut {
+    pub corners: Vec<TissueCorner>,
+    /// So many of them belong to the surface, the rest to the cut.
+    pub surface: usize,
+}
+
+/// Triangles of the tissue in a plane, three corners each.
+pub fn slice(mesh: &Mesh, plane: RestPlane) -> Vec<TissueCorner> {
+    let mut corners = Vec::new();
+    slice_into(mesh, plane, &distances(mesh, Some(plane)), &mut corners);
+    corners
+}
+
+/// How far every node lies beyond the plane [m]; all are inside without one.
+fn distances(mesh: &Mesh, plane: Option<RestPlane>) -> Vec<f64> {
+    let beyond = |node: usize| plane.map_or(-1.0, |p| p.normal.dot(mesh.rest_position(node)) - p.offset);
+    (0..mesh.node_count()).map(beyond).collect()
+}
+
+fn slice_into(mesh: &Mesh, plane: RestPlane, distance: &[f64], corners: &mut Vec<TissueCorner>) {
+    let mut polygon = Vec::with_capacity(8);
+    let (first, second) = crate::needle::lateral_axes(plane.normal);
+    for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell)) {
+        let nodes = mesh.cell_nodes(cell);
+        let edges: &[[usize; 2]] = if nodes.len() == 8 { &HEXAHEDRON_EDGES } else { &TETRAHEDRON_EDGES };
+        polygon.clear();
+        polygon.extend(edges.iter().filter_map(|[a, b]| crossing(distance, nodes[*a] as u32, nodes[*b] as u32)));
+        if polygon.len() < 3 {
+            continue;
+        }
+        // A plane cuts a convex cell in a convex polygon: its corners in the order of their angle.
+        let place = |corner: &TissueCorner| {
+            let [a, b] = corner.nodes.map(|n| mesh.rest_position(n as usize));
+            a.lerp(b, f64::from(corner.part))
+        };
+        let centre = polygon.iter().map(place).sum::<DVec3>() / polygon.len() as f64;
+        let angle = |corner: &TissueCorner| {
+            let arm = place(corner) - centre;
+            arm.dot(second).atan2(arm.dot(first))
+        };
+        polygon.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+        fan(&polygon, corners);
     }
 }
 
@@ -158,18 +185,22 @@ mod tests {
         for mesh in [Mesh::Block(block()), tets] {
             let outline = Outline::of(&mesh);
             let whole = 2.0 * (4.0 * 3.0 + 3.0 * 2.0 + 2.0 * 4.0) * 1e-6;
-            assert!((area(&mesh, &outline.cut(&mesh, None)) / whole - 1.0).abs() < 1e-12);
+            assert!((area(&mesh, &outline.cut(&mesh, None).corners) / whole - 1.0).abs() < 1e-12);
             for part in [0.3, 1.0, 2.5] {
                 let plane = RestPlane { normal: DVec3::X, offset: part * 1e-3 };
                 let left = 2.0 * (part * 3.0 + 3.0 * 2.0 + 2.0 * part) * 1e-6;
-                let found = area(&mesh, &outline.cut(&mesh, Some(plane)));
+                let cut = outline.cut(&mesh, Some(plane));
+                let found = area(&mesh, &cut.corners);
                 assert!((found / left - 1.0).abs() < 1e-6, "{part}: {found} against {left}");
+                // The slice alone is what the cut adds to the surface.
+                assert_eq!(cut.corners[cut.surface..], slice(&mesh, plane));
+                assert!((area(&mesh, &cut.corners[cut.surface..]) / 6e-6 - 1.0).abs() < 1e-6);
             }
         }
         // A plane at a slope cuts a triangle off a corner.
         let mesh = Mesh::Block(block());
         let plane = RestPlane { normal: DVec3::ONE.normalize(), offset: 1e-3 / 3f64.sqrt() };
-        let corners = Outline::of(&mesh).cut(&mesh, Some(plane));
+        let corners = Outline::of(&mesh).cut(&mesh, Some(plane)).corners;
         let expected = (3f64.sqrt() / 2.0 + 1.5) * 1e-6;
         assert!((area(&mesh, &corners) / expected - 1.0).abs() < 1e-6);
     }
@@ -177,6 +208,6 @@ mod tests {
     #[test]
     fn nothing_is_left_beyond_the_block() {
         let mesh = Mesh::Block(block());
-        assert!(Outline::of(&mesh).cut(&mesh, Some(RestPlane { normal: DVec3::X, offset: -1e-3 })).is_empty());
+        assert!(Outline::of(&mesh).cut(&mesh, Some(RestPlane { normal: DVec3::X, offset: -1e-3 })).corners.is_empty());
     }
 }

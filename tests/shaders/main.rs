@@ -490,3 +490,28 @@ fn a_broken_stage_names_file_and_line() {
     let text = SOURCES.iter().find(|s| s.0 == "shared/driven_faces").unwrap().1;
     assert!(text.lines().nth(line - 1).unwrap().contains("step_input"), "line {line} of driven_faces: {error}");
 }
+
+/// The shaders that draw: they are no stages.
+const DRAWING: [(&str, &str); 4] = [
+    ("render/stress_picture", include_str!("../../shaders/render/stress_picture.wgsl")),
+    ("render/tissue", include_str!("../../shaders/render/tissue.wgsl")),
+    // Where faces may part.
+    (
+        "render/tissue with render/parted",
+        concat!(include_str!("../../shaders/render/tissue.wgsl"), include_str!("../../shaders/render/parted.wgsl")),
+    ),
+    ("render/ultrasound", include_str!("../../shaders/render/ultrasound.wgsl")),
+];
+
+#[test]
+fn the_drawing_shaders_validate_and_keep_the_budget() {
+    for (name, source) in DRAWING {
+        let module = naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let mut validator =
+            naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+        validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {}", e.into_inner()));
+        let storage = |v: &naga::GlobalVariable| matches!(v.space, naga::AddressSpace::Storage { .. });
+        let count = module.global_variables.iter().filter(|(_, v)| storage(v)).count();
+        assert!(count <= 8, "{name}: {count} storage buffers");
+    }
+}

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use rayon::prelude::*;
 
-use super::everything;
+use super::{DRAWING, everything};
 
 /// A compiler by its program and the arguments before the file.
 const COMPILERS: [(&str, &[&str]); 2] = [("tint", &["--format", "wgsl"]), ("naga", &[])];
@@ -25,11 +25,11 @@ fn is_there(program: &str) -> bool {
 #[test]
 fn another_compiler_takes_every_shader() {
     let folder = tempfile::tempdir().unwrap();
-    let picture = include_str!("../../shaders/render/stress_picture.wgsl").to_string();
+    let pictures = DRAWING.map(|(what, text)| (what, text.to_string()));
     let texts: Vec<(&str, &String)> = everything()
         .iter()
         .map(|(what, r)| (what.as_str(), &r.composed.source))
-        .chain([("render/stress_picture", &picture)])
+        .chain(pictures.iter().map(|(what, text)| (*what, text)))
         .collect();
     let files: Vec<_> = texts
         .iter()
