@@ -281,7 +281,7 @@ fn an_edited_scene_is_read_anew() {
     let Some(display) = Display::open() else { return };
     let file = display.path("mine.toml");
     let text = std::fs::read_to_string(scene("training/hit_target.toml")).unwrap();
-    let text = text.replace("cell_size_mm = 0.6", "cell_size_mm = 1.2");
+    let text = text.replace("cell_size_mm = 0.65", "cell_size_mm = 1.2");
     std::fs::write(&file, &text).unwrap();
     let out = display.path("run");
     let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
