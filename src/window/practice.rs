@@ -295,9 +295,13 @@ impl Practice {
             Taken::Engine => Renewed::Buffers,
             Taken::Simulation(source, simulation) => {
                 self.save()?;
-                let (leader, pace) = (self.leader, self.tuning.last);
+                let (leader, pace, runs) = (self.leader, self.tuning.last, self.state == State::Running);
                 self.begin(*simulation, source.scene()?, source, leader)?;
                 self.tuning.last = pace;
+                // What ran goes on running, from its beginning.
+                if runs {
+                    self.state = State::Running;
+                }
                 return Ok(Renewed::Attempt);
             }
         };
