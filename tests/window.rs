@@ -61,14 +61,18 @@ impl Display {
     }
 
     fn view(&self, arguments: &[&str]) -> Command {
+        self.view_of("scenes/muscle_biopsy.toml", "tissue.cell_size_mm=1.0", arguments)
+    }
+
+    fn view_of(&self, scene: &str, change: &str, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
         command
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .env("DISPLAY", &self.name)
             .env_remove("WAYLAND_DISPLAY")
             .arg("view")
-            .arg("scenes/muscle_biopsy.toml")
-            .args(["--set", "tissue.cell_size_mm=1.0"])
+            .arg(scene)
+            .args(["--set", change])
             .args(arguments);
         command
     }
@@ -191,4 +195,53 @@ fn without_a_display_there_is_a_message() {
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{told}");
     assert!(told.contains("way out") && told.contains("stylet run") && !told.contains("panicked"), "{told}");
+}
+
+#[test]
+fn the_mouse_pushes_and_tilts_a_needle_on_a_free_path() {
+    let Some(display) = Display::open() else { return };
+    let out = display.path("attempt");
+    let arguments = ["--frames", "100000", "--out", out.to_str().unwrap()];
+    let mut child = display
+        .view_of("scenes/free_hand/change_of_direction.toml", "tissue.cell_size_mm=1.3", &arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    display.wait();
+    let frames = || std::fs::read_to_string(out.join("force.csv")).map_or(0, |t| t.lines().count());
+    let later = |count: usize| {
+        let (begin, first) = (Instant::now(), frames());
+        while frames() < first + count {
+            assert!(begin.elapsed() < Duration::from_secs(90), "{} frames", frames());
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    };
+    later(5);
+    // Pushed with Shift wherever the pointer is, then tilted with Alt to the right.
+    for (key, [x, y]) in [("shift", ["0", "12"]), ("alt", ["12", "0"])] {
+        display.xdotool(&["mousemove", "600", "420", "keydown", key, "mousedown", "1"]);
+        for _ in 0..8 {
+            display.xdotool(&["mousemove_relative", "--", x, y]);
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        display.xdotool(&["mouseup", "1", "keyup", key]);
+        later(30);
+    }
+    let begin = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        display.xdotool(&["key", "ctrl+q"]);
+        assert!(begin.elapsed() < Duration::from_secs(30), "the window does not close");
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let session: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("session.json")).unwrap()).unwrap();
+    let last = session["poses"].as_array().unwrap().last().unwrap();
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    // 96 points down on the screen, and 96 to the right: the hub leans there, which is +x and a little +y in this view.
+    assert!(number(&last["depth"]) > 1e-3, "{last}");
+    assert!(number(&last["direction"][0]) < -0.05 && number(&last["direction"][2]) < -0.9, "{last}");
+    assert!(number(&last["entry"][0]).abs() < 1e-9, "{last}");
 }

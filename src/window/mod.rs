@@ -1,6 +1,7 @@
 //! The window: an insertion is practised by hand, or watched, while the device solves the tissue and draws it.
 //!
-//! [`practice`] holds one attempt: simulation, who leads, records. [`hand`] is what a hand holds. [`section`], [`tool_shape`] and
+//! [`practice`] holds one attempt: simulation, who leads, records. [`hand`] is what a hand holds, [`grip`] how
+//! the mouse takes hold of the needle, [`reach`] what the tissue follows of it. [`section`], [`tool_shape`] and
 //! [`camera`] say what is drawn, [`scene_view`] draws it from the solver's own buffers, [`panels`] stand around it, [`app`] is the
 //! window itself. The window owns no physics: it sends poses and reads records.
 
@@ -8,9 +9,11 @@ pub mod accuracy;
 pub mod app;
 pub mod camera;
 pub mod effects_panel;
+pub mod grip;
 pub mod hand;
 pub mod panels;
 pub mod practice;
+pub mod reach;
 pub mod scene_view;
 pub mod section;
 pub mod texts;

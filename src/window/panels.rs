@@ -103,6 +103,7 @@ pub fn controls(
             desk.speed = speed * 1e-3;
         }
         ui.small(texts::KEYS);
+        ui.small(if practice.path_is_free() { texts::FREE_PATH } else { texts::PLANNED_PATH });
     }
     egui::CollapsingHeader::new(texts::EFFECTS).show(ui, |ui| {
         let (scene, tuning) = practice.tunable();
