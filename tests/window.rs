@@ -245,3 +245,67 @@ fn the_mouse_pushes_and_tilts_a_needle_on_a_free_path() {
     assert!(number(&last["direction"][0]) < -0.05 && number(&last["direction"][2]) < -0.9, "{last}");
     assert!(number(&last["entry"][0]).abs() < 1e-9, "{last}");
 }
+
+/// Another program over OpenIGTLink leads the needle of a real window, and the forces of the hand are written at 1 kHz.
+#[cfg(feature = "link")]
+#[test]
+fn another_program_leads_the_needle_and_sees_it() {
+    use std::io::{BufRead, BufReader, Write};
+
+    use glam::DVec3;
+    use stylet::link::basis_along;
+    use stylet::link::message::{Content, Transform};
+    use stylet::link::read::{self, Received};
+
+    let Some(display) = Display::open() else { return };
+    let forces = display.path("forces.csv");
+    let mut child = display
+        .view(&["--link", "--link-port", "0", "--allow-control", "--frames", "100000"])
+        .args(["--haptic-log".as_ref(), forces.as_os_str()])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut told = BufReader::new(child.stdout.take().unwrap());
+    let mut line = String::new();
+    told.read_line(&mut line).unwrap();
+    let address = line.trim().strip_prefix("OpenIGTLink at ").unwrap_or_else(|| panic!("{line}")).to_string();
+    let mut peer = std::net::TcpStream::connect(&address).unwrap();
+    peer.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    let wanted = Transform { rotation: basis_along(DVec3::NEG_Z), translation: DVec3::new(0.0, 0.0, -2.0) };
+    peer.write_all(&Content::Transform(wanted).encode("NeedleControl", 0)).unwrap();
+    // The depth of a state whose needle has come as far as it was asked to.
+    let begin = Instant::now();
+    let depth = loop {
+        assert!(begin.elapsed() < Duration::from_secs(120), "the needle does not follow");
+        let Received { content, .. } = read::message(&mut peer, |_| true, true).unwrap().expect("a message");
+        let Some(Content::Text(text)) = content else { continue };
+        let state: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let depth = state["depth_mm"].as_f64().unwrap();
+        if depth > 1.999 {
+            assert_eq!(state["state"], "running");
+            assert!(state["axial_force_n"].as_f64().unwrap() > 0.01, "{state}");
+            break depth;
+        }
+    };
+    assert!(depth < 2.001, "{depth}");
+    drop(peer);
+    display.wait();
+    std::thread::sleep(Duration::from_millis(500));
+    let begin = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        display.xdotool(&["key", "ctrl+q"]);
+        assert!(begin.elapsed() < Duration::from_secs(30), "the window does not close");
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    let output = child.wait_with_output().unwrap();
+    let mut rest = String::new();
+    std::io::Read::read_to_string(&mut told, &mut rest).unwrap();
+    assert!(output.status.success(), "{rest}{}", String::from_utf8_lossy(&output.stderr));
+    println!("{rest}");
+    assert!(rest.contains("haptic: ") && rest.contains("2.00 mm"), "{rest}");
+    let table = std::fs::read_to_string(&forces).unwrap();
+    let axial: Vec<f64> = table.lines().skip(1).map(|row| row.split(',').nth(1).unwrap().parse().unwrap()).collect();
+    assert!(axial.len() > 1000 && axial.iter().any(|f| *f > 0.01), "{} forces", axial.len());
+    assert!(axial.last().unwrap().abs() < 0.5, "the hand is let go");
+}

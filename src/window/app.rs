@@ -14,6 +14,7 @@ use winit::window::{Window, WindowId};
 
 use super::ViewOptions;
 use super::camera::Camera;
+use super::devices::Devices;
 use super::grip::{Grip, Modifiers, Sight};
 use super::hand::{Desk, Key, Recording};
 use super::panels::{self, Choices, ReferenceCurve, Wishes};
@@ -26,6 +27,7 @@ use super::tuning::Source;
 use super::watch::Watch;
 use crate::gpu::Gpu;
 use crate::gpu::compose::{SOURCES, read_sources};
+use crate::haptic::LoopTiming;
 use crate::scene::Scene;
 use crate::session::Session;
 use crate::solver::change::Reach;
@@ -67,6 +69,8 @@ pub struct ViewOutcome {
     /// The same of the frames alone, from their start to their results.
     pub real_time_factor: f64,
     pub latency: Latency,
+    /// How the loop of the forces kept its time, where there was one.
+    pub haptic: Option<LoopTiming>,
     pub stopped: Option<String>,
 }
 
@@ -186,6 +190,7 @@ struct Open {
     view: SceneView,
     practice: Practice,
     desk: Desk,
+    devices: Devices,
     recording: Option<Recording>,
     recorded: Option<Session>,
     choices: Choices,
@@ -349,6 +354,7 @@ impl App {
         if self.options.script || self.recorded.is_some() || self.options.frames.is_some() {
             practice.state = State::Running;
         }
+        let devices = Devices::open(&self.options, desk.speed)?;
         let now = Instant::now();
         let mut open = Open {
             window,
@@ -360,6 +366,7 @@ impl App {
             view,
             practice,
             desk,
+            devices,
             recording: self.recorded.as_ref().map(|session| Recording::new(session.poses.clone())),
             recorded: self.recorded.clone(),
             choices: Choices::new(Some((1, at))),
@@ -433,6 +440,10 @@ impl App {
                 && let Err(error) = open.screenshot(&self.reference, path)
             {
                 self.failure.get_or_insert(error);
+            }
+            match open.devices.finish() {
+                Ok(timing) => self.outcome.haptic = timing,
+                Err(error) => _ = self.failure.get_or_insert(error),
             }
             if let Err(error) = open.practice.save() {
                 self.failure.get_or_insert(error);
@@ -554,6 +565,7 @@ impl Open {
     fn picture(&mut self, reference: &[ReferenceCurve]) -> Result<Wishes> {
         let begin = Instant::now();
         self.next = begin + Duration::from_secs_f64(PICTURE);
+        self.devices.tend(&mut self.practice, &self.desk);
         let due = self.frame_is_due();
         if due {
             self.start()?;
@@ -614,7 +626,7 @@ impl Open {
         }
         match &mut self.recording {
             Some(recording) => self.practice.start(recording),
-            None => self.practice.start(&mut self.desk),
+            None => self.practice.start(&mut self.devices.with(&mut self.desk)),
         }
     }
 
@@ -623,8 +635,9 @@ impl Open {
         let inputs = self.practice.latency.count;
         match &mut self.recording {
             Some(recording) => self.practice.finish(recording)?,
-            None => self.practice.finish(&mut self.desk)?,
+            None => self.practice.finish(&mut self.devices.with(&mut self.desk))?,
         }
+        self.devices.felt(&self.practice);
         // The force that answers an input is read at once.
         self.stale |= self.practice.latency.count > inputs;
         Ok(())
@@ -650,10 +663,11 @@ impl Open {
                 egui::ScrollArea::vertical().show(ui, |ui| {
                     let (practice, choices) = (&mut self.practice, &mut self.choices);
                     *wishes = panels::controls(ui, practice, choices, &mut self.camera, &mut self.desk);
+                    self.devices.show(ui, &self.practice);
                 });
             });
             egui::Panel::right("readings").default_size(330.0).show(ui, |ui| {
-                panels::readings(ui, &self.practice, &mut self.choices, reference);
+                panels::readings(ui, &self.practice, &mut self.choices, reference, self.devices.timing());
             });
             egui::CentralPanel::no_frame().show(ui, |ui| {
                 self.area = ui.available_rect_before_wrap();
