@@ -3,12 +3,14 @@
 //! Reading order, which is also the straight line that data takes:
 //! [`scene`] -> [`mesh`] -> [`effects`] -> [`separation`] and [`model`] -> [`solver`] (engines [`solver::cpu`] and
 //! [`gpu`]) -> [`observables`] -> [`output`] and [`render`]. [`stability`] runs that line on the hard cases, [`study`] many
-//! times over, [`training`] scores what a trainee did. [`untrusted`] lists the readers of files.
+//! times over, [`training`] scores what a trainee did, [`haptic`] gives the
+//! forces to a device at 1 kHz. [`untrusted`] lists the readers of files.
 
 pub mod commands;
 pub mod effects;
 pub mod error;
 pub mod gpu;
+pub mod haptic;
 #[cfg(feature = "link")]
 pub mod link;
 pub mod material;

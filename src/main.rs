@@ -152,6 +152,21 @@ struct ViewArgs {
     /// Write the last picture to this PNG file
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
+    /// Show needle and forces to other programs over OpenIGTLink, on this machine at port 18944
+    #[arg(long)]
+    link: bool,
+    /// Another port; 0: a free one, which is printed
+    #[arg(long, value_name = "PORT", requires = "link")]
+    link_port: Option<u16>,
+    /// Listen at this address; every other than 127.0.0.1 opens the simulation to the network
+    #[arg(long, value_name = "ADDRESS", requires = "link")]
+    link_address: Option<std::net::IpAddr>,
+    /// Programs over OpenIGTLink may lead the needle
+    #[arg(long, requires = "link")]
+    allow_control: bool,
+    /// Write the forces that a haptic device would get, 1000 a second, to this CSV file
+    #[arg(long, value_name = "FILE")]
+    haptic_log: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -561,6 +576,12 @@ fn view(args: ViewArgs, start: Instant) -> Result<String> {
         history: args.history,
         shaders: args.shaders,
         size: args.size.and_then(|size| Some([*size.first()?, *size.get(1)?])),
+        link: args.link.then_some(stylet::window::LinkChoice {
+            address: args.link_address,
+            port: args.link_port,
+            allow_control: args.allow_control,
+        }),
+        haptic_log: args.haptic_log,
     };
     let seen = stylet::window::view(&options, start)?;
     if let Some(reason) = seen.stopped {
@@ -576,9 +597,10 @@ fn view(args: ViewArgs, start: Instant) -> Result<String> {
             latency.longest * 1e3
         ),
     };
+    let haptic = seen.haptic.map_or(String::new(), |timing| format!("\nhaptic: {}", timing.text()));
     Ok(format!(
         "{} pictures, {:.1} a second; first one after {:.2} s\n{} frames of tissue, {:.2} of real time with the window open (tissue alone: \
-         {:.2}); {:.3} N at {:.2} mm\n{felt}",
+         {:.2}); {:.3} N at {:.2} mm\n{felt}{haptic}",
         seen.pictures,
         seen.frames_per_second,
         seen.first_picture,

@@ -423,7 +423,7 @@ impl Model {
         });
     }
 
-    /// Nodes and cells that the needle can reach on a free path, generously.
+    /// Nodes and cells that the needle can reach on a free path, generously; all of them where a hand leads it.
     fn plan_free_path(&mut self, params: puncture::Params, needle: NeedleShape) {
         let Some(mesh) = self.mesh.as_block() else { return };
         let motion = &self.scene.motion;
@@ -434,7 +434,8 @@ impl Model {
         };
         let axes: Vec<(DVec3, DVec3)> =
             motion.samples(0.25e-3).into_iter().filter(|p| p.depth > -FREE_PATH_ROOM).map(inside).collect();
-        let near = |x: DVec3, reach: f64| axes.iter().any(|(a, b)| distance_to_segment(x, *a, *b) < reach);
+        let near =
+            |x: DVec3, reach: f64| params.anywhere || axes.iter().any(|(a, b)| distance_to_segment(x, *a, *b) < reach);
         let h = self.scene.tissue.cell_size;
         let reach = params.ring_radius.max(needle.radius + 1.5 * h) + FREE_PATH_ROOM;
         self.contact_nodes = (0..mesh.node_count())

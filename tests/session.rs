@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use common::*;
+use glam::{DQuat, DVec3};
 use stylet::observables::FrameRecord;
 use stylet::scene::Scene;
+use stylet::scene::motion::HandPose;
 use stylet::session::Session;
 use stylet::solver::simulation::{Purpose, Simulation};
 
@@ -36,7 +38,7 @@ fn practised(frames: usize, ahead: usize) -> (Session, Vec<FrameRecord>) {
     for frame in 0..frames + ahead {
         if frame < frames {
             let now = simulation.hand().unwrap();
-            session.poses.push(stylet::scene::motion::HandPose { depth: wanted(frame), ..now });
+            session.poses.push(HandPose { depth: wanted(frame), ..now });
             simulation.lead(session.poses.last().unwrap());
             simulation.start_frames().unwrap();
         }
@@ -140,7 +142,7 @@ fn a_hand_that_goes_as_the_script_does_feels_the_same() {
         if record.frame + 1 == scripted.frame_count() {
             break;
         }
-        led.lead(&stylet::scene::motion::HandPose { depth: pose.depth, ..now });
+        led.lead(&HandPose { depth: pose.depth, ..now });
         let same = led.next_frame().unwrap().unwrap();
         assert_eq!((same.frame, same.step), (record.frame, record.step));
         at_most("depth", (same.depth - record.depth).abs(), 1e-12);
@@ -177,6 +179,75 @@ fn a_session_gives_its_forces_again_bit_for_bit() {
     for (row, record) in table("first").lines().skip(1).zip(&records) {
         let force: f64 = row.split(',').nth(column).unwrap().parse().unwrap();
         at_most("force", (force - record.force.axial).abs(), 1e-8);
+    }
+}
+
+/// A small block with a free path: in, tilted about the point of entry while it goes on, out, to another entry, and in again.
+const FREE: [&str; 3] = ["tissue.cell_size_mm=1.3", "tissue.size_mm=[14.0, 12.0, 10.0]", "solver.frame_rate_hz=30"];
+
+fn free_scene() -> Scene {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/free_hand/change_of_direction.toml");
+    Scene::load(&file, &FREE.map(String::from)).unwrap()
+}
+
+/// What a hand wants after `now` in a frame, by phases of 12 frames of 1/30 s.
+fn wanted_free(now: &HandPose, frame: usize) -> HandPose {
+    let turned = |angle: f64| DQuat::from_rotation_y(angle) * DQuat::from_rotation_x(0.4 * angle) * now.direction;
+    let way = 10e-3 / 30.0;
+    match frame / 12 {
+        0 => HandPose { depth: now.depth + way, ..*now },
+        1 => HandPose { depth: now.depth + 0.3 * way, direction: turned(0.02).normalize(), ..*now },
+        2 => HandPose { depth: now.depth - 2.0 * way, ..*now },
+        3 => HandPose {
+            entry: now.entry + DVec3::new(-0.25e-3, 0.1e-3, 0.0),
+            direction: turned(-0.03).normalize(),
+            ..*now
+        },
+        _ => HandPose { depth: now.depth + way, ..*now },
+    }
+}
+
+/// Records of a run that these poses lead.
+fn led_by(poses: impl Iterator<Item = HandPose>, device: Option<stylet::gpu::Gpu>) -> Vec<FrameRecord> {
+    let mut simulation = Simulation::for_purpose(free_scene(), device, Purpose { led: true, drawn: false }).unwrap();
+    let step = |pose| {
+        simulation.lead(&pose);
+        simulation.next_frame().unwrap().unwrap()
+    };
+    poses.map(step).collect()
+}
+
+#[test]
+fn tilts_and_another_entry_come_again_bit_for_bit() {
+    for device in [None, gpu()] {
+        let (drawn, mut frames) = (device.is_some(), 0);
+        let purpose = Purpose { led: true, drawn };
+        let scene = free_scene();
+        let mut simulation = Simulation::for_purpose(scene.clone(), device.clone(), purpose).unwrap();
+        let mut session = Session::new(&scene, &FREE.map(String::from), simulation.engine().info());
+        let mut records = Vec::new();
+        while frames < 66 {
+            let pose = wanted_free(&simulation.hand().unwrap(), frames);
+            session.poses.push(pose);
+            simulation.lead(&pose);
+            records.push(simulation.next_frame().unwrap().unwrap());
+            frames += 1;
+        }
+        let turned = session.poses.iter().map(|p| p.direction.angle_between(DVec3::NEG_Z)).fold(0.0, f64::max);
+        let aside = records.iter().map(|r| r.force.lateral.length()).fold(0.0, f64::max);
+        let axial = |from: usize, to: usize| records[from..to].iter().map(|r| r.force.axial).fold(0.0, f64::max);
+        println!("drawn {drawn}: {turned:.2} rad, {aside:.3} N aside, {:.3} N, {:.3} N", axial(0, 24), axial(48, 66));
+        assert!(turned > 0.2 && aside > 0.02, "{turned} rad, {aside} N");
+        // The second way in is through new tissue, away from the planned motion.
+        assert!(axial(0, 24) > 0.2 && axial(48, 66) > 0.2);
+        assert!(records.last().unwrap().energy.imbalance().abs() < 0.05, "{:?}", records.last().unwrap().energy);
+        let place = Place::new();
+        let file = place.path("session.json");
+        session.write(&file).unwrap();
+        let again = led_by(Session::read(&file).unwrap().poses.into_iter(), device);
+        assert_eq!(bits(&records), bits(&again));
+        let lateral = |r: &FrameRecord| r.force.lateral.to_array().map(f64::to_bits);
+        assert!(records.iter().map(lateral).eq(again.iter().map(lateral)));
     }
 }
 

@@ -61,14 +61,18 @@ impl Display {
     }
 
     fn view(&self, arguments: &[&str]) -> Command {
+        self.view_of("scenes/muscle_biopsy.toml", "tissue.cell_size_mm=1.0", arguments)
+    }
+
+    fn view_of(&self, scene: &str, change: &str, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
         command
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .env("DISPLAY", &self.name)
             .env_remove("WAYLAND_DISPLAY")
             .arg("view")
-            .arg("scenes/muscle_biopsy.toml")
-            .args(["--set", "tissue.cell_size_mm=1.0"])
+            .arg(scene)
+            .args(["--set", change])
             .args(arguments);
         command
     }
@@ -191,6 +195,119 @@ fn without_a_display_there_is_a_message() {
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{told}");
     assert!(told.contains("way out") && told.contains("stylet run") && !told.contains("panicked"), "{told}");
+}
+
+#[test]
+fn the_mouse_pushes_and_tilts_a_needle_on_a_free_path() {
+    let Some(display) = Display::open() else { return };
+    let out = display.path("attempt");
+    let arguments = ["--frames", "100000", "--out", out.to_str().unwrap()];
+    let mut child = display
+        .view_of("scenes/free_hand/change_of_direction.toml", "tissue.cell_size_mm=1.3", &arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    display.wait();
+    let frames = || std::fs::read_to_string(out.join("force.csv")).map_or(0, |t| t.lines().count());
+    let later = |count: usize| {
+        let (begin, first) = (Instant::now(), frames());
+        while frames() < first + count {
+            assert!(begin.elapsed() < Duration::from_secs(90), "{} frames", frames());
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    };
+    later(5);
+    // Pushed with Shift wherever the pointer is, then tilted with Alt to the right.
+    for (key, [x, y]) in [("shift", ["0", "12"]), ("alt", ["12", "0"])] {
+        display.xdotool(&["mousemove", "600", "420", "keydown", key, "mousedown", "1"]);
+        for _ in 0..8 {
+            display.xdotool(&["mousemove_relative", "--", x, y]);
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        display.xdotool(&["mouseup", "1", "keyup", key]);
+        later(30);
+    }
+    let begin = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        display.xdotool(&["key", "ctrl+q"]);
+        assert!(begin.elapsed() < Duration::from_secs(30), "the window does not close");
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let session: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("session.json")).unwrap()).unwrap();
+    let last = session["poses"].as_array().unwrap().last().unwrap();
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    // 96 points down on the screen, and 96 to the right: the hub leans there, which is +x and a little +y in this view.
+    assert!(number(&last["depth"]) > 1e-3, "{last}");
+    assert!(number(&last["direction"][0]) < -0.05 && number(&last["direction"][2]) < -0.9, "{last}");
+    assert!(number(&last["entry"][0]).abs() < 1e-9, "{last}");
+}
+
+/// Another program over OpenIGTLink leads the needle of a real window, and the forces of the hand are written at 1 kHz.
+#[cfg(feature = "link")]
+#[test]
+fn another_program_leads_the_needle_and_sees_it() {
+    use std::io::{BufRead, BufReader, Write};
+
+    use glam::DVec3;
+    use stylet::link::basis_along;
+    use stylet::link::message::{Content, Transform};
+    use stylet::link::read::{self, Received};
+
+    let Some(display) = Display::open() else { return };
+    let forces = display.path("forces.csv");
+    let mut child = display
+        .view(&["--link", "--link-port", "0", "--allow-control", "--frames", "100000"])
+        .args(["--haptic-log".as_ref(), forces.as_os_str()])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut told = BufReader::new(child.stdout.take().unwrap());
+    let mut line = String::new();
+    told.read_line(&mut line).unwrap();
+    let address = line.trim().strip_prefix("OpenIGTLink at ").unwrap_or_else(|| panic!("{line}")).to_string();
+    let mut peer = std::net::TcpStream::connect(&address).unwrap();
+    peer.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    let wanted = Transform { rotation: basis_along(DVec3::NEG_Z), translation: DVec3::new(0.0, 0.0, -2.0) };
+    peer.write_all(&Content::Transform(wanted).encode("NeedleControl", 0)).unwrap();
+    // The depth of a state whose needle has come as far as it was asked to.
+    let begin = Instant::now();
+    let depth = loop {
+        assert!(begin.elapsed() < Duration::from_secs(120), "the needle does not follow");
+        let Received { content, .. } = read::message(&mut peer, |_| true, true).unwrap().expect("a message");
+        let Some(Content::Text(text)) = content else { continue };
+        let state: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let depth = state["depth_mm"].as_f64().unwrap();
+        if depth > 1.999 {
+            assert_eq!(state["state"], "running");
+            assert!(state["axial_force_n"].as_f64().unwrap() > 0.01, "{state}");
+            break depth;
+        }
+    };
+    assert!(depth < 2.001, "{depth}");
+    drop(peer);
+    display.wait();
+    std::thread::sleep(Duration::from_millis(500));
+    let begin = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        display.xdotool(&["key", "ctrl+q"]);
+        assert!(begin.elapsed() < Duration::from_secs(30), "the window does not close");
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    let output = child.wait_with_output().unwrap();
+    let mut rest = String::new();
+    std::io::Read::read_to_string(&mut told, &mut rest).unwrap();
+    assert!(output.status.success(), "{rest}{}", String::from_utf8_lossy(&output.stderr));
+    println!("{rest}");
+    assert!(rest.contains("haptic: ") && rest.contains("2.00 mm"), "{rest}");
+    let table = std::fs::read_to_string(&forces).unwrap();
+    let axial: Vec<f64> = table.lines().skip(1).map(|row| row.split(',').nth(1).unwrap().parse().unwrap()).collect();
+    assert!(axial.len() > 1000 && axial.iter().any(|f| *f > 0.01), "{} forces", axial.len());
+    assert!(axial.last().unwrap().abs() < 0.5, "the hand is let go");
 }
 
 /// Depth of the tip in the last row [m], 0 where there is none.

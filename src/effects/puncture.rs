@@ -190,6 +190,8 @@ pub struct Params {
     pub entry_fade: f64,
     /// Find the path while the tip moves even where it could be planned.
     pub always_free: bool,
+    /// The free path may lead anywhere in the block: a hand holds the needle.
+    pub anywhere: bool,
     /// Exponent n of the rate of cutting in the tip forces; 0: no rate.
     pub rate_exponent: f64,
     /// Speed v_0 up to which the tip forces are those above [m/s].
@@ -234,6 +236,7 @@ impl Default for Params {
             contact_damping: 0.2,
             entry_fade: 2.0e-3,
             always_free: false,
+            anywhere: false,
             rate_exponent: 0.0,
             reference_speed: 1.0e-3,
         }

@@ -100,6 +100,16 @@ impl Scene {
         (0..2).find(|a| self.motion.direction[*a].abs() < 1e-9)
     }
 
+    /// The same for a hand: with room beyond the phases, and everywhere where the path is free.
+    pub fn for_hand(mut self) -> Scene {
+        self.motion = self.motion.with_room(self.tissue.size.z);
+        let free = crate::model::has_free_path(&self);
+        if let Some(puncture) = &mut self.effects.puncture {
+            puncture.anywhere = free;
+        }
+        self
+    }
+
     /// JSON schema of the scene file, for editors and for the `schema` command.
     pub fn schema() -> serde_json::Value {
         schemars::schema_for!(file::SceneFile).to_value()

@@ -76,7 +76,7 @@ impl Simulation {
     pub fn plan_change(&self, mut scene: Scene) -> Result<Change> {
         let now = &self.model.scene;
         if self.purpose.led {
-            scene.motion = scene.motion.with_room(scene.tissue.size.z);
+            scene = scene.for_hand();
         }
         let same_mesh = now.tissue == scene.tissue && now.mesh == scene.mesh;
         let same_lines = |mesh: &Mesh| *mesh == self.model.mesh;

@@ -161,7 +161,7 @@ impl Simulation {
     /// The same for a purpose. A tool that a hand leads stands on the surface until [`Simulation::lead`] is called.
     pub fn for_purpose(mut scene: Scene, device: Option<Gpu>, purpose: Purpose) -> Result<Self> {
         if purpose.led {
-            scene.motion = scene.motion.with_room(scene.tissue.size.z);
+            scene = scene.for_hand();
         }
         let mesh = Mesh::of_scene(&scene);
         let mut simulation = Self::prepare(scene, mesh, device, Vec::new(), MOST_STEPS_PER_FRAME, purpose)?;

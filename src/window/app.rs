@@ -14,7 +14,9 @@ use winit::window::{Window, WindowId};
 
 use super::ViewOptions;
 use super::camera::Camera;
-use super::hand::{Desk, InputDevice, Recording};
+use super::devices::Devices;
+use super::grip::{Grip, Modifiers, Sight};
+use super::hand::{Desk, Key, Recording};
 use super::marks;
 use super::panels::{self, Choices, ReferenceCurve, Wishes};
 use super::practice::{Latency, Leader, Practice, Renewed, State};
@@ -27,6 +29,7 @@ use super::tuning::Source;
 use super::watch::Watch;
 use crate::gpu::Gpu;
 use crate::gpu::compose::{SOURCES, read_sources};
+use crate::haptic::LoopTiming;
 use crate::scene::Scene;
 use crate::session::Session;
 use crate::solver::change::Reach;
@@ -68,6 +71,8 @@ pub struct ViewOutcome {
     /// The same of the frames alone, from their start to their results.
     pub real_time_factor: f64,
     pub latency: Latency,
+    /// How the loop of the forces kept its time, where there was one.
+    pub haptic: Option<LoopTiming>,
     pub stopped: Option<String>,
 }
 
@@ -188,6 +193,7 @@ struct Open {
     scan: Scan,
     practice: Practice,
     desk: Desk,
+    devices: Devices,
     recording: Option<Recording>,
     recorded: Option<Session>,
     choices: Choices,
@@ -213,6 +219,8 @@ struct Open {
     shader_files: Watch,
     /// Ctrl is held.
     control: bool,
+    /// What the drag under way does.
+    grip: Grip,
     /// What the attempt was worth, with those before it, while that is shown.
     debriefing: Option<Debriefing>,
 }
@@ -257,7 +265,10 @@ impl ApplicationHandler for App {
                 open.stale = true;
             }
             WindowEvent::Focused(false) => open.desk.let_go(),
-            WindowEvent::ModifiersChanged(modifiers) => open.control = modifiers.state().control_key(),
+            WindowEvent::ModifiersChanged(modifiers) => {
+                open.control = modifiers.state().control_key();
+                open.desk.shifting(open.control);
+            }
             WindowEvent::KeyboardInput { event, .. } if event.physical_key == KeyCode::KeyQ && open.control => {
                 self.close(event_loop);
             }
@@ -348,6 +359,7 @@ impl App {
         if self.options.script || self.recorded.is_some() || self.options.frames.is_some() {
             practice.state = State::Running;
         }
+        let devices = Devices::open(&self.options, desk.speed)?;
         let now = Instant::now();
         let mut open = Open {
             window,
@@ -360,6 +372,7 @@ impl App {
             scan: Scan::default(),
             practice,
             desk,
+            devices,
             recording: self.recorded.as_ref().map(|session| Recording::new(session.poses.clone())),
             recorded: self.recorded.clone(),
             choices: Choices::new(Some((1, at))),
@@ -377,6 +390,7 @@ impl App {
             scene_file: Watch::new([self.source.path.clone()]),
             shader_files: Watch::new(self.options.shaders.iter().flat_map(|folder| shader_files(folder))),
             control: false,
+            grip: Grip::Camera,
             debriefing: None,
         };
         open.choices.look.probe.on = self.options.ultrasound;
@@ -435,6 +449,10 @@ impl App {
             {
                 self.failure.get_or_insert(error);
             }
+            match open.devices.finish() {
+                Ok(timing) => self.outcome.haptic = timing,
+                Err(error) => _ = self.failure.get_or_insert(error),
+            }
             if let Err(error) = open.practice.save() {
                 self.failure.get_or_insert(error);
             }
@@ -465,8 +483,12 @@ impl Open {
     fn key(&mut self, key: PhysicalKey, state: ElementState, repeat: bool) {
         let held = state == ElementState::Pressed;
         match key {
-            PhysicalKey::Code(KeyCode::ArrowDown | KeyCode::KeyS) => self.desk.hold_advance(held),
-            PhysicalKey::Code(KeyCode::ArrowUp | KeyCode::KeyW) => self.desk.hold_withdraw(held),
+            PhysicalKey::Code(KeyCode::ArrowDown | KeyCode::KeyS) => self.desk.hold(Key::Advance, held),
+            PhysicalKey::Code(KeyCode::ArrowUp | KeyCode::KeyW) => self.desk.hold(Key::Withdraw, held),
+            PhysicalKey::Code(KeyCode::ArrowLeft | KeyCode::KeyA) => self.desk.hold(Key::Left, held),
+            PhysicalKey::Code(KeyCode::ArrowRight | KeyCode::KeyD) => self.desk.hold(Key::Right, held),
+            PhysicalKey::Code(KeyCode::PageUp | KeyCode::KeyR) => self.desk.hold(Key::Away, held),
+            PhysicalKey::Code(KeyCode::PageDown | KeyCode::KeyF) => self.desk.hold(Key::Towards, held),
             PhysicalKey::Code(KeyCode::Space) if held && !repeat => {
                 self.practice.state = match &self.practice.state {
                     State::Running => State::Paused,
@@ -553,6 +575,7 @@ impl Open {
     fn picture(&mut self, reference: &[ReferenceCurve]) -> Result<Wishes> {
         let begin = Instant::now();
         self.next = begin + Duration::from_secs_f64(PICTURE);
+        self.devices.tend(&mut self.practice, &self.desk);
         let due = self.frame_is_due();
         if due {
             self.start()?;
@@ -612,21 +635,20 @@ impl Open {
         {
             self.take_buffers()?;
         }
-        let hand: &mut dyn InputDevice = match &mut self.recording {
-            Some(recording) => recording,
-            None => &mut self.desk,
-        };
-        self.practice.start(hand)
+        match &mut self.recording {
+            Some(recording) => self.practice.start(recording),
+            None => self.practice.start(&mut self.devices.with(&mut self.desk)),
+        }
     }
 
     /// Waits for the frame that was given.
     fn finish(&mut self) -> Result<()> {
         let inputs = self.practice.latency.count;
-        let hand: &mut dyn InputDevice = match &mut self.recording {
-            Some(recording) => recording,
-            None => &mut self.desk,
-        };
-        self.practice.finish(hand)?;
+        match &mut self.recording {
+            Some(recording) => self.practice.finish(recording)?,
+            None => self.practice.finish(&mut self.devices.with(&mut self.desk))?,
+        }
+        self.devices.felt(&self.practice);
         // The force that answers an input is read at once.
         self.stale |= self.practice.latency.count > inputs;
         Ok(())
@@ -653,10 +675,11 @@ impl Open {
                 egui::ScrollArea::vertical().show(ui, |ui| {
                     let (practice, choices) = (&mut self.practice, &mut self.choices);
                     *wishes = panels::controls(ui, practice, choices, &mut self.camera, &mut self.desk);
+                    self.devices.show(ui, &self.practice);
                 });
             });
             egui::Panel::right("readings").default_size(330.0).show(ui, |ui| {
-                panels::readings(ui, &self.practice, &mut self.choices, reference);
+                panels::readings(ui, &self.practice, &mut self.choices, reference, self.devices.timing());
             });
             if self.choices.look.probe.on {
                 egui::Panel::bottom("ultrasound").default_size(270.0).resizable(true).show(ui, |ui| {
@@ -667,7 +690,7 @@ impl Open {
             egui::CentralPanel::no_frame().show(ui, |ui| {
                 self.area = ui.available_rect_before_wrap();
                 let response = ui.allocate_rect(self.area, egui::Sense::click_and_drag());
-                look(&response, ui, &mut self.camera, &mut self.desk);
+                look(&response, ui, &mut self.camera, &mut self.desk, (self.practice.tool_place(), &mut self.grip));
             });
         });
         self.scale = output.pixels_per_point;
@@ -828,13 +851,27 @@ fn canvas(gpu: &Gpu, config: &wgpu::SurfaceConfiguration) -> wgpu::Texture {
     })
 }
 
-/// Mouse over the view: drags turn and shift it, the wheel leads the needle or, with Ctrl, zooms.
-fn look(response: &egui::Response, ui: &egui::Ui, camera: &mut Camera, desk: &mut Desk) {
+/// Mouse over the view: drags turn and shift it or lead the needle where they begin on it, the wheel leads the needle or, with Ctrl,
+/// zooms.
+fn look(
+    response: &egui::Response,
+    ui: &egui::Ui,
+    camera: &mut Camera,
+    desk: &mut Desk,
+    (tool, grip): (Option<(DVec3, DVec3)>, &mut Grip),
+) {
+    desk.seen_from(camera.level().map(|axis| axis.as_dvec3()));
+    let led = tool.is_some_and(|needle| {
+        let size = Vec2::new(response.rect.width(), response.rect.height());
+        take_hold(response, ui, &Sight { camera, size, needle }, (desk, grip))
+    });
     let height = response.rect.height().max(1.0);
     let drag = response.drag_delta() / height;
     let drag = Vec2::new(drag.x, drag.y);
     if response.dragged_by(egui::PointerButton::Primary) {
-        camera.orbit(drag);
+        if !led {
+            camera.orbit(drag);
+        }
     } else if response.dragged_by(egui::PointerButton::Secondary) || response.dragged_by(egui::PointerButton::Middle) {
         camera.pan(drag);
     }
@@ -858,4 +895,27 @@ fn look(response: &egui::Response, ui: &egui::Ui, camera: &mut Camera, desk: &mu
         desk.ask(-f64::from(notches) * NOTCH);
         camera.zoom(zoom.ln() / 1.1f32.ln());
     }
+}
+
+/// The left button over the needle; true while a drag leads it.
+fn take_hold(response: &egui::Response, ui: &egui::Ui, sight: &Sight, (desk, grip): (&mut Desk, &mut Grip)) -> bool {
+    let place = |at: egui::Pos2| Vec2::new(at.x - response.rect.left(), at.y - response.rect.top());
+    let (held, pressed_at) = ui.input(|input| {
+        let m = input.modifiers;
+        (Modifiers { shift: m.shift, control: m.ctrl || m.command, alt: m.alt }, input.pointer.press_origin())
+    });
+    if response.drag_started_by(egui::PointerButton::Primary) {
+        // A drag is one some points after the button went down.
+        *grip = Grip::begin(held, pressed_at.is_some_and(|at| sight.is_on_needle(place(at))));
+    }
+    if *grip == Grip::Camera && response.hover_pos().is_some_and(|at| sight.is_on_needle(place(at))) {
+        ui.ctx().set_cursor_icon(egui::CursorIcon::Grab);
+    }
+    if !response.dragged_by(egui::PointerButton::Primary) {
+        *grip = Grip::Camera;
+        return false;
+    }
+    let Some(to) = response.interact_pointer_pos().map(place) else { return *grip != Grip::Camera };
+    let drag = response.drag_delta();
+    sight.drag(*grip, to - Vec2::new(drag.x, drag.y), to, desk)
 }

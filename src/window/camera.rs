@@ -42,6 +42,26 @@ impl Camera {
         rh::proj::directx::perspective(OPENING, aspect, near, self.distance + 8.0 * self.radius) * view
     }
 
+    /// Direction from the eye through a point of the screen, -1..1 each, y upwards (unit).
+    pub fn ray(&self, aspect: f32, at: Vec2) -> Vec3 {
+        let (right, up, away) = self.axes();
+        let half = (0.5 * OPENING).tan();
+        (away + right * (at.x * half * aspect) + up * (at.y * half)).normalize()
+    }
+
+    /// To the right on the screen and away from the viewer, horizontally (unit).
+    pub fn level(&self) -> [Vec3; 2] {
+        let (sin, cos) = self.azimuth.sin_cos();
+        [Vec3::new(cos, sin, 0.0), Vec3::new(-sin, cos, 0.0)]
+    }
+
+    /// To the right and up on the screen, and away (unit).
+    fn axes(&self) -> (Vec3, Vec3, Vec3) {
+        let away = (self.centre - self.eye()).normalize();
+        let right = away.cross(Vec3::Z).normalize();
+        (right, right.cross(away), away)
+    }
+
     /// Turns by a drag of the mouse, in parts of the height of the view.
     pub fn orbit(&mut self, drag: Vec2) {
         self.azimuth -= 3.0 * drag.x;
@@ -50,9 +70,7 @@ impl Camera {
 
     /// Shifts what is looked at, in parts of the height of the view.
     pub fn pan(&mut self, drag: Vec2) {
-        let away = (self.centre - self.eye()).normalize();
-        let right = away.cross(Vec3::Z).normalize();
-        let up = right.cross(away);
+        let (right, up, _) = self.axes();
         let height = 2.0 * self.distance * (0.5 * OPENING).tan();
         self.centre += (up * drag.y - right * drag.x) * height;
     }
@@ -114,6 +132,18 @@ mod tests {
                 assert!(p.x.abs() <= 1.0 && p.y.abs() <= 1.0 && (0.0..1.0).contains(&p.z), "{p}");
             }
         }
+    }
+
+    #[test]
+    fn a_ray_goes_through_what_is_seen_there() {
+        let mut camera = Camera::around(Vec3::new(1e-3, 2e-3, -8e-3), 12e-3);
+        camera.orbit(Vec2::new(0.2, -0.3));
+        let place = Vec3::new(4e-3, -2e-3, -5e-3);
+        let ray = camera.ray(1.5, seen(&camera, place).truncate());
+        assert!(ray.angle_between(place - camera.eye()) < 1e-3);
+        let [right, away] = camera.level();
+        assert!(right.dot(away).abs() < 1e-6 && right.cross(away).z > 0.99);
+        assert!(away.dot(camera.centre - camera.eye()) > 0.0);
     }
 
     #[test]

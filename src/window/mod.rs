@@ -1,20 +1,29 @@
 //! The window: an insertion is practised by hand, or watched, while the device solves the tissue and draws it.
 //!
-//! [`practice`] holds one attempt: simulation, who leads, records. [`hand`] is what a hand holds. [`section`], [`tool_shape`],
-//! [`marks`] and [`camera`] say what is drawn, [`scene_view`] draws it from the solver's own buffers as [`appearance`] chooses,
-//! [`panels`] stand around it, [`app`] is the window itself. [`probe`] says where an ultrasound slice stands, [`ultrasound`] draws it
-//! and [`scan`] shows it. The window owns no physics: it sends poses and reads records.
+//! [`practice`] holds one attempt: simulation, who leads, records; [`tuning`] what is changed while it goes on. [`hand`] is what a hand
+//! holds, [`grip`] how the mouse takes hold of the needle, [`reach`] what the tissue follows of it, [`devices`] what else is connected.
+//! [`section`], [`tool_shape`], [`marks`] and [`camera`] say what is drawn, [`scene_view`] draws it from the solver's own buffers as
+//! [`appearance`] chooses, [`panels`] stand around it, [`app`] is the window itself. [`probe`] says where an ultrasound slice stands,
+//! [`ultrasound`] draws it and [`scan`] shows it. The window owns no physics: it sends poses and reads records.
 
 pub mod accuracy;
 pub mod app;
 pub mod appearance;
 pub mod camera;
+pub mod devices;
 pub mod effects_panel;
+pub mod gamepad;
+pub mod grip;
 pub mod hand;
+#[cfg(feature = "link")]
+pub mod link_device;
 pub mod marks;
+#[cfg(feature = "gamepad")]
+pub mod pads;
 pub mod panels;
 pub mod practice;
 pub mod probe;
+pub mod reach;
 pub mod scan;
 pub mod scene_view;
 pub mod section;
@@ -24,9 +33,21 @@ pub mod tuning;
 pub mod ultrasound;
 pub mod watch;
 
+use std::net::IpAddr;
 use std::path::PathBuf;
 
 pub use app::view;
+
+/// How the needle is shown to other programs (feature `link`).
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LinkChoice {
+    /// `None`: this machine only.
+    pub address: Option<IpAddr>,
+    /// `None`: the usual one; 0: a free one.
+    pub port: Option<u16>,
+    /// Whether they may lead it.
+    pub allow_control: bool,
+}
 
 /// What the command line asks for.
 #[derive(Debug, Clone, Default)]
@@ -55,4 +76,8 @@ pub struct ViewOptions {
     pub size: Option<[u32; 2]>,
     /// Folder whose shaders stand in for the built-in ones, and are read anew when they change.
     pub shaders: Option<PathBuf>,
+    /// OpenIGTLink beside the window.
+    pub link: Option<LinkChoice>,
+    /// File of the forces at 1 kHz.
+    pub haptic_log: Option<PathBuf>,
 }

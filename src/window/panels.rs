@@ -9,6 +9,7 @@ use super::hand::Desk;
 use super::practice::{Leader, Practice, State};
 use super::scene_view::{Field, Scale};
 use super::texts;
+use crate::haptic::LoopTiming;
 use crate::observables::ForceParts;
 use crate::training::score::Score;
 
@@ -106,6 +107,7 @@ pub fn controls(
             desk.speed = speed * 1e-3;
         }
         ui.small(texts::KEYS);
+        ui.small(if practice.path_is_free() { texts::FREE_PATH } else { texts::PLANNED_PATH });
     }
     egui::CollapsingHeader::new(texts::EFFECTS).show(ui, |ui| {
         let (scene, tuning) = practice.tunable();
@@ -202,7 +204,13 @@ fn colour_bar(ui: &mut egui::Ui, scale: &Scale, map: ColourMap) {
 }
 
 /// Force against depth, numbers and lights on the right.
-pub fn readings(ui: &mut egui::Ui, practice: &Practice, choices: &mut Choices, reference: &[ReferenceCurve]) {
+pub fn readings(
+    ui: &mut egui::Ui,
+    practice: &Practice,
+    choices: &mut Choices,
+    reference: &[ReferenceCurve],
+    haptic: Option<LoopTiming>,
+) {
     let Some(record) = practice.records.last() else {
         ui.label(texts::NOTHING_YET);
         return;
@@ -260,6 +268,11 @@ pub fn readings(ui: &mut egui::Ui, practice: &Practice, choices: &mut Choices, r
             let told = format!("{} frame(s), {:.0} ms", latency.most_frames, latency.mean * 1e3);
             row(texts::LATENCY, if latency.count > 0 { told } else { "-".into() });
             row(texts::TOO_FAST, format!("{}", practice.limited_frames));
+        }
+        if let Some(timing) = haptic {
+            row(texts::HAPTIC_RATE, format!("{:.0} /s", timing.rate()));
+            let told = format!("{:.1} ms, {:.1} ms", timing.longest_gap * 1e3, timing.latency * 1e3);
+            row(texts::HAPTIC_GAP, told);
         }
     });
     ui.horizontal_wrapped(|ui| {

@@ -9,6 +9,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::hand::InputDevice;
+use super::reach::Reach;
 use super::tuning::{Source, Taken, Tuning};
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
@@ -23,9 +24,6 @@ use crate::{Error, Result};
 
 /// Tool speed over the scaled shear wave speed beyond which inertia, not tissue, answers the hand.
 const LARGEST_MACH: f64 = 0.3;
-
-/// How far out of the tissue a hand may lead the tip [m].
-const OUTSIDE: f64 = 5e-3;
 
 /// Frames between two writings of the session: what a crash may cost.
 const SAVE_EVERY: usize = 300;
@@ -346,17 +344,17 @@ impl Practice {
         self.simulation.start_frames()
     }
 
+    /// True where a hand may choose the angle and the point of entry.
+    pub fn path_is_free(&self) -> bool {
+        self.simulation.model.puncture.as_ref().is_some_and(|p| p.free.is_some())
+    }
+
     /// What the tissue can follow of what the hand wants.
     fn within_reach(&mut self, now: &HandPose, wanted: HandPose) -> HandPose {
-        let deepest = self.simulation.model.scene.motion.deepest();
-        let depth = wanted.depth.clamp(-OUTSIDE, deepest);
-        let step = self.speed_limit * self.timing.simulated;
-        let limited = (depth - now.depth).clamp(-step, step);
-        if limited != depth - now.depth {
-            self.limited_frames += 1;
-        }
-        // A planned path is straight: the needle keeps to it.
-        HandPose { depth: now.depth + limited, ..*now }
+        let reach = Reach::of(&self.simulation.model, self.speed_limit);
+        let (pose, limited) = reach.within(now, &wanted, self.timing.simulated);
+        self.limited_frames += u64::from(limited);
+        pose
     }
 
     /// Waits for the results of the frame that was started, and keeps them.

@@ -358,6 +358,7 @@ impl Check<'_> {
             ),
             entry_fade: self.optional(&at("entry_fade_mm"), t.entry_fade_mm, MM, d.entry_fade, Positive(100.0)),
             always_free: t.path == Some(PathWord::Free),
+            anywhere: false,
             rate_exponent: self.optional(&at("rate_exponent"), t.rate_exponent, 1.0, d.rate_exponent, NotNegative(1.0)),
             reference_speed: self.optional(
                 &at("reference_speed_mm_s"),
