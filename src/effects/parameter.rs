@@ -23,12 +23,15 @@ pub struct Parameter {
     pub value: Value,
 }
 
+/// Components of a list in the unit of its key.
+pub type Components = fn(&Scene) -> Option<Vec<f64>>;
+
 /// The present value in the unit of the key; `None` where the scene has no such number.
 #[derive(Debug, Clone, Copy)]
 pub enum Value {
     Number(fn(&Scene) -> Option<f64>),
     /// A list, which is always written whole, with the lists that are refused without it: key and values.
-    List(fn(&Scene) -> Option<Vec<f64>>, Option<(&'static str, fn(&Scene) -> Option<Vec<f64>>)>),
+    List(Components, Option<(&'static str, Components)>),
 }
 
 impl Parameter {

@@ -37,7 +37,7 @@ const PARAMETERS: [Parameter; 2] = [
         "assumption; total of 50 %: Van Loocke 2008",
         |_| None,
     )
-    .holding(Value::List(|s| shares(s), Some(("viscoelastic.tau_s", times)))),
+    .holding(Value::List(shares, Some(("viscoelastic.tau_s", times)))),
     Parameter::new(
         "viscoelastic.tau_s",
         "relaxation time",
@@ -46,7 +46,7 @@ const PARAMETERS: [Parameter; 2] = [
         "assumption; total of 50 %: Van Loocke 2008",
         |_| None,
     )
-    .holding(Value::List(|s| times(s), Some(("viscoelastic.g", shares))))
+    .holding(Value::List(times, Some(("viscoelastic.g", shares))))
     .logarithmic(),
 ];
 

@@ -137,9 +137,12 @@ impl Compiled {
     }
 }
 
+/// Name of a stage and its composed source.
+type KernelKey = (&'static str, String);
+
 /// The kernels that a device has compiled, by their source: an engine with other effects or another mesh shares those that are the same.
 #[derive(Clone, Default)]
-pub struct KernelCache(Arc<Mutex<BTreeMap<(&'static str, String), Arc<Compiled>>>>);
+pub struct KernelCache(Arc<Mutex<BTreeMap<KernelKey, Arc<Compiled>>>>);
 
 impl KernelCache {
     /// The kernel of a stage with these defines.
