@@ -1595,6 +1595,11 @@ impl Engine for GpuEngine {
             self.gpu.queue.write_buffer(&self.buffers[name.as_str()], 0, bytes);
         }
         self.gravity_work = *gravity_work;
+        if let Some((_, bytes)) = buffers.iter().find(|(name, _)| name == "node_displacement") {
+            let weighted = |(u, m): ([i32; 4], &f64)| displacement(u) * *m;
+            let moment: DVec3 = read_all(bytes).zip(&self.model.node_mass).map(weighted).sum();
+            self.moment = moment / self.model.mass_scaling();
+        }
         Ok(())
     }
 

@@ -425,6 +425,9 @@ impl App {
             open.debriefing = Some(Debriefing { score, before });
             open.stale = true;
         }
+        if let Some(time) = wishes.go_back {
+            open.practice.go_back(time)?;
+        }
         if let Some(leader) = wishes.restart {
             open.debriefing = None;
             open.practice.again(leader)?;

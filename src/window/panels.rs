@@ -50,6 +50,8 @@ impl Choices {
 pub struct Wishes {
     pub restart: Option<Leader>,
     pub step: bool,
+    /// To this moment of the script [s].
+    pub go_back: Option<f64>,
     pub recut: bool,
     /// The attempt is over: what is it worth?
     pub debrief: bool,
@@ -100,6 +102,14 @@ pub fn controls(
         }
     });
     ui.add(egui::Slider::new(&mut choices.pace, 0.1..=1.0).text(texts::PACE));
+    if practice.may_go_back() {
+        let last = practice.records.last().map_or(0.0, |r| r.time);
+        let mut time = last;
+        let slider = ui.add(egui::Slider::new(&mut time, 0.0..=last).text(texts::MOMENT));
+        if slider.changed() && time < last {
+            wishes.go_back = Some(time);
+        }
+    }
     if practice.leader == Leader::Hand {
         let mut speed = desk.speed * 1e3;
         let largest = (practice.speed_limit * 1e3).min(50.0);

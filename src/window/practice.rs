@@ -17,6 +17,7 @@ use crate::output::{DrivenFace, OutputFolder, Tables};
 use crate::scene::Scene;
 use crate::scene::motion::HandPose;
 use crate::session::{SceneChange, Session};
+use crate::solver::checkpoint::Checkpoint;
 use crate::solver::simulation::{Purpose, Simulation, tool_mach};
 use crate::training::kinematic::Sample;
 use crate::training::score::Score;
@@ -24,6 +25,10 @@ use crate::{Error, Result};
 
 /// Tool speed over the scaled shear wave speed beyond which inertia, not tissue, answers the hand.
 const LARGEST_MACH: f64 = 0.3;
+
+/// Frames between two moments of a script that one can go back to, and how many of them are kept.
+const MARK_EVERY: usize = 30;
+const MOST_MARKS: usize = 64;
 
 /// Frames between two writings of the session: what a crash may cost.
 const SAVE_EVERY: usize = 300;
@@ -157,6 +162,8 @@ pub struct Practice {
     pub latency: Latency,
     /// The next frame is the first after a change: what it takes longer is part of it.
     freshly_changed: bool,
+    /// Moments of a script that one can go back to.
+    marks: Vec<Checkpoint>,
     last_drawn: Option<Instant>,
 }
 
@@ -223,6 +230,7 @@ impl Practice {
             fresh: None,
             latency: Latency::default(),
             freshly_changed: false,
+            marks: Vec::new(),
             last_drawn: None,
             scene,
         })
@@ -309,6 +317,8 @@ impl Practice {
         self.scene = self.tuning.source.scene()?;
         self.speed_limit = speed_limit(&self.simulation);
         self.freshly_changed = true;
+        // What was before had other constants.
+        self.marks.clear();
         self.timing.simulated = self.simulation.steps_per_frame() as f64 * self.simulation.dt();
         Ok(renewed)
     }
@@ -373,6 +383,7 @@ impl Practice {
                 }
                 self.records.push(record);
                 self.timing.done += self.timing.simulated;
+                self.mark()?;
                 if self.records.len().is_multiple_of(SAVE_EVERY) {
                     self.save()?;
                 }
@@ -389,6 +400,40 @@ impl Practice {
             Ok(None) => self.state = State::Ended,
             Err(error @ (Error::Diverged { .. } | Error::Device(_))) => self.state = State::Stopped(error.to_string()),
             Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// True where one can go back: a script is watched, and nothing of it is written.
+    pub fn may_go_back(&self) -> bool {
+        self.leader == Leader::Script && self.written.is_none() && !self.marks.is_empty()
+    }
+
+    /// Keeps this moment, where one may want to go back to it.
+    fn mark(&mut self) -> Result<()> {
+        if self.leader == Leader::Script
+            && self.written.is_none()
+            && self.marks.len() < MOST_MARKS
+            && self.records.len() % MARK_EVERY == 1
+        {
+            self.marks.push(self.simulation.checkpoint()?);
+        }
+        Ok(())
+    }
+
+    /// Goes back to the last mark at or before `time` [s]; call it between frames. The way from there is computed again.
+    ///
+    /// # Errors
+    /// `Error::Device`.
+    pub fn go_back(&mut self, time: f64) -> Result<()> {
+        let place = |mark: &Checkpoint| mark.frames as usize;
+        let before = |mark: &Checkpoint| self.records.get(place(mark) - 1).is_some_and(|r| r.time <= time);
+        let Some(index) = self.marks.iter().rposition(before) else { return Ok(()) };
+        self.marks.truncate(index + 1);
+        self.simulation.resume(&self.marks[index])?;
+        self.records.truncate(place(&self.marks[index]));
+        if matches!(self.state, State::Ended | State::Stopped(_)) {
+            self.state = State::Paused;
         }
         Ok(())
     }

@@ -38,6 +38,7 @@ pub const APPLY_ANEW: &str = "apply (begins anew)";
 pub const ERROR: &str = "error of the force";
 pub const MEASURED_AT: &str = "by the study with";
 pub const NO_STUDY: &str = "The error is not known here; this measures it:";
+pub const MOMENT: &str = "moment, s";
 pub const FIELD: &str = "field";
 pub const AUTOMATIC: &str = "scale follows the needle";
 pub const LOGARITHMIC: &str = "logarithmic";
