@@ -45,3 +45,32 @@ fn a_script_goes_back_and_comes_again() {
     practice.go_back(-1.0).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(practice.records.len(), 100);
 }
+
+/// A folder without room: the run waits and says why, nothing in memory is lost, and with room again everything is written.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_costs_nothing() {
+    let Some(gpu) = common::gpu() else { return };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/training/hit_target.toml");
+    let coarse = ["tissue.cell_size_mm=1.3", "tissue.size_mm=[14, 14, 12]"].map(String::from).to_vec();
+    let (source, scene) = Source::read(path, coarse).unwrap_or_else(|e| panic!("{e}"));
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().join("attempt");
+    let mut practice =
+        Practice::new(scene, source, gpu, Leader::Script, Some(&out), false).unwrap_or_else(|e| panic!("{e}"));
+    run(&mut practice, 10);
+    // A disk that is always full stands in for the table.
+    let whole = out.join("force.csv");
+    practice.hold_back(stylet::Error::file(&whole, std::io::Error::from_raw_os_error(28)));
+    assert_eq!(practice.state, State::Paused, "the user is asked");
+    assert!(practice.unwritten.as_deref().is_some_and(|text| text.contains("way out")), "{:?}", practice.unwritten);
+    run(&mut practice, 25);
+    let rows = || std::fs::read_to_string(&whole).unwrap().lines().count() - 1;
+    assert_eq!(rows(), 10, "nothing more was tried");
+    let score = practice.debrief(None).unwrap_or_else(|e| panic!("{e}"));
+    assert!(!score.goals.is_empty());
+    practice.write_again().unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((rows(), practice.unwritten.is_none()), (25, true));
+    run(&mut practice, 26);
+    assert_eq!(rows(), 26);
+}

@@ -126,6 +126,15 @@ pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome
     }
 }
 
+/// There is a display, and nothing that can draw on it.
+fn no_driver(reason: &str) -> Error {
+    Error::input(
+        format!("no graphics driver can draw on this display: {reason}"),
+        "install a Vulkan driver (Debian/Ubuntu: mesa-vulkan-drivers, which draws without a graphics card too), look at `stylet \
+         adapters`, or use `stylet run`, which needs no picture and computes on the processor where there is no adapter",
+    )
+}
+
 fn no_display(reason: &str) -> Error {
     Error::input(
         format!("no window can be opened here: {reason}"),
@@ -308,7 +317,7 @@ impl App {
         let window = Arc::new(event_loop.create_window(attributes).map_err(|e| refused(e.to_string()))?);
         let display = Box::new(event_loop.owned_display_handle());
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_with_display_handle_from_env(display));
-        let surface = instance.create_surface(window.clone()).map_err(|e| refused(e.to_string()))?;
+        let surface = instance.create_surface(window.clone()).map_err(|e| no_driver(&e.to_string()))?;
         let (gpu, adapter) = Gpu::for_surface(&instance, &surface)?;
         let leader = if self.options.script { Leader::Script } else { Leader::Hand };
         let practice = Practice::new(
@@ -415,15 +424,23 @@ impl App {
             let mut before = Vec::new();
             if let (Some(trainee), Some(task)) = (&self.options.trainee, &score.task) {
                 let history = History::new(&self.options.history);
-                history.add(trainee, &score)?;
-                let found = history.attempts(trainee)?;
-                for broken in &found.broken {
-                    eprintln!("note: {broken}");
+                // A history that takes nothing costs neither the scores nor the attempt.
+                match history.add(trainee, &score).and_then(|_| history.attempts(trainee)) {
+                    Ok(found) => {
+                        for broken in &found.broken {
+                            eprintln!("note: {broken}");
+                        }
+                        before = progress(&found.attempts, task, PROGRESS_KEY);
+                    }
+                    Err(error) => open.practice.hold_back(error),
                 }
-                before = progress(&found.attempts, task, PROGRESS_KEY);
             }
             open.debriefing = Some(Debriefing { score, before });
             open.stale = true;
+        }
+        if wishes.write_again {
+            // What is still wrong stands in the panel.
+            let _ = open.practice.write_again();
         }
         if let Some(time) = wishes.go_back {
             open.practice.go_back(time)?;
@@ -456,7 +473,17 @@ impl App {
                 Ok(timing) => self.outcome.haptic = timing,
                 Err(error) => _ = self.failure.get_or_insert(error),
             }
-            if let Err(error) = open.practice.save() {
+            if open.practice.unwritten.is_some()
+                && let Err(error) = open.practice.write_again()
+            {
+                if let Some(place) = open.practice.rescue() {
+                    eprintln!(
+                        "note: the session was kept in {}; stylet replay computes its tables again",
+                        place.display()
+                    );
+                }
+                self.failure.get_or_insert(error);
+            } else if let Err(error) = open.practice.save() {
                 self.failure.get_or_insert(error);
             }
             let last = open.practice.records.last();

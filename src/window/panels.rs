@@ -50,6 +50,8 @@ impl Choices {
 pub struct Wishes {
     pub restart: Option<Leader>,
     pub step: bool,
+    /// The folder may have room again.
+    pub write_again: bool,
     /// To this moment of the script [s].
     pub go_back: Option<f64>,
     pub recut: bool,
@@ -88,6 +90,10 @@ pub fn controls(
         let done = egui::Button::new(texts::FINISH);
         wishes.debrief = ui.add_enabled(!practice.records.is_empty(), done).clicked();
     });
+    if let Some(reason) = &practice.unwritten {
+        ui.colored_label(ui.visuals().error_fg_color, format!("{} {reason}", texts::UNWRITTEN));
+        wishes.write_again = ui.button(texts::WRITE_AGAIN).clicked();
+    }
     if let Some(task) = &practice.scene().task {
         ui.group(|ui| {
             ui.strong(&task.name);

@@ -145,6 +145,8 @@ pub struct Practice {
     /// Number of this attempt since the window was opened, from 1.
     attempt: u32,
     written: Option<Written>,
+    /// Why the folder takes nothing more; everything is still in memory.
+    pub unwritten: Option<String>,
     pub simulation: Simulation,
     pub leader: Leader,
     pub state: State,
@@ -218,6 +220,7 @@ impl Practice {
             out: out.map(Path::to_path_buf),
             attempt: 1,
             written,
+            unwritten: None,
             simulation,
             leader,
             state: State::Paused,
@@ -378,14 +381,19 @@ impl Practice {
                 if let Some((since, frames)) = self.fresh.take() {
                     self.latency.add(self.records.len() as u64 + 1 - frames, since.elapsed().as_secs_f64());
                 }
-                if let Some(written) = &mut self.written {
-                    written.tables.append(&record)?;
+                if let Some(written) = self.written.as_mut().filter(|_| self.unwritten.is_none())
+                    && let Err(error) = written.tables.append(&record)
+                {
+                    self.hold_back(error);
                 }
                 self.records.push(record);
                 self.timing.done += self.timing.simulated;
                 self.mark()?;
-                if self.records.len().is_multiple_of(SAVE_EVERY) {
-                    self.save()?;
+                if self.records.len().is_multiple_of(SAVE_EVERY)
+                    && self.unwritten.is_none()
+                    && let Err(error) = self.save()
+                {
+                    self.hold_back(error);
                 }
                 if let Some(begin) = self.started.take() {
                     if std::mem::take(&mut self.freshly_changed)
@@ -402,6 +410,40 @@ impl Practice {
             Err(error) => return Err(error),
         }
         Ok(())
+    }
+
+    /// The folder takes nothing more: the run waits for the user, and goes on in memory.
+    pub fn hold_back(&mut self, error: Error) {
+        self.unwritten = Some(error.to_string());
+        if self.state == State::Running {
+            self.state = State::Paused;
+        }
+    }
+
+    /// Writes everything anew, once there is room again.
+    ///
+    /// # Errors
+    /// What the folder still cannot take; nothing in memory is lost.
+    pub fn write_again(&mut self) -> Result<()> {
+        let Some(written) = &self.written else { return Ok(()) };
+        let model = &self.simulation.model;
+        let driven = DrivenFace::of_scene(&self.scene.faces, &model.mesh);
+        let (folder, targets) = (&written.folder, &self.scene.targets);
+        let tables = Tables::with_records(folder, &driven, model.has_bore(), targets, &self.records);
+        let done = tables.and_then(|tables| {
+            if let Some(written) = &mut self.written {
+                written.tables = tables;
+            }
+            self.save()
+        });
+        self.unwritten = done.as_ref().err().map(|error| error.to_string());
+        done
+    }
+
+    /// Writes the session where there is room, when its own folder has none; tells where.
+    pub fn rescue(&self) -> Option<PathBuf> {
+        let place = std::env::temp_dir().join(format!("stylet-session-{}.json", std::process::id()));
+        (self.leader == Leader::Hand && self.session.write(&place).is_ok()).then_some(place)
     }
 
     /// True where one can go back: a script is watched, and nothing of it is written.
@@ -459,20 +501,23 @@ impl Practice {
     /// What the attempt is worth; a run that was stopped is told, and not scored.
     ///
     /// # Errors
-    /// `Error::Input` where nothing was recorded; `Error::File` where the folder takes no scores.
-    pub fn debrief(&self, reference: Option<&Score>) -> Result<Score> {
+    /// `Error::Input` where nothing was recorded. A folder that takes no scores is told in the window.
+    pub fn debrief(&mut self, reference: Option<&Score>) -> Result<Score> {
         let sample = |record: &FrameRecord| {
             let pose = self.simulation.tool_pose(record.time)?;
             Some(Sample { time: record.time, tip: pose.tip, direction: pose.direction })
         };
-        self.save()?;
         let samples: Vec<Sample> = self.records.iter().filter_map(sample).collect();
         let mut score = Score::of(&self.scene, &samples, &self.records, reference)?;
         if let State::Stopped(reason) = &self.state {
             score.fail(reason.clone());
         }
-        if let Some(written) = &self.written {
-            score.write(&written.folder)?;
+        let kept = self.save().and_then(|()| match &self.written {
+            Some(written) => score.write(&written.folder),
+            None => Ok(()),
+        });
+        if let Err(error) = kept {
+            self.hold_back(error);
         }
         Ok(score)
     }
