@@ -599,10 +599,11 @@ fn view(args: ViewArgs, start: Instant) -> Result<String> {
     };
     let haptic = seen.haptic.map_or(String::new(), |timing| format!("\nhaptic: {}", timing.text()));
     Ok(format!(
-        "{} pictures, {:.1} a second; first one after {:.2} s\n{} frames of tissue, {:.2} of real time with the window open (tissue alone: \
+        "{} pictures, {:.1} a second, at most {:.0} ms apart; first one after {:.2} s\n{} frames of tissue, {:.2} of real time with the window open (tissue alone: \
          {:.2}); {:.3} N at {:.2} mm\n{felt}{haptic}",
         seen.pictures,
         seen.frames_per_second,
+        1e3 * seen.longest_pause,
         seen.first_picture,
         seen.frames,
         seen.achieved,

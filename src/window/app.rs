@@ -47,6 +47,8 @@ const NOTCH: f64 = 0.25e-3;
 const DESK_SPEED: f64 = 5e-3;
 /// Size of the window at the start, in points.
 const SIZE: [u32; 2] = [1280, 800];
+/// Pictures after which pauses are counted.
+const WARM_UP: u64 = 5;
 /// Time between two looks at the range of the field [s].
 const LOOK_AT_RANGE: f64 = 0.4;
 /// What the progress of a trainee is shown of.
@@ -66,6 +68,8 @@ pub struct ViewOutcome {
     pub depth: f64,
     pub force: f64,
     pub frames_per_second: f64,
+    /// Longest time between two pictures [s].
+    pub longest_pause: f64,
     /// Simulated over wall time while the run was on, the window with its pictures included; at most the pace.
     pub achieved: f64,
     /// The same of the frames alone, from their start to their results.
@@ -219,6 +223,9 @@ struct Open {
     /// Where the tissue is drawn [points], and pixels per point, since the panels were drawn last.
     area: egui::Rect,
     scale: f32,
+    /// When the last picture was shown, and the longest time between two of them [s].
+    presented: Option<Instant>,
+    longest_pause: f64,
     /// When the range of the field was looked at last.
     ranged: Option<Instant>,
     /// The panels are drawn on the next picture.
@@ -394,6 +401,8 @@ impl App {
             canvas,
             area: egui::Rect::NOTHING,
             scale: 1.0,
+            presented: None,
+            longest_pause: 0.0,
             ranged: None,
             stale: true,
             scene_file: Watch::new([self.source.path.clone()]),
@@ -491,6 +500,7 @@ impl App {
             self.outcome.frames = open.practice.records.len() as u64;
             self.outcome.depth = last.map_or(0.0, |r| r.depth);
             self.outcome.force = last.map_or(0.0, |r| r.force.axial);
+            self.outcome.longest_pause = open.longest_pause;
             self.outcome.frames_per_second = open.practice.timing.frames_per_second();
             self.outcome.real_time_factor = open.practice.timing.real_time_factor();
             self.outcome.achieved = open.practice.timing.achieved();
@@ -546,7 +556,9 @@ impl Open {
     /// After a restart: the buffers are new.
     fn rebind(&mut self) -> Result<()> {
         let model = self.practice.simulation.model.clone();
-        if let Some(engine) = self.practice.simulation.engine().on_device() {
+        if let Some(engine) = self.practice.simulation.engine().on_device()
+            && !self.view.take_model(&self.gpu, engine, &model)?
+        {
             self.view = SceneView::new(&self.gpu, engine, &model, self.config.format)?;
         }
         self.scan.close(&mut self.painter);
@@ -649,6 +661,12 @@ impl Open {
             self.gpu.queue.present(shown);
             self.pictures += 1;
             self.practice.drawn();
+            // The first pictures wait for their shaders.
+            if let Some(before) = self.presented.replace(Instant::now())
+                && self.pictures > WARM_UP
+            {
+                self.longest_pause = self.longest_pause.max(before.elapsed().as_secs_f64());
+            }
         }
         self.gpu.check()?;
         if self.choices.automatic && self.ranged.is_none_or(|at| at.elapsed().as_secs_f64() >= LOOK_AT_RANGE) {

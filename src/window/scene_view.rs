@@ -201,15 +201,7 @@ impl SceneView {
         let view = filled("view", bytemuck::bytes_of(&View::zeroed()), uniform);
         let map = ColourMap::default();
         let table = filled("colour_table", bytemuck::cast_slice(&colour_table(map)), uniform);
-        let rest: Vec<[f32; 4]> = (0..mesh.node_count())
-            .map(|node| {
-                let x = mesh.rest_position(node).as_vec3();
-                [x.x, x.y, x.z, 0.0]
-            })
-            .collect();
-        let rest = filled("node_rest", bytemuck::cast_slice(&rest), wgpu::BufferUsages::STORAGE);
-        let copies = parts
-            .then(|| filled("node_copies", bytemuck::cast_slice(&node_copies(model)), wgpu::BufferUsages::STORAGE));
+        let (rest, copies) = mesh_buffers(device, model);
         let [displacement, fields] = drawn_buffers(engine)?;
         let mut buffers = vec![&view, &table, displacement, &rest, fields];
         buffers.extend(&copies);
@@ -248,6 +240,21 @@ impl SceneView {
             return Err(Error::Device(format!("drawing of the tissue: {error}")));
         }
         Ok(drawing)
+    }
+
+    /// Draws another model from now on, with the same pipelines. False where it needs others; nothing has changed then.
+    ///
+    /// # Errors
+    /// As [`SceneView::new`].
+    pub fn take_model(&mut self, gpu: &Gpu, engine: &GpuEngine, model: &Model) -> Result<bool> {
+        if self.copies.is_some() == model.separation.pairs.is_empty() {
+            return Ok(false);
+        }
+        (self.rest, self.copies) = mesh_buffers(&gpu.device, model);
+        self.outline = Outline::of(&model.mesh);
+        self.take_buffers(gpu, engine)?;
+        self.cut(gpu, &model.mesh, None);
+        Ok(true)
     }
 
     /// Draws from another engine of the same mesh.
@@ -380,6 +387,22 @@ fn bindings(device: &wgpu::Device, pipeline: &wgpu::RenderPipeline, buffers: &[&
         layout: &pipeline.get_bind_group_layout(0),
         entries: &entries,
     })
+}
+
+/// Where the nodes are at rest [m], and where faces may part the other copies of every node.
+fn mesh_buffers(device: &wgpu::Device, model: &Model) -> (wgpu::Buffer, Option<wgpu::Buffer>) {
+    let filled = |label, contents: &[u8]| {
+        let usage = wgpu::BufferUsages::STORAGE;
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+    };
+    let place = |node| {
+        let x = model.mesh.rest_position(node).as_vec3();
+        [x.x, x.y, x.z, 0.0]
+    };
+    let rest: Vec<[f32; 4]> = (0..model.mesh.node_count()).map(place).collect();
+    let parts = !model.separation.pairs.is_empty();
+    let copies = parts.then(|| filled("node_copies", bytemuck::cast_slice(&node_copies(model))));
+    (filled("node_rest", bytemuck::cast_slice(&rest)), copies)
 }
 
 /// The other copies of every node, itself where there are fewer than four.
