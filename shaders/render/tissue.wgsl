@@ -1,8 +1,8 @@
 // The tissue in the window: corners are points on mesh edges, taken where the solver has just left the nodes.
 struct View {
     view_projection: mat4x4<f32>,
-    // Where the eye is [m].
-    eye: vec4<f32>,
+    // Direction from the middle of the view to the eye; w unused.
+    towards: vec4<f32>,
     // Low and high end of the field, its lane, 1 where the scale is logarithmic.
     range: vec4<f32>,
     // How much of the tissue's surface is drawn, 0..1; y, z, w unused.
@@ -53,18 +53,17 @@ fn tissue_corner(@location(0) nodes: vec2<u32>, @location(1) part: f32) -> Tissu
     return placed_corner(nodes, part, mix(drawn_nodes[nodes.x][lane], drawn_nodes[nodes.y][lane], part));
 }
 
-// Light from the eye, on both sides of a face; a factor on bytes as the target keeps them (sRGB), which spares every pixel three
-// powers.
-fn shade(place: vec3<f32>, normal: vec3<f32>) -> f32 {
-    let towards = normalize(view.eye.xyz - place);
-    return 0.35 + 0.65 * abs(dot(normal, towards));
+// Light from the direction of the eye, on both sides of a face; a factor on bytes as the target keeps them (sRGB), which spares every
+// pixel three powers. `normal` of any length.
+fn shade(normal: vec3<f32>) -> f32 {
+    return 0.35 + 0.65 * abs(dot(normal, view.towards.xyz)) * inverseSqrt(max(dot(normal, normal), 1e-30));
 }
 
 @fragment
 fn tissue_colour(corner: TissueCorner) -> @location(0) vec4<f32> {
     let colour = colour_table[u32(corner.field * 255.0 + 0.5)];
-    let normal = normalize(cross(dpdx(corner.place), dpdy(corner.place)));
-    return vec4<f32>(colour.rgb * shade(corner.place, normal), 1.0);
+    let normal = cross(dpdx(corner.place), dpdy(corner.place));
+    return vec4<f32>(colour.rgb * shade(normal), 1.0);
 }
 
 // Whether a pixel of a surface is drawn of which `part` is to be seen: a screen door of 4 x 4 pixels [Bayer1973]. Nothing has to be
@@ -79,12 +78,12 @@ fn is_drawn(clip: vec4<f32>, part: f32) -> bool {
 // The surface where it is seen through; the faces of a cut stay whole.
 @fragment
 fn veil_colour(corner: TissueCorner) -> @location(0) vec4<f32> {
-    let normal = normalize(cross(dpdx(corner.place), dpdy(corner.place)));
+    let normal = cross(dpdx(corner.place), dpdy(corner.place));
     if (!is_drawn(corner.clip, view.surface.x)) {
         discard;
     }
     let colour = colour_table[u32(corner.field * 255.0 + 0.5)];
-    return vec4<f32>(colour.rgb * shade(corner.place, normal), 1.0);
+    return vec4<f32>(colour.rgb * shade(normal), 1.0);
 }
 
 // Behind everything, three corners that cover the view.
@@ -100,7 +99,6 @@ fn backdrop_colour() -> @location(0) vec4<f32> {
 
 struct ToolCorner {
     @builtin(position) clip: vec4<f32>,
-    @location(0) place: vec3<f32>,
     @location(1) normal: vec3<f32>,
     // In w how much of it is drawn.
     @location(2) colour: vec4<f32>,
@@ -112,7 +110,7 @@ fn tool_corner(
     @location(1) normal: vec3<f32>,
     @location(2) colour: vec4<f32>,
 ) -> ToolCorner {
-    return ToolCorner(view.view_projection * vec4<f32>(place, 1.0), place, normal, colour);
+    return ToolCorner(view.view_projection * vec4<f32>(place, 1.0), normal, colour);
 }
 
 @fragment
@@ -120,5 +118,5 @@ fn tool_colour(corner: ToolCorner) -> @location(0) vec4<f32> {
     if (!is_drawn(corner.clip, corner.colour.w)) {
         discard;
     }
-    return vec4<f32>(corner.colour.rgb * shade(corner.place, normalize(corner.normal)), 1.0);
+    return vec4<f32>(corner.colour.rgb * shade(corner.normal), 1.0);
 }

@@ -79,7 +79,7 @@ pub struct Scale {
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct View {
     view_projection: [[f32; 4]; 4],
-    eye: [f32; 4],
+    towards: [f32; 4],
     range: [f32; 4],
     surface: [f32; 4],
 }
@@ -305,10 +305,10 @@ impl SceneView {
             self.depth = Some((size, texture.create_view(&Default::default())));
         }
         let Some((_, depth)) = &self.depth else { return };
-        let eye = camera.eye();
+        let towards = (camera.eye() - camera.centre).normalize_or_zero();
         let view = View {
             view_projection: camera.view_projection(area.width / area.height.max(1.0)).to_cols_array_2d(),
-            eye: [eye.x, eye.y, eye.z, 0.0],
+            towards: [towards.x, towards.y, towards.z, 0.0],
             range: [
                 scale.low as f32,
                 scale.high as f32,
