@@ -40,7 +40,7 @@ use crate::{Error, Result};
 /// Shortest time between two pictures [s].
 const PICTURE: f64 = 1.0 / 60.0;
 /// Longest time between two pictures while the tissue lags behind [s].
-const SLOWEST_PICTURE: f64 = 1.0 / 24.0;
+const SLOWEST_PICTURE: f64 = 1.0 / 22.0;
 /// Way that a notch of the wheel asks for [m].
 const NOTCH: f64 = 0.25e-3;
 /// Speed of the keys at the start [m/s].
@@ -53,8 +53,10 @@ const WARM_UP: u64 = 5;
 const LOOK_AT_RANGE: f64 = 0.4;
 /// What the progress of a trainee is shown of.
 const PROGRESS_KEY: &str = "peak_axial_force";
-/// Pictures from one on which a software adapter draws the panels to the next.
-const PANELS_EVERY: u64 = 6;
+/// Time between two drawings of the panels on a software adapter that has better things to do [s].
+const PANELS_EVERY: f64 = 0.35;
+/// Drawings of the panels of which one shows all of them, the others what lies beside the view on the right.
+const WHOLE_EVERY: u64 = 4;
 /// Part of the nodes that may lie beyond the automatic scale.
 const BEYOND_SCALE: f64 = 0.002;
 
@@ -228,6 +230,9 @@ struct Open {
     longest_pause: f64,
     /// When the range of the field was looked at last.
     ranged: Option<Instant>,
+    /// When the panels were drawn last, and how often.
+    panelled: Option<Instant>,
+    panel_count: u64,
     /// The panels are drawn on the next picture.
     stale: bool,
     /// Scene and shaders, to be read anew when they change.
@@ -404,6 +409,8 @@ impl App {
             presented: None,
             longest_pause: 0.0,
             ranged: None,
+            panelled: None,
+            panel_count: 0,
             stale: true,
             scene_file: Watch::new([self.source.path.clone()]),
             shader_files: Watch::new(self.options.shaders.iter().flat_map(|folder| shader_files(folder))),
@@ -705,11 +712,17 @@ impl Open {
     /// Filling the panels takes a software adapter longer than drawing the tissue.
     fn panels_are_due(&self) -> bool {
         let input = !self.egui.egui_input().events.is_empty() || self.egui.is_any_pointer_button_down();
-        !self.gpu.is_software() || self.stale || input || self.pictures.is_multiple_of(PANELS_EVERY)
+        let waited = self.panelled.is_none_or(|at| at.elapsed().as_secs_f64() >= PANELS_EVERY);
+        !self.gpu.is_software() || self.stale || input || waited
     }
 
     /// Asks the panels what they show and what was clicked.
     fn run_panels(&mut self, reference: &[ReferenceCurve], wishes: &mut Wishes) -> Panels {
+        // The canvas keeps what is not drawn: without input the left side changes little.
+        let still = self.gpu.is_software() && !self.stale && self.egui.egui_input().events.is_empty();
+        self.panel_count += 1;
+        let part = still && !self.panel_count.is_multiple_of(WHOLE_EVERY);
+        self.panelled = Some(Instant::now());
         let input = self.egui.take_egui_input(&self.window);
         let context = self.egui.egui_ctx().clone();
         let mut turned = false;
@@ -751,7 +764,11 @@ impl Open {
         if wishes.recut {
             self.cut();
         }
-        Panels { triangles: context.tessellate(output.shapes, self.scale), textures: output.textures_delta }
+        let mut triangles = context.tessellate(output.shapes, self.scale);
+        if part {
+            triangles.retain(|shape| shape.clip_rect.right() > self.area.left());
+        }
+        Panels { triangles, textures: output.textures_delta }
     }
 
     /// Draws the tissue on the canvas, and the panels where they were asked.

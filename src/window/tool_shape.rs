@@ -96,6 +96,8 @@ fn needle_triangles(needle: &NeedleShape, place: &ToolPlace) -> Vec<ToolCorner> 
         }
         return corners;
     }
+    // A straight shaft has no rings between its ends.
+    let between = if place.line.is_none() { ALONG } else { 1 };
     match needle.tip {
         TipShape::Bevel { heading } => {
             // The ground face: at the angle phi from the heading the tube begins further back.
@@ -103,12 +105,12 @@ fn needle_triangles(needle: &NeedleShape, place: &ToolPlace) -> Vec<ToolCorner> 
                 if s > 0.0 { 0.0 } else { 0.5 * needle.tip_length * (1.0 - (phi - heading).cos()) }
             };
             let mut profile = vec![(0.0, 0.0), (0.0, needle.radius)];
-            profile.extend((0..=ALONG).map(|n| (shaft(n), needle.radius)));
+            profile.extend((0..=ALONG).step_by(between).map(|n| (shaft(n), needle.radius)));
             revolve(&profile, place, &back, &|_| STEEL)
         }
         _ => {
             let mut profile = vec![(0.0, 0.0), (needle.tip_length, needle.radius)];
-            profile.extend((1..=ALONG).map(|n| (shaft(n), needle.radius)));
+            profile.extend((0..=ALONG).step_by(between).skip(1).map(|n| (shaft(n), needle.radius)));
             revolve(&profile, place, &|_, _| 0.0, &|_| STEEL)
         }
     }
