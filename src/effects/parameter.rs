@@ -23,6 +23,9 @@ pub struct Parameter {
     pub value: Value,
 }
 
+/// Unit of whole numbers.
+pub const COUNT: &str = "count";
+
 /// Components of a list in the unit of its key.
 pub type Components = fn(&Scene) -> Option<Vec<f64>>;
 
@@ -67,6 +70,7 @@ impl Parameter {
     /// Overrides that set component `index` to `value`.
     pub fn overrides(&self, scene: &Scene, index: usize, value: f64) -> Vec<String> {
         match self.value {
+            Value::Number(_) if self.unit == COUNT => vec![format!("{}={}", self.key, value.round())],
             Value::Number(_) => vec![format!("{}={value}", self.key)],
             Value::List(values, beside) => {
                 let mut list = values(scene).unwrap_or_default();
@@ -129,7 +133,7 @@ mod tests {
                     continue;
                 }
                 // A whole number stays one.
-                let wanted = if parameter.unit == "count" { wanted.round() } else { wanted };
+                let wanted = if parameter.unit == COUNT { wanted.round() } else { wanted };
                 assert!((found[index] / wanted - 1.0).abs() < 1e-9, "{}: {found:?} instead of {wanted}", parameter.key);
                 for (other, old) in parameter.values(&before).into_iter().enumerate().filter(|(n, _)| *n != index) {
                     assert!((found[other] - old).abs() <= 1e-9 * old.abs(), "{}: {other} moved", parameter.key);

@@ -16,7 +16,7 @@ use super::ViewOptions;
 use super::camera::Camera;
 use super::devices::Devices;
 use super::grip::{Grip, Modifiers, Sight};
-use super::hand::{Desk, Key, Recording};
+use super::hand::{Desk, InputDevice, Key, Recording};
 use super::marks;
 use super::panels::{self, Choices, ReferenceCurve, Wishes};
 use super::practice::{Latency, Leader, Practice, Renewed, State};
@@ -608,6 +608,8 @@ impl Open {
         self.counted = Instant::now();
         if self.practice.state != State::Running {
             self.due = 0.0;
+            // An input that nothing answers is no latency.
+            let _ = self.desk.fresh_input();
             return false;
         }
         self.practice.timing.running += passed;

@@ -2,7 +2,7 @@
 
 use super::texts;
 use super::tuning::{Pace, Tuning};
-use crate::effects::parameter::Parameter;
+use crate::effects::parameter::{COUNT, Parameter};
 use crate::effects::{EFFECTS, Effect};
 use crate::scene::Scene;
 use crate::solver::change::Reach;
@@ -76,7 +76,7 @@ fn sliders(ui: &mut egui::Ui, scene: &Scene, parameter: &Parameter, wishes: &mut
             .clamping(egui::SliderClamping::Never)
             .max_decimals(4)
             .suffix(unit);
-        let slider = if parameter.unit == "count" { slider.integer() } else { slider };
+        let slider = if parameter.unit == COUNT { slider.integer() } else { slider };
         let name = ui.small(parameter.name).id;
         if ui.add(slider).labelled_by(name).on_hover_text(format!("{}\n{}", parameter.key, parameter.source)).changed()
         {

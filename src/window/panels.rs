@@ -1,6 +1,6 @@
 //! The panels around the view: what is shown, who leads, forces, energies, health and times.
 
-use egui_plot::{Legend, Line, Plot, PlotPoints};
+use egui_plot::{AxisHints, Legend, Line, Plot, PlotPoints};
 
 use super::accuracy::Accuracy;
 use super::appearance::{self, ColourMap, Look};
@@ -243,7 +243,8 @@ pub fn readings(
     };
     Plot::new("force")
         .height((0.4 * ui.available_height()).max(140.0))
-        .x_axis_label(texts::DEPTH_AXIS)
+        // A narrow plot has room for its numbers nevertheless.
+        .custom_x_axes(vec![AxisHints::new_x().label(texts::DEPTH_AXIS).label_spacing(egui::Rangef::new(16.0, 28.0))])
         .y_axis_label(texts::FORCE_AXIS)
         .legend(Legend::default())
         .allow_drag(false)
