@@ -1,6 +1,6 @@
 //! The panels around the view: what is shown, who leads, forces, energies, health and times.
 
-use egui_plot::{AxisHints, Legend, Line, Plot, PlotPoints};
+use egui_plot::{AxisHints, GridInput, GridMark, Legend, Line, Plot, PlotPoints};
 
 use super::accuracy::Accuracy;
 use super::appearance::{self, ColourMap, Look};
@@ -219,6 +219,15 @@ fn colour_bar(ui: &mut egui::Ui, scale: &Scale, map: ColourMap) {
     });
 }
 
+/// Lines of the depth axis: 1, 2 or 5 times a power of ten apart, with room for a number at each.
+fn depth_marks(input: GridInput) -> Vec<GridMark> {
+    let least = 3.0 * input.base_step_size;
+    let power = 10f64.powf(least.log10().floor());
+    let step_size = [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|s| *s >= least).unwrap_or(10.0 * power);
+    let (from, to) = ((input.bounds.0 / step_size).ceil() as i64, (input.bounds.1 / step_size).floor() as i64);
+    (from..=to).map(|n| GridMark { value: n as f64 * step_size, step_size }).collect()
+}
+
 /// Force against depth, numbers and lights on the right.
 pub fn readings(
     ui: &mut egui::Ui,
@@ -243,7 +252,8 @@ pub fn readings(
     };
     Plot::new("force")
         .height((0.4 * ui.available_height()).max(140.0))
-        // A narrow plot has room for its numbers nevertheless.
+        // Powers of ten would leave a narrow plot of some millimetres without a number.
+        .x_grid_spacer(depth_marks)
         .custom_x_axes(vec![AxisHints::new_x().label(texts::DEPTH_AXIS).label_spacing(egui::Rangef::new(16.0, 28.0))])
         .y_axis_label(texts::FORCE_AXIS)
         .legend(Legend::default())

@@ -377,7 +377,11 @@ fn drawn_buffers(engine: &GpuEngine) -> Result<[&wgpu::Buffer; 2]> {
 }
 
 /// Binds buffers in the order of the shader.
-fn bindings(device: &wgpu::Device, pipeline: &wgpu::RenderPipeline, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
+pub(super) fn bindings(
+    device: &wgpu::Device,
+    pipeline: &wgpu::RenderPipeline,
+    buffers: &[&wgpu::Buffer],
+) -> wgpu::BindGroup {
     let entries: Vec<wgpu::BindGroupEntry> = (0..)
         .zip(buffers)
         .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
@@ -423,7 +427,7 @@ fn node_copies(model: &Model) -> Vec<[u32; 4]> {
 }
 
 /// Corners in a buffer of the device, and how many.
-fn vertices<T: Pod>(gpu: &Gpu, corners: &[T]) -> (wgpu::Buffer, u32) {
+pub(super) fn vertices<T: Pod>(gpu: &Gpu, corners: &[T]) -> (wgpu::Buffer, u32) {
     let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: Some("corners"),
         // A buffer of no bytes cannot be bound.

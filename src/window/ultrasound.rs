@@ -11,6 +11,7 @@ use glam::{DVec2, DVec3};
 use wgpu::util::DeviceExt;
 
 use super::probe::{ATTENUATION, Orientation, Probe, ProbePlane, in_slice};
+use super::scene_view::{bindings, vertices};
 use super::section::{self, TissueCorner};
 use super::tool_shape::ToolPlace;
 use crate::gpu::{Gpu, GpuEngine};
@@ -419,21 +420,10 @@ impl Ultrasound {
         let displacement = engine
             .buffer("node_displacement")
             .ok_or_else(|| Error::Device("the engine has no buffer node_displacement".into()))?;
-        let bindings = |pipeline: &wgpu::RenderPipeline, buffers: &[&wgpu::Buffer]| {
-            let entries: Vec<wgpu::BindGroupEntry> = (0..)
-                .zip(buffers)
-                .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-                .collect();
-            device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout: &pipeline.get_bind_group_layout(0),
-                entries: &entries,
-            })
-        };
         let bindings = [
-            bindings(&tissue, &[&slice, &table, displacement, &rest]),
-            bindings(&shadow, &[&slice]),
-            bindings(&needle, &[&slice]),
+            bindings(device, &tissue, &[&slice, &table, displacement, &rest]),
+            bindings(device, &shadow, &[&slice]),
+            bindings(device, &needle, &[&slice]),
         ];
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("ultrasound"),
@@ -526,17 +516,6 @@ impl Ultrasound {
             }
         }
     }
-}
-
-/// Corners in a buffer of the device, and how many.
-fn vertices<T: Pod>(gpu: &Gpu, corners: &[T]) -> (wgpu::Buffer, u32) {
-    let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("corners"),
-        // A buffer of no bytes cannot be bound.
-        contents: if corners.is_empty() { &[0; 16] } else { bytemuck::cast_slice(corners) },
-        usage: wgpu::BufferUsages::VERTEX,
-    });
-    (buffer, corners.len() as u32)
 }
 
 #[cfg(test)]
