@@ -598,9 +598,20 @@ fn view(args: ViewArgs, start: Instant) -> Result<String> {
         ),
     };
     let haptic = seen.haptic.map_or(String::new(), |timing| format!("\nhaptic: {}", timing.text()));
+    let switches = match seen.switches.iter().map(|pace| pace.halted).max() {
+        None => String::new(),
+        Some(halted) => {
+            let whole: Vec<String> = seen.switches.iter().map(|pace| pace.whole.as_millis().to_string()).collect();
+            format!(
+                "\neffects switched in {} ms; frames halted for {} ms at most",
+                whole.join(", "),
+                halted.as_millis()
+            )
+        }
+    };
     Ok(format!(
         "{} pictures, {:.1} a second, at most {:.0} ms apart; first one after {:.2} s\n{} frames of tissue, {:.2} of real time with the window open (tissue alone: \
-         {:.2}); {:.3} N at {:.2} mm\n{felt}{haptic}",
+         {:.2}); {:.3} N at {:.2} mm\n{felt}{switches}{haptic}",
         seen.pictures,
         seen.frames_per_second,
         1e3 * seen.longest_pause,

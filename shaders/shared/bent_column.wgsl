@@ -1,14 +1,6 @@
 // A column of cells between lines that are bent around a bore: prisms, bilinear in the plane,
 // X = centre + xi E_xi + eta E_eta + xi eta taper. The same functions as in shared/straight_column.
 
-// Edges along x, y and z as (length, cube root, quarter inverse, unused), then two vectors per column.
-@group(1) @binding(0) var<storage, read> cell_edges: array<vec4<f32>>;
-
-fn layer_edge(k: u32) -> CellEdge {
-    let edge = cell_edges[params.cells_x + params.cells_y + k];
-    return CellEdge(edge.x, edge.y, edge.z, 0.0);
-}
-
 struct BentColumn {
     // An eighth of the gradients of xi (x, y) and of eta (x, y) at the centre [1/m]; zero for a gap.
     gradients: vec4<f32>,
@@ -22,7 +14,8 @@ struct BentColumn {
 alias Column = BentColumn;
 
 fn column_at(i: u32, j: u32) -> Column {
-    let at = params.cells_x + params.cells_y + params.cells_z + 2u * (j * params.cells_x + i);
+    // Two vectors per column behind the edges.
+    let at = CELLS_X + CELLS_Y + CELLS_Z + 2u * (j * CELLS_X + i);
     let shape = cell_edges[at + 1u];
     return Column(cell_edges[at], shape.xy, shape.z, shape.w);
 }

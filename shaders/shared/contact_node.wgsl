@@ -1,12 +1,26 @@
 #import shared/params
 #import shared/step_input
+// What lies in the buffers are vectors: a software adapter pays for every access, hardly for its width.
+
+// A node that the tool may touch, as it lies in the buffer; see `Contact`.
+struct ContactNode {
+    rest: vec4<f32>,
+    grid: vec4<u32>,
+    surface: vec4<f32>,
+    // node, slot, pushed, faces
+    numbers: vec4<u32>,
+    // rest_radius, rest_axial, mass, share
+    sizes: vec4<f32>,
+    ring_low: vec4<u32>,
+    ring_high: vec4<u32>,
+}
 
 // A node that the tool may touch: what is known before the run.
-struct ContactNode {
-    // Rest position X [m], w unused.
-    rest: vec4<f32>,
-    // Grid coordinates of the node, w unused.
-    grid: vec4<u32>,
+struct Contact {
+    // Rest position X [m].
+    rest: vec3<f32>,
+    // Grid coordinates of the node.
+    grid: vec3<u32>,
     // Of a surface that separates: side to which a slit face is pushed (unit vector); w: 1 at the outer wall of a hollow
     // needle, -1 at its bore.
     surface: vec4<f32>,
@@ -15,24 +29,33 @@ struct ContactNode {
     slot: u32,
     // 1: pushed by the tool; 0: only carries forces of the tip.
     pushed: u32,
+    // On a slit: faces around the node (bits: lower and higher along the first way, those again higher along the second), and the
+    // contact nodes around, row by row without the node itself.
+    faces: u32,
+    ring_low: vec4<u32>,
+    ring_high: vec4<u32>,
     // Rest distance from the axis r0 and coordinate s0 along the path [m].
     rest_radius: f32,
     rest_axial: f32,
     // Nodal mass [kg].
     mass: f32,
-    // On a slit: faces around the node (bits: lower and higher along the first way, those again higher along the second), and the
-    // contact nodes around, row by row without the node itself.
-    faces: u32,
     // What the node stands for: on a slit a quarter of the areas of its faces [m^2], else its rest volume [m^3].
     share: f32,
-    ring_low: vec4<u32>,
-    ring_high: vec4<u32>,
+}
+
+// What a contact node remembers, as it lies in the buffer; see `Memory`.
+struct ContactMemory {
+    stick: vec4<f32>,
+    // overlap, axial_on, touching, on_shaft
+    touch: vec4<f32>,
+    // passed, rest_radius; z, w unused
+    path: vec4<f32>,
 }
 
 // What a contact node remembers.
-struct ContactMemory {
-    // Stretch of the stick spring [m], w unused.
-    stick: vec4<f32>,
+struct Memory {
+    // Stretch of the stick spring [m].
+    stick: vec3<f32>,
     // Overlap found at activation [m], axial position there [m], 1 while touching.
     overlap: f32,
     axial_on: f32,
@@ -42,8 +65,6 @@ struct ContactMemory {
     // On a free path: 1 where the tip has passed, and the distance from the axis there [m].
     passed: f32,
     rest_radius: f32,
-    _pad0: f32,
-    _pad1: f32,
 }
 
 // Sums over the steps of a frame; forces on the tissue.
@@ -51,36 +72,78 @@ struct ContactSums {
     // Whole impulse [N s] and angular impulse about the tip [N m s], w unused.
     impulse: vec4<f32>,
     angular_impulse: vec4<f32>,
-    // Parts along the insertion direction [N s].
-    cutting: f32,
-    spreading: f32,
-    sliding: f32,
-    // Work of the tool [J].
+    // Parts along the insertion direction [N s]: cutting, spreading, sliding, and the part of spreading on the shaft of a needle.
+    parts: vec4<f32>,
+    // Work of the tool [J], dissipated by sliding and by damping [J], stored in the springs of this node at the last step [J].
+    energies: vec4<f32>,
+}
+
+// What one step adds to the sums beside the forces: parts of angular impulse and work that forces at the node do not have.
+struct StepSums {
+    angular_impulse: vec3<f32>,
+    shaft: f32,
     work: f32,
-    // Dissipated by sliding and by damping [J].
     sliding_dissipation: f32,
     damping_dissipation: f32,
-    // Stored in the springs of this node at the last step [J].
     stored: f32,
-    // The part of `spreading` on the shaft of a needle [N s].
-    shaft: f32,
 }
 
 @group(1) @binding(4) var<storage, read> contact_nodes: array<ContactNode>;
 @group(3) @binding(4) var<storage, read_write> contact_memory: array<ContactMemory>;
 @group(3) @binding(5) var<storage, read_write> contact_sums: array<ContactSums>;
 
-// Books the forces of one step on contact node `index`: tip, normal and tangential force, lever about the tip.
-fn book_contact(index: u32, tip: vec3<f32>, normal: vec3<f32>, tangential: vec3<f32>, lever: vec3<f32>) {
+fn contact_at(index: u32) -> Contact {
+    let c = contact_nodes[index];
+    return Contact(
+        c.rest.xyz,
+        c.grid.xyz,
+        c.surface,
+        c.numbers.x,
+        c.numbers.y,
+        c.numbers.z,
+        c.numbers.w,
+        c.ring_low,
+        c.ring_high,
+        c.sizes.x,
+        c.sizes.y,
+        c.sizes.z,
+        c.sizes.w,
+    );
+}
+
+fn remembered(index: u32) -> Memory {
+    let m = contact_memory[index];
+    return Memory(m.stick.xyz, m.touch.x, m.touch.y, m.touch.z, m.touch.w, m.path.x, m.path.y);
+}
+
+fn remember(index: u32, m: Memory) {
+    contact_memory[index] = ContactMemory(
+        vec4<f32>(m.stick, 0.0),
+        vec4<f32>(m.overlap, m.axial_on, m.touching, m.on_shaft),
+        vec4<f32>(m.passed, m.rest_radius, 0.0, 0.0),
+    );
+}
+
+// Books one step of contact node `index`: tip, normal and tangential force, lever about the tip, and what else there is.
+fn book_contact(
+    index: u32,
+    tip: vec3<f32>,
+    normal: vec3<f32>,
+    tangential: vec3<f32>,
+    lever: vec3<f32>,
+    more: StepSums,
+) {
     let total = tip + normal + tangential;
     let d = step_input.direction.xyz * params.dt;
-    contact_sums[index].impulse += vec4<f32>(total * params.dt, 0.0);
-    contact_sums[index].angular_impulse += vec4<f32>(cross(lever, total) * params.dt, 0.0);
-    contact_sums[index].cutting += dot(tip, d);
-    contact_sums[index].spreading += dot(normal, d);
-    contact_sums[index].sliding += dot(tangential, d);
-    contact_sums[index].work += dot(total, step_input.velocity.xyz) * params.dt;
+    let torque = cross(lever, total);
+    var power = dot(total, step_input.velocity.xyz);
 #ifdef FREE_PATH
-    contact_sums[index].work += dot(cross(lever, total), angular_velocity()) * params.dt;
+    power += dot(torque, angular_velocity());
 #endif
+    contact_sums[index].impulse += vec4<f32>(total * params.dt, 0.0);
+    contact_sums[index].angular_impulse += vec4<f32>(torque * params.dt + more.angular_impulse, 0.0);
+    contact_sums[index].parts += vec4<f32>(dot(tip, d), dot(normal, d), dot(tangential, d), more.shaft);
+    let before = contact_sums[index].energies.xyz;
+    let taken = vec3<f32>(power * params.dt + more.work, more.sliding_dissipation, more.damping_dissipation);
+    contact_sums[index].energies = vec4<f32>(before + taken, more.stored);
 }

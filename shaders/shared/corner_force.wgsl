@@ -7,9 +7,9 @@
 @group(2) @binding(2) var<storage, read_write> corner_force: array<vec4<f32>>;
 
 fn padded_column(i: u32, j: u32) -> u32 {
-    return (j + 1u) * (params.cells_x + 2u) + i + 1u;
+    return (j + 1u) * (CELLS_X + 2u) + i + 1u;
 }
 
 fn corner_slot(strip: u32, plane: u32, corner: u32, column: u32) -> u32 {
-    return ((strip * (params.strip_layers + 1u) + plane) * 4u + corner) * params.padded_columns + column;
+    return ((strip * (STRIP_LAYERS + 1u) + plane) * 4u + corner) * PADDED_COLUMNS + column;
 }

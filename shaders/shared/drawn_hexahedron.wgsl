@@ -6,10 +6,10 @@
 #endif
 
 fn drawn_cell(index: u32) -> DrawnCell {
-    let layer = params.cells_x * params.cells_y;
+    let layer = CELLS_X * CELLS_Y;
     let k = quotient(index, layer);
-    let j = quotient(index - k * layer, params.cells_x);
-    let cell = vec3<u32>(index - k * layer - j * params.cells_x, j, k);
+    let j = quotient(index - k * layer, CELLS_X);
+    let cell = vec3<u32>(index - k * layer - j * CELLS_X, j, k);
     let shape = column_at(cell.x, cell.y);
     let edge_z = layer_edge(cell.z);
     var gradient = array<vec3<f32>, 3>(vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0));

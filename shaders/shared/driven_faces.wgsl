@@ -34,19 +34,19 @@ fn prescribed_velocity(place: NodePlace) -> vec3<f32> {
     let i = place.i;
     let j = place.j;
     let k = place.k;
-    let y0 = params.nodes_x;
-    let z0 = params.nodes_x + params.nodes_y;
+    let y0 = NODES_X;
+    let z0 = NODES_X + NODES_Y;
     let X = vec3<f32>(grid_lines[i], grid_lines[y0 + j], grid_lines[z0 + k]);
     let low = vec3<f32>(grid_lines[0], grid_lines[y0], grid_lines[z0]);
-    let high = vec3<f32>(grid_lines[y0 - 1u], grid_lines[z0 - 1u], grid_lines[z0 + params.nodes_z - 1u]);
+    let high = vec3<f32>(grid_lines[y0 - 1u], grid_lines[z0 - 1u], grid_lines[z0 + NODES_Z - 1u]);
     let arm = X - 0.5 * (low + high);
     var v = vec3<f32>(0.0);
     if (i == 0u) { v += face_velocity(0u, arm); }
-    if (i + 1u == params.nodes_x) { v += face_velocity(1u, arm); }
+    if (i + 1u == NODES_X) { v += face_velocity(1u, arm); }
     if (j == 0u) { v += face_velocity(2u, arm); }
-    if (j + 1u == params.nodes_y) { v += face_velocity(3u, arm); }
+    if (j + 1u == NODES_Y) { v += face_velocity(3u, arm); }
     if (k == 0u) { v += face_velocity(4u, arm); }
-    if (k + 1u == params.nodes_z) { v += face_velocity(5u, arm); }
+    if (k + 1u == NODES_Z) { v += face_velocity(5u, arm); }
     return v;
 }
 #endif

@@ -17,15 +17,15 @@ fn gathered_force(place: NodePlace) -> vec4<f32> {
 fn gathered_force(place: NodePlace) -> vec4<f32> {
     // One strip, or two where the node lies on the plane between them.
     let k = place.k;
-    let above = quotient(k, params.strip_layers);
-    let last = min(above, params.strip_count - 1u);
-    let first = select(last, above - 1u, k > 0u && above * params.strip_layers == k);
-    let stride = params.padded_columns;
-    let row = params.cells_x + 2u;
+    let above = quotient(k, STRIP_LAYERS);
+    let last = min(above, STRIP_COUNT - 1u);
+    let first = select(last, above - 1u, k > 0u && above * STRIP_LAYERS == k);
+    let stride = PADDED_COLUMNS;
+    let row = CELLS_X + 2u;
     let column = padded_column(place.i, place.j);
     var sum = vec4<f32>(0.0);
     for (var strip = first; strip <= last; strip++) {
-        let slot = corner_slot(strip, k - strip * params.strip_layers, 0u, column);
+        let slot = corner_slot(strip, k - strip * STRIP_LAYERS, 0u, column);
         sum += corner_force[slot] + corner_force[slot + stride - 1u]
             + corner_force[slot + 2u * stride - row] + corner_force[slot + 3u * stride - row - 1u];
     }

@@ -4,7 +4,7 @@
 
 fn corner_node(cell: vec3<u32>, corner: u32) -> u32 {
     let at = cell + vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
-    return (at.z * params.nodes_y + at.y) * params.nodes_x + at.x;
+    return (at.z * NODES_Y + at.y) * NODES_X + at.x;
 }
 
 // `number`: its material; `kept`: part of the stiffness that the cell keeps for other reasons than its material's.
@@ -46,7 +46,7 @@ fn cell_energy(cell: vec3<u32>, number: u32, kept: f32, u: ptr<function, array<v
     let size = column_cube_root(shape) * edge_z.cube_root;
     let q2 = dot(q[0], q[0]) + dot(q[1], q[1]) + dot(q[2], q[2]) + dot(q[3], q[3]);
     var e: CellEnergy;
-    let index = (cell.z * params.cells_y + cell.y) * params.cells_x + cell.x;
+    let index = (cell.z * CELLS_Y + cell.y) * CELLS_X + cell.x;
     let point = point_energy(PointPlace(index, number, size, kept, 0.0, 0.0), H);
     e.elastic = volume * point.stored;
     e.held = volume * point.held;

@@ -5,10 +5,10 @@
 #endif
 
 fn measured_cell(index: u32) -> MeasuredCell {
-    let layer = params.cells_x * params.cells_y;
+    let layer = CELLS_X * CELLS_Y;
     let k = quotient(index, layer);
-    let j = quotient(index - k * layer, params.cells_x);
-    let cell = vec3<u32>(index - k * layer - j * params.cells_x, j, k);
+    let j = quotient(index - k * layer, CELLS_X);
+    let cell = vec3<u32>(index - k * layer - j * CELLS_X, j, k);
     var out: MeasuredCell;
     var u: array<vec3<f32>, 8>;
     // Relative to the first corner in integers: differences stay exact.

@@ -21,10 +21,10 @@ struct NodePlace {
 }
 
 fn node_place(node: u32) -> NodePlace {
-    let layer = params.nodes_x * params.nodes_y;
+    let layer = NODES_X * NODES_Y;
     let k = quotient(node, layer);
-    let j = quotient(node - k * layer, params.nodes_x);
-    return NodePlace(node - k * layer - j * params.nodes_x, j, k);
+    let j = quotient(node - k * layer, NODES_X);
+    return NodePlace(node - k * layer - j * NODES_X, j, k);
 }
 
 // Bits 0..2: held or driven components x, y, z.
@@ -32,9 +32,9 @@ fn held_components(place: NodePlace) -> u32 {
     let i = place.i;
     let j = place.j;
     let k = place.k;
-    var held = select(0u, params.fixed_x_min, i == 0u) | select(0u, params.fixed_x_max, i + 1u == params.nodes_x);
-    held |= select(0u, params.fixed_y_min, j == 0u) | select(0u, params.fixed_y_max, j + 1u == params.nodes_y);
-    held |= select(0u, params.fixed_z_min, k == 0u) | select(0u, params.fixed_z_max, k + 1u == params.nodes_z);
+    var held = select(0u, FIXED_X_MIN, i == 0u) | select(0u, FIXED_X_MAX, i + 1u == NODES_X);
+    held |= select(0u, FIXED_Y_MIN, j == 0u) | select(0u, FIXED_Y_MAX, j + 1u == NODES_Y);
+    held |= select(0u, FIXED_Z_MIN, k == 0u) | select(0u, FIXED_Z_MAX, k + 1u == NODES_Z);
     return held;
 }
 #endif

@@ -27,19 +27,19 @@ struct SlitForce {
 }
 
 // Contact node `place` (row by row, 4 is the node itself) of the 3 x 3 block around a node.
-fn slit_neighbour(contact: ContactNode, place: u32) -> u32 {
+fn slit_neighbour(contact: Contact, place: u32) -> u32 {
     let at = select(place, place - 1u, place > 4u);
     return select(contact.ring_low[at & 3u], contact.ring_high[at & 3u], at > 3u);
 }
 
 fn lever_of(contact: u32) -> vec3<f32> {
     return contact_nodes[contact].rest.xyz - step_input.tip.xyz
-        + vec3<f32>(node_displacement[contact_nodes[contact].node].xyz) * DISPLACEMENT_UNIT;
+        + vec3<f32>(node_displacement[contact_nodes[contact].numbers.x].xyz) * DISPLACEMENT_UNIT;
 }
 
 fn slit_force(index: u32) -> SlitForce {
     var sum: SlitForce;
-    let contact = contact_nodes[index];
+    let contact = contact_at(index);
     let d = -step_input.direction.xyz;
     let own = lever_of(index);
     let own_velocity = node_velocity[contact.node].xyz;
@@ -52,16 +52,16 @@ fn slit_force(index: u32) -> SlitForce {
         let levers = array<vec3<f32>, 3>(lever_of(first), lever_of(second), lever_of(far));
         let rest_axial = vec4<f32>(
             contact.rest_axial,
-            contact_nodes[first].rest_axial,
-            contact_nodes[second].rest_axial,
-            contact_nodes[far].rest_axial,
+            contact_nodes[first].sizes.y,
+            contact_nodes[second].sizes.y,
+            contact_nodes[far].sizes.y,
         );
         let s = vec4<f32>(dot(own, d), dot(levers[0], d), dot(levers[1], d), dot(levers[2], d));
         let near = (contact.faces & (1u << face)) != 0u
             && any(rest_axial < vec4<f32>(tip_state.coordinate)) && any(s > vec4<f32>(0.0));
         let edges = array<vec3<f32>, 2>(
-            contact_nodes[first].rest.xyz - contact.rest.xyz,
-            contact_nodes[second].rest.xyz - contact.rest.xyz,
+            contact_nodes[first].rest.xyz - contact.rest,
+            contact_nodes[second].rest.xyz - contact.rest,
         );
         let k = puncture.face_stiffness * length(cross(edges[0], edges[1])) / f32(FACE_POINTS * FACE_POINTS);
         for (var point = select(FACE_POINTS * FACE_POINTS, 0u, near); point < FACE_POINTS * FACE_POINTS; point++) {
@@ -71,9 +71,9 @@ fn slit_force(index: u32) -> SlitForce {
             let lever = own * w.x + levers[0] * w.y + levers[1] * w.z + levers[2] * w.w;
             let s = dot(s, w);
             var from_axis = lever;
-            var v = own_velocity * w.x + node_velocity[contact_nodes[first].node].xyz * w.y
-                + node_velocity[contact_nodes[second].node].xyz * w.z
-                + node_velocity[contact_nodes[far].node].xyz * w.w - step_input.velocity.xyz;
+            var v = own_velocity * w.x + node_velocity[contact_nodes[first].numbers.x].xyz * w.y
+                + node_velocity[contact_nodes[second].numbers.x].xyz * w.z
+                + node_velocity[contact_nodes[far].numbers.x].xyz * w.w - step_input.velocity.xyz;
 #ifdef FLEXIBLE_NEEDLE
             let bend = bend_at(s);
             from_axis -= bend.offset;

@@ -1,12 +1,5 @@
 // A column of cells between straight grid lines. The same functions as in shared/bent_column.
 
-// Edges along x, then y, then z.
-@group(1) @binding(0) var<storage, read> cell_edges: array<CellEdge>;
-
-fn layer_edge(k: u32) -> CellEdge {
-    return cell_edges[params.cells_x + params.cells_y + k];
-}
-
 struct StraightColumn {
     x: CellEdge,
     y: CellEdge,
@@ -15,7 +8,7 @@ struct StraightColumn {
 alias Column = StraightColumn;
 
 fn column_at(i: u32, j: u32) -> Column {
-    return Column(cell_edges[i], cell_edges[params.cells_x + j]);
+    return Column(cell_edge(i), cell_edge(CELLS_X + j));
 }
 
 // Area [m^2] and its cube root.

@@ -35,20 +35,20 @@ struct MaterialPlace {
 
 // The rest position itself or the nearest one in the block.
 fn within_block(X: vec3<f32>) -> vec3<f32> {
-    let y0 = params.nodes_x;
-    let z0 = y0 + params.nodes_y;
+    let y0 = NODES_X;
+    let z0 = y0 + NODES_Y;
     let low = vec3<f32>(grid_lines[0], grid_lines[y0], grid_lines[z0]);
-    let high = vec3<f32>(grid_lines[y0 - 1u], grid_lines[z0 - 1u], grid_lines[z0 + params.nodes_z - 1u]);
+    let high = vec3<f32>(grid_lines[y0 - 1u], grid_lines[z0 - 1u], grid_lines[z0 + NODES_Z - 1u]);
     return clamp(X, low, high);
 }
 
 fn grid_place(X: vec3<f32>) -> GridPlace {
-    let y0 = params.nodes_x;
-    let z0 = y0 + params.nodes_y;
+    let y0 = NODES_X;
+    let z0 = y0 + NODES_Y;
     let cell = vec3<u32>(
-        find_cell(X.x, 0u, params.nodes_x),
-        find_cell(X.y, y0, params.nodes_y),
-        find_cell(X.z, z0, params.nodes_z),
+        find_cell(X.x, 0u, NODES_X),
+        find_cell(X.y, y0, NODES_Y),
+        find_cell(X.z, z0, NODES_Z),
     );
     let low = vec3<f32>(grid_lines[cell.x], grid_lines[y0 + cell.y], grid_lines[z0 + cell.z]);
     let high = vec3<f32>(grid_lines[cell.x + 1u], grid_lines[y0 + cell.y + 1u], grid_lines[z0 + cell.z + 1u]);
@@ -64,7 +64,7 @@ fn material_place(X: vec3<f32>) -> MaterialPlace {
     for (var corner = 0u; corner < 8u; corner++) {
         let bit = vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
         let at = grid.cell + bit;
-        let node = (at.z * params.nodes_y + at.y) * params.nodes_x + at.x;
+        let node = (at.z * NODES_Y + at.y) * NODES_X + at.x;
         let upper = bit == vec3<u32>(1u);
         let n = select(1.0 - grid.local, grid.local, upper);
         let rate = select(vec3<f32>(-1.0), vec3<f32>(1.0), upper) / grid.width

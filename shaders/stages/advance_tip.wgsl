@@ -32,15 +32,15 @@ struct AnchorPlace {
 fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     let t = step_input.direction.xyz;
     let X = tip_anchors[anchor].surface.xyz + t * a;
-    let y0 = params.nodes_x;
-    let z0 = params.nodes_x + params.nodes_y;
+    let y0 = NODES_X;
+    let z0 = NODES_X + NODES_Y;
 #ifdef BORE
-    let cell = vec3<u32>(tip_anchors[anchor].column.xy, find_cell(X.z, z0, params.nodes_z));
+    let cell = vec3<u32>(tip_anchors[anchor].column.xy, find_cell(X.z, z0, NODES_Z));
 #else
     let cell = vec3<u32>(
-        find_cell(X.x, 0u, params.nodes_x),
-        find_cell(X.y, y0, params.nodes_y),
-        find_cell(X.z, z0, params.nodes_z),
+        find_cell(X.x, 0u, NODES_X),
+        find_cell(X.y, y0, NODES_Y),
+        find_cell(X.z, z0, NODES_Z),
     );
 #endif
     let low = vec3<f32>(grid_lines[cell.x], grid_lines[y0 + cell.y], grid_lines[z0 + cell.z]);
@@ -56,7 +56,7 @@ fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     for (var corner = 0u; corner < 8u; corner++) {
         let bit = vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
         let at = cell + bit;
-        let node = (at.z * params.nodes_y + at.y) * params.nodes_x + at.x;
+        let node = (at.z * NODES_Y + at.y) * NODES_X + at.x;
         let upper = bit == vec3<u32>(1u);
         let n = select(1.0 - local, local, upper);
         let d = select(-rate, rate, upper);

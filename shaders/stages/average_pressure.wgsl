@@ -7,14 +7,14 @@
 #import shared/mesh_node
 #import shared/averaged_dilatation
 
-// Cells around the nodes, four at a time; the last four of a node are filled up with `params.cell_count`.
+// Cells around the nodes, four at a time; the last four of a node are filled up with `CELL_COUNT`.
 @group(1) @binding(10) var<storage, read> node_cells: array<vec4<u32>>;
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
 @compute @workgroup_size(64)
 fn average_pressure(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let node = thread_index(id, groups);
-    if (node >= params.node_count) {
+    if (node >= NODE_COUNT) {
         return;
     }
     let place = mesh_nodes[node];

@@ -17,7 +17,7 @@
 @compute @workgroup_size(64)
 fn cell_fields(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let index = thread_index(id, groups);
-    if (index >= params.cell_count) {
+    if (index >= CELL_COUNT) {
         return;
     }
     let cell = drawn_cell(index);

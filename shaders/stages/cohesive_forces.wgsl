@@ -45,7 +45,7 @@ fn cohesive_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     damage = max(damage, select(0.0, 1.0, backward && above));
 #endif
     // Where both copies lie on the full shaft the bond is gone.
-    damage = max(damage, contact_memory[pair.contacts.x].on_shaft * contact_memory[pair.contacts.y].on_shaft);
+    damage = max(damage, contact_memory[pair.contacts.x].touch.w * contact_memory[pair.contacts.y].touch.w);
 #endif
     let k = cohesive.penalty * pair.first_way_and_area.w;
     let closed = normal_opening < 0.0;

@@ -18,7 +18,7 @@
 
 // Writes the forces of one plane from their transform: z (all corners alike), x, y, xy.
 fn store_plane(slot: u32, z: vec3<f32>, x: vec3<f32>, y: vec3<f32>, xy: vec3<f32>, bound: f32) {
-    let stride = params.padded_columns;
+    let stride = PADDED_COLUMNS;
     corner_force[slot] = vec4<f32>(x + y - z - xy, bound);
     corner_force[slot + stride] = vec4<f32>(y + xy - z - x, bound);
     corner_force[slot + 2u * stride] = vec4<f32>(x + xy - z - y, bound);
@@ -28,21 +28,21 @@ fn store_plane(slot: u32, z: vec3<f32>, x: vec3<f32>, y: vec3<f32>, xy: vec3<f32
 @compute @workgroup_size(64)
 fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let thread = thread_index(id, groups);
-    if (thread >= params.column_count * params.strip_count) {
+    if (thread >= COLUMN_COUNT * STRIP_COUNT) {
         return;
     }
-    let strip = quotient(thread, params.column_count);
-    let column = thread - strip * params.column_count;
-    let j = quotient(column, params.cells_x);
-    let i = column - j * params.cells_x;
-    let first = strip * params.strip_layers;
-    let last = min(first + params.strip_layers, params.cells_z);
+    let strip = quotient(thread, COLUMN_COUNT);
+    let column = thread - strip * COLUMN_COUNT;
+    let j = quotient(column, CELLS_X);
+    let i = column - j * CELLS_X;
+    let first = strip * STRIP_LAYERS;
+    let last = min(first + STRIP_LAYERS, CELLS_Z);
 
     let shape = column_at(i, j);
     let area = column_area(shape);
     let area_cube_root = column_cube_root(shape);
-    let row = params.nodes_x;
-    let layer = params.nodes_x * params.nodes_y;
+    let row = NODES_X;
+    let layer = NODES_X * NODES_Y;
     var node = first * layer + j * row + i;
     var b0 = node_displacement[node].xyz;
     var b1 = node_displacement[node + 1u].xyz;
@@ -88,7 +88,7 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let q_xy = vec3<f32>(upper_xy + lower_xy) * eighth - tapered(shape, H);
         let q_xyz = vec3<f32>(upper_xy - lower_xy) * eighth;
         let q2 = (dot(q_yz, q_yz) + dot(q_zx, q_zx) + dot(q_xy, q_xy) + dot(q_xyz, q_xyz)) / max(size * size, SMALLEST_SQUARE);
-        let cell = (k * params.cells_y + j) * params.cells_x + i;
+        let cell = (k * CELLS_Y + j) * CELLS_X + i;
         let number = material_of(cell);
         let modulus = materials[number].hourglass;
 
@@ -133,7 +133,7 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         left_y = a_y + q_yz * hourglass;
         left_xy = (q_xy + q_xyz) * hourglass;
         left_bound = bound;
-        slot += 4u * params.padded_columns;
+        slot += 4u * PADDED_COLUMNS;
         b0 = t0;
         b1 = t1;
         b2 = t2;

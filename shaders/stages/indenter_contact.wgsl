@@ -20,8 +20,8 @@ fn indenter_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
     if (index >= arrayLength(&contact_nodes)) {
         return;
     }
-    let contact = contact_nodes[index];
-    let x = contact.rest.xyz + vec3<f32>(node_displacement[contact.node].xyz) * DISPLACEMENT_UNIT;
+    let contact = contact_at(index);
+    let x = contact.rest + vec3<f32>(node_displacement[contact.node].xyz) * DISPLACEMENT_UNIT;
     let lever = x - step_input.tip.xyz;
     let penetration = tool_penetration(lever, step_input.direction.xyz, contact.rest_radius);
     let n = penetration.xyz;
@@ -30,37 +30,36 @@ fn indenter_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
     let vn = dot(v, n);
     let k = indentation.contact_stiffness;
     let damping = 2.0 * indentation.contact_damping * sqrt(k * contact.mass);
-    var memory = contact_memory[index];
+    var memory = remembered(index);
     var normal = vec3<f32>(0.0);
     var tangential = vec3<f32>(0.0);
-    var stored = 0.0;
+    var sums = StepSums();
     if (indentation.bonded == 1u && (memory.touching == 1.0 || depth > 0.0)) {
         memory.touching = 1.0;
-        memory.stick += vec4<f32>((v - n * vn) * params.dt, 0.0);
-        normal = n * (k * depth) - v * damping - memory.stick.xyz * k;
-        contact_sums[index].damping_dissipation += damping * dot(v, v) * params.dt;
-        stored = 0.5 * k * (depth * depth + dot(memory.stick.xyz, memory.stick.xyz));
+        memory.stick += (v - n * vn) * params.dt;
+        normal = n * (k * depth) - v * damping - memory.stick * k;
+        sums.damping_dissipation = damping * dot(v, v) * params.dt;
+        sums.stored = 0.5 * k * (depth * depth + dot(memory.stick, memory.stick));
     } else if (depth > 0.0) {
         memory.touching = 1.0;
         let pressure = max(0.0, k * depth - damping * vn);
         normal = n * pressure;
-        contact_sums[index].damping_dissipation += (k * depth - pressure) * vn * params.dt;
-        stored = 0.5 * k * depth * depth;
+        sums.damping_dissipation = (k * depth - pressure) * vn * params.dt;
+        sums.stored = 0.5 * k * depth * depth;
 #ifdef FRICTION
         let kt = friction.stiffness_ratio * k;
-        let trial = stick_trial(memory.stick.xyz, (v - n * vn) * params.dt, n);
+        let trial = stick_trial(memory.stick, (v - n * vn) * params.dt, n);
         let stretch = stick_return(trial, friction.coefficient * pressure / kt);
-        memory.stick = vec4<f32>(stretch, 0.0);
+        memory.stick = stretch;
         tangential = stretch * -kt;
-        contact_sums[index].sliding_dissipation += kt * dot(stretch, trial - stretch);
-        stored += 0.5 * kt * dot(stretch, stretch);
+        sums.sliding_dissipation = kt * dot(stretch, trial - stretch);
+        sums.stored += 0.5 * kt * dot(stretch, stretch);
 #endif
     } else {
-        memory.stick = vec4<f32>(0.0);
+        memory.stick = vec3<f32>(0.0);
         memory.touching = 0.0;
     }
-    contact_memory[index] = memory;
-    contact_sums[index].stored = stored;
+    remember(index, memory);
     corner_force[contact.slot] += vec4<f32>(normal + tangential, 0.0);
-    book_contact(index, vec3<f32>(0.0), normal, tangential, lever);
+    book_contact(index, vec3<f32>(0.0), normal, tangential, lever, sums);
 }

@@ -38,7 +38,7 @@
 @compute @workgroup_size(64)
 fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let node = thread_index(id, groups);
-    if (node >= params.node_count) {
+    if (node >= NODE_COUNT) {
         return;
     }
     let place = node_place(node);

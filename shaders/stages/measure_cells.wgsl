@@ -27,14 +27,14 @@ fn book_history(sums: ptr<function, CellSums>, cell: u32, volume: f32, held: f32
 @compute @workgroup_size(64)
 fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let thread = thread_index(id, groups);
-    if (thread >= params.measure_threads) {
+    if (thread >= MEASURE_THREADS) {
         return;
     }
     var sums: CellSums;
     sums.min_jacobian = 1e30;
     sums.min_corner_jacobian = 1e30;
     sums.least_intact = 1.0;
-    for (var index = thread; index < params.cell_count; index += params.measure_threads) {
+    for (var index = thread; index < CELL_COUNT; index += MEASURE_THREADS) {
         let cell = measured_cell(index);
         let energy = cell.energy;
         sums.elastic += energy.elastic;

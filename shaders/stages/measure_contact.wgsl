@@ -29,7 +29,7 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
     var load = vec4<f32>(0.0);
     for (var index = 0u; index < arrayLength(&contact_nodes); index++) {
         let place = contact_nodes[index].rest.xyz
-            + vec3<f32>(node_displacement[contact_nodes[index].node].xyz) * DISPLACEMENT_UNIT;
+            + vec3<f32>(node_displacement[contact_nodes[index].numbers.x].xyz) * DISPLACEMENT_UNIT;
         let s = dot(step_input.tip.xyz - place, step_input.direction.xyz);
         load += contact_sums[index].impulse * max(0.0, 1.0 - abs(centre_line_entry(s) - f32(lane)));
     }
@@ -41,14 +41,8 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
         let sums = contact_sums[index];
         total.impulse += sums.impulse;
         total.angular_impulse += sums.angular_impulse;
-        total.cutting += sums.cutting;
-        total.spreading += sums.spreading;
-        total.sliding += sums.sliding;
-        total.work += sums.work;
-        total.sliding_dissipation += sums.sliding_dissipation;
-        total.damping_dissipation += sums.damping_dissipation;
-        total.stored += sums.stored;
-        total.shaft += sums.shaft;
+        total.parts += sums.parts;
+        total.energies += sums.energies;
         contact_sums[index] = ContactSums();
     }
     contact_totals[lane] = total;

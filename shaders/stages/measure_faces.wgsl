@@ -10,7 +10,7 @@
 #ifdef TETRAHEDRA
 fn part_of_face(face: u32, part: u32) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    for (var node = part; node < params.node_count; node += 64u) {
+    for (var node = part; node < NODE_COUNT; node += 64u) {
         let place = node_place(node);
         // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
         for (var once = 1u - ((place.flags >> (3u + face)) & 1u); once == 0u; once++) {
@@ -22,10 +22,10 @@ fn part_of_face(face: u32, part: u32) -> vec3<f32> {
 #else
 fn part_of_face(face: u32, part: u32) -> vec3<f32> {
     let axis = face / 2u;
-    let counts = vec3<u32>(params.nodes_x, params.nodes_y, params.nodes_z);
+    let counts = vec3<u32>(NODES_X, NODES_Y, NODES_Z);
     // Nodes per row of the face, and of the face.
-    let row = select(params.nodes_x, params.nodes_y, axis == 0u);
-    let count = row * select(params.nodes_z, params.nodes_y, axis == 2u);
+    let row = select(NODES_X, NODES_Y, axis == 0u);
+    let count = row * select(NODES_Z, NODES_Y, axis == 2u);
     let last = (face & 1u) == 1u;
     var sum = vec3<f32>(0.0);
     for (var index = part; index < count; index += 64u) {

@@ -20,11 +20,11 @@ fn not_finite(v: vec3<f32>) -> bool {
 @compute @workgroup_size(64)
 fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let thread = thread_index(id, groups);
-    if (thread >= params.measure_threads) {
+    if (thread >= MEASURE_THREADS) {
         return;
     }
     var sums: NodeSums;
-    for (var node = thread; node < params.node_count; node += params.measure_threads) {
+    for (var node = thread; node < NODE_COUNT; node += MEASURE_THREADS) {
         let u = node_displacement[node];
         let v = node_velocity[node];
         let mass = node_mass[node];

@@ -54,17 +54,19 @@ fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> FreeCo
     let ahead = dot(relative, T);
     let radius = length(relative - T * ahead);
     let ring = puncture.ring_radius;
-    let old = contact_memory[index].passed == 1.0;
+    let known = contact_memory[index].path;
+    let old = known.x == 1.0;
     // The dimple before the puncture is no opened path.
     let passes = free_tip.coordinate > 0.0 && ahead <= 0.0 && ahead > -ring && radius < ring;
     let passed = free_tip.inside == 1.0 && s > -PASSED_MARGIN && (old || passes);
+    var rest_radius = known.y;
     for (var once = select(1u, 0u, passed != old); once == 0u; once++) {
-        var fresh = ContactMemory();
+        var fresh = Memory();
         fresh.passed = select(0.0, 1.0, passed);
         fresh.rest_radius = select(0.0, radius, passed);
-        contact_memory[index] = fresh;
+        rest_radius = fresh.rest_radius;
+        remember(index, fresh);
     }
-    let rest_radius = contact_memory[index].rest_radius;
     // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.
     let reach = WATCHED * puncture.needle_radius;
     let met = free_tip.inside == 1.0 && !passed && s > puncture.tip_length && dot(lever, lever) - s * s < reach * reach;
@@ -111,8 +113,8 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     if (index >= arrayLength(&contact_nodes)) {
         return;
     }
-    let contact = contact_nodes[index];
-    let lever = contact.rest.xyz + vec3<f32>(node_displacement[contact.node].xyz) * DISPLACEMENT_UNIT
+    let contact = contact_at(index);
+    let lever = contact.rest + vec3<f32>(node_displacement[contact.node].xyz) * DISPLACEMENT_UNIT
         - step_input.tip.xyz;
     let d = -step_input.direction.xyz;
     let s = dot(lever, d);
@@ -125,12 +127,12 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     let needle_velocity = step_input.velocity.xyz;
 #endif
 #ifdef FREE_PATH
-    let tip = tip_share(contact.grid.xyz, contact.rest.xyz);
-    let met = free_contact(index, contact.rest.xyz, from_axis, s);
+    let tip = tip_share(contact.grid, contact.rest);
+    let met = free_contact(index, contact.rest, from_axis, s);
     let passed = met.touches;
     let rest_radius = met.rest_radius;
 #else
-    let tip = step_input.direction.xyz * tip_share(contact.grid.xyz, contact.rest_axial);
+    let tip = step_input.direction.xyz * tip_share(contact.grid, contact.rest_axial);
     var passed = contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0;
 #ifdef SLIT
     // Its faces may touch where the node does not.
@@ -140,25 +142,23 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
 #endif
     var normal = vec3<f32>(0.0);
     var tangential = vec3<f32>(0.0);
-    var stored = 0.0;
+    var sums = StepSums();
     // Stiffness that contact adds at the node [N/m].
     var bound = 0.0;
-    // Torque about the tip beyond that of forces at the node [N m].
-    var turn = vec3<f32>(0.0);
     // Loops that run once or not at all: software adapters skip them, where they would walk through an `if`.
     for (var once = select(1u, 0u, passed); once == 0u; once++) {
-        var memory = contact_memory[index];
+        var memory = remembered(index);
         var v = node_velocity[contact.node].xyz - needle_velocity;
 #ifdef SLIT
         let points = slit_force(index);
         normal = points.normal;
-        stored = points.stored;
         bound = points.bound;
-        turn = points.torque - cross(lever, normal);
-        contact_sums[index].shaft += dot(points.on_shaft, step_input.direction.xyz) * params.dt;
-        contact_sums[index].damping_dissipation += points.damping_power * params.dt;
+        sums.stored = points.stored;
+        sums.angular_impulse = (points.torque - cross(lever, normal)) * params.dt;
+        sums.shaft = dot(points.on_shaft, step_input.direction.xyz) * params.dt;
+        sums.damping_dissipation = points.damping_power * params.dt;
 #ifdef FLEXIBLE_NEEDLE
-        contact_sums[index].work += (points.bend_power - dot(normal, bend.rate)) * params.dt;
+        sums.work = (points.bend_power - dot(normal, bend.rate)) * params.dt;
 #endif
         let pressing = length(normal);
         let n = normal * select(0.0, 1.0 / pressing, pressing > 0.0);
@@ -205,11 +205,9 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let damping = 2.0 * puncture.contact_damping * sqrt(k * contact.mass);
         let pressure = select(0.0, max(0.0, elastic - damping * vn), depth > 0.0);
         normal = n * pressure;
-        stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
-        contact_sums[index].shaft +=
-            select(0.0, dot(normal, step_input.direction.xyz) * params.dt, s >= puncture.tip_length);
-        contact_sums[index].damping_dissipation +=
-            select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
+        sums.stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
+        sums.shaft = select(0.0, dot(normal, step_input.direction.xyz) * params.dt, s >= puncture.tip_length);
+        sums.damping_dissipation = select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
         bound = select(0.0, 2.0 * k * steep * steep, depth > 0.0);
 #ifdef COHESIVE
         memory.on_shaft = select(0.0, 1.0, depth > 0.0 && s >= puncture.tip_length);
@@ -225,32 +223,33 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         coefficient = select(puncture.bore_grip, coefficient, contact.surface.w > 0.0);
 #endif
         let allowed = coefficient * rubbing / kt;
-        let trial = stick_trial(memory.stick.xyz, (v - n * vn) * params.dt, n);
+        let trial = stick_trial(memory.stick, (v - n * vn) * params.dt, n);
         let stretch = stick_return(trial, allowed);
-        memory.stick = vec4<f32>(stretch, 0.0);
+        memory.stick = stretch;
         tangential = stretch * -kt;
-        contact_sums[index].sliding_dissipation += kt * dot(stretch, trial - stretch);
-        stored += 0.5 * kt * dot(stretch, stretch);
+        sums.sliding_dissipation = kt * dot(stretch, trial - stretch);
+        sums.stored += 0.5 * kt * dot(stretch, stretch);
 #endif
-        contact_memory[index] = memory;
+        remember(index, memory);
     }
     let total = tip + normal + tangential;
+#ifdef FLEXIBLE_NEEDLE
+    sums.work += dot(total, bend.rate) * params.dt;
+#endif
     for (var once = select(1u, 0u, dot(total, total) > 0.0); once == 0u; once++) {
         corner_force[contact.slot] += vec4<f32>(total, bound);
-        book_contact(index, tip, normal, tangential, lever);
-        contact_sums[index].angular_impulse += vec4<f32>(turn * params.dt, 0.0);
-#ifdef FLEXIBLE_NEEDLE
-        contact_sums[index].work += dot(total, bend.rate) * params.dt;
-#endif
     }
-    contact_sums[index].stored = stored;
+    for (var once = select(1u, 0u, passed || dot(total, total) > 0.0); once == 0u; once++) {
+        book_contact(index, tip, normal, tangential, lever, sums);
+    }
     // A node that the needle has left forgets.
-    for (var once = select(0u, 1u, passed); once == 0u && contact_memory[index].touching != 0.0; once++) {
-        var left = ContactMemory();
+    for (var once = select(0u, 1u, passed); once == 0u && contact_memory[index].touch.z != 0.0; once++) {
+        var left = Memory();
 #ifdef FREE_PATH
-        left.passed = contact_memory[index].passed;
-        left.rest_radius = contact_memory[index].rest_radius;
+        left.passed = contact_memory[index].path.x;
+        left.rest_radius = contact_memory[index].path.y;
 #endif
-        contact_memory[index] = left;
+        remember(index, left);
+        contact_sums[index].energies.w = 0.0;
     }
 }

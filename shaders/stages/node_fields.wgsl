@@ -13,8 +13,8 @@
 
 // Adds a cell to the sum of the fields and to the number of cells.
 fn add_cell(sum: ptr<function, vec4<f32>>, count: ptr<function, f32>, cell: u32) {
-    let field = drawn_cells[min(cell, params.cell_count)];
-    let weight = select(0.0, 1.0, cell < params.cell_count && field.w >= 0.0);
+    let field = drawn_cells[min(cell, CELL_COUNT)];
+    let weight = select(0.0, 1.0, cell < CELL_COUNT && field.w >= 0.0);
     *sum += field * weight;
     *count += weight;
 }
@@ -22,7 +22,7 @@ fn add_cell(sum: ptr<function, vec4<f32>>, count: ptr<function, f32>, cell: u32)
 @compute @workgroup_size(64)
 fn node_fields(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let node = thread_index(id, groups);
-    if (node >= params.node_count) {
+    if (node >= NODE_COUNT) {
         return;
     }
     var sum = vec4<f32>(0.0);
@@ -37,16 +37,16 @@ fn node_fields(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
         add_cell(&sum, &count, cells.w);
     }
 #else
-    let layer = params.nodes_x * params.nodes_y;
+    let layer = NODES_X * NODES_Y;
     let k = quotient(node, layer);
-    let j = quotient(node - k * layer, params.nodes_x);
-    let i = node - k * layer - j * params.nodes_x;
+    let j = quotient(node - k * layer, NODES_X);
+    let i = node - k * layer - j * NODES_X;
     for (var corner = 0u; corner < 8u; corner++) {
         // Cells around the node; below zero an index wraps to one that is too large.
         let at = vec3<u32>(i, j, k) - vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
-        let inside = at.x < params.cells_x && at.y < params.cells_y && at.z < params.cells_z;
-        let cell = (at.z * params.cells_y + at.y) * params.cells_x + at.x;
-        add_cell(&sum, &count, select(params.cell_count, cell, inside));
+        let inside = at.x < CELLS_X && at.y < CELLS_Y && at.z < CELLS_Z;
+        let cell = (at.z * CELLS_Y + at.y) * CELLS_X + at.x;
+        add_cell(&sum, &count, select(CELL_COUNT, cell, inside));
     }
 #endif
     drawn_nodes[node] = sum / max(count, 1.0);

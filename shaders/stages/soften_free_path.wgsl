@@ -52,10 +52,10 @@ fn soften_free_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
         let slowly = old - SOFTENING_RATE * free_tip.advance / min(size.x, min(size.y, size.z));
         let remaining = max(pow(puncture.residual_stiffness, fraction), slowly);
         for (var again = select(1u, 0u, remaining < old); again == 0u; again++) {
-            let layer = params.cells_x * params.cells_y;
+            let layer = CELLS_X * CELLS_Y;
             let k = quotient(number, layer);
-            let j = quotient(number - k * layer, params.cells_x);
-            let cell = vec3<u32>(number - k * layer - j * params.cells_x, j, k);
+            let j = quotient(number - k * layer, CELLS_X);
+            let cell = vec3<u32>(number - k * layer - j * CELLS_X, j, k);
             var u: array<vec3<f32>, 8>;
             for (var corner = 0u; corner < 8u; corner++) {
                 let node = corner_node(cell, corner);

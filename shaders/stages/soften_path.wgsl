@@ -31,10 +31,10 @@ fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
 #endif
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
     for (var once = select(1u, 0u, remaining < old); once == 0u; once++) {
-        let layer = params.cells_x * params.cells_y;
+        let layer = CELLS_X * CELLS_Y;
         let k = quotient(path.cell, layer);
-        let j = quotient(path.cell - k * layer, params.cells_x);
-        let cell = vec3<u32>(path.cell - k * layer - j * params.cells_x, j, k);
+        let j = quotient(path.cell - k * layer, CELLS_X);
+        let cell = vec3<u32>(path.cell - k * layer - j * CELLS_X, j, k);
         var u: array<vec3<f32>, 8>;
         for (var corner = 0u; corner < 8u; corner++) {
             let node = corner_node(cell, corner);

@@ -40,7 +40,7 @@ fn stiffness_bounds(tet: Tetrahedron, point: PointAnswer) -> vec4<f32> {
 @compute @workgroup_size(64)
 fn tetrahedron_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let cell = thread_index(id, groups);
-    if (cell >= params.cell_count) {
+    if (cell >= CELL_COUNT) {
         return;
     }
     let tet = tetrahedra[cell];

@@ -94,3 +94,24 @@ impl EffectSet {
         self.active().map(|e| e.key).collect()
     }
 }
+
+/// The override that switches the effect `key` where those of `on` run.
+pub fn switched(on: &[&str], key: &str, is: bool) -> String {
+    let keys: Vec<&str> =
+        EFFECTS.iter().map(|e| e.key).filter(|k| if *k == key { is } else { on.contains(k) }).collect();
+    format!("effects={keys:?}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_switch_names_all_effects_that_shall_be_on() {
+        assert_eq!(
+            switched(&["friction", "puncture"], "gravity", true),
+            r#"effects=["gravity", "puncture", "friction"]"#
+        );
+        assert_eq!(switched(&["friction", "puncture"], "friction", false), r#"effects=["puncture"]"#);
+    }
+}

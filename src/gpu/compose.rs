@@ -50,6 +50,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/material_point", include_str!("../../shaders/shared/material_point.wgsl")),
     ("shared/measured_hexahedron", include_str!("../../shaders/shared/measured_hexahedron.wgsl")),
     ("shared/measured_tetrahedron", include_str!("../../shaders/shared/measured_tetrahedron.wgsl")),
+    ("shared/mesh_numbers", include_str!("../../shaders/shared/mesh_numbers.wgsl")),
     ("shared/mesh_node", include_str!("../../shaders/shared/mesh_node.wgsl")),
     ("shared/node_load", include_str!("../../shaders/shared/node_load.wgsl")),
     ("shared/node_place", include_str!("../../shaders/shared/node_place.wgsl")),

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use super::kernel::KernelCache;
+use super::workers::Threads;
 use crate::error::{Error, Result};
 
 /// An opened device and what is known about its adapter.
@@ -109,6 +110,7 @@ impl Gpu {
     /// `Error::Adapter` where it does not offer what the engine needs.
     pub fn of_adapter(adapter: &wgpu::Adapter) -> Result<Self> {
         let info = adapter.get_info();
+        let threads = Threads::now();
         // Exactly the default limits: what a software adapter offers beyond them must not be relied on.
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("stylet"),
@@ -120,6 +122,9 @@ impl Gpu {
             way_out: "choose another adapter with WGPU_ADAPTER_NAME (see `stylet adapters`), or use --engine cpu"
                 .into(),
         })?;
+        if info.device_type == wgpu::DeviceType::Cpu {
+            threads.spread_new();
+        }
         let failure = Arc::new(Mutex::new(None));
         let keep = |slot: Arc<Mutex<Option<String>>>| {
             move |text: String| {

@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::device::Gpu;
-use super::kernel::{Compiled, Kernel, STEP_INPUT};
+use super::kernel::{Compiled, Kernel, MeshNumbers, STEP_INPUT};
 use super::layout::Layout;
 use super::structs::*;
 use crate::effects::EffectSet;
@@ -215,12 +215,13 @@ impl GpuEngine {
         let layout = Layout::new(&model.mesh, layers);
         let features = Features { drawn, ..Features::of(&model) };
         let defines = defines(&model.effects, &features);
+        let measure_threads = measure_threads(&model);
+        let numbers = mesh_numbers(&model, &layout, measure_threads);
         // Composing, validating and compiling go side by side: they are most of the time to the first step.
         let compiled = stages(&model.effects, &features)
             .into_par_iter()
-            .map(|stage| gpu.kernels.compiled(&gpu.device, stage, &defines))
+            .map(|stage| gpu.kernels.compiled(&gpu.device, stage, &defines, &numbers))
             .collect::<Result<Vec<Arc<Compiled>>>>()?;
-        let measure_threads = measure_threads(&model);
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let mut buffers = BTreeMap::new();
         let mut bytes = 0;
@@ -458,14 +459,16 @@ impl GpuEngine {
                         let vector = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
                         sums.impulse += vector(s.impulse);
                         sums.angular_impulse += vector(s.angular_impulse);
-                        sums.cutting_impulse += f64::from(s.cutting);
-                        sums.spreading_impulse += f64::from(s.spreading);
-                        sums.shaft_impulse += f64::from(s.shaft);
-                        sums.friction_impulse += f64::from(s.sliding);
-                        sums.tool_work += f64::from(s.work);
-                        sums.friction_dissipation += f64::from(s.sliding_dissipation);
-                        sums.contact_dissipation += f64::from(s.damping_dissipation);
-                        sums.contact_energy += f64::from(s.stored);
+                        let [cutting, spreading, sliding, shaft] = s.parts.map(f64::from);
+                        sums.cutting_impulse += cutting;
+                        sums.spreading_impulse += spreading;
+                        sums.friction_impulse += sliding;
+                        sums.shaft_impulse += shaft;
+                        let [work, sliding, damping, stored] = s.energies.map(f64::from);
+                        sums.tool_work += work;
+                        sums.friction_dissipation += sliding;
+                        sums.contact_dissipation += damping;
+                        sums.contact_energy += stored;
                     }
                 }
                 _ => {
@@ -684,7 +687,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
     let cells = model.mesh.cell_count() as u64;
     let zeros = |count: u64, size: usize| Contents::Zeros(count * size as u64);
     match name {
-        "params" => bytes_of(&[params(model, layout, dt, measure_threads)]),
+        "params" => bytes_of(&[params(model, dt)]),
         STEP_INPUT => zeros(max_steps.max(1) as u64, size_of::<StepInput>()),
         "gravity" => {
             let g = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration);
@@ -896,44 +899,43 @@ fn mesh_nodes(model: &Model, layout: &Layout) -> Vec<MeshNode> {
         .collect()
 }
 
-fn params(model: &Model, layout: &Layout, dt: f64, measure_threads: u32) -> Params {
-    let block = match layout {
-        Layout::Strips(strips) => {
-            let [x, y, z] = model.mesh.block().cells().map(|c| c as u32);
-            Params {
-                cells_x: x,
-                cells_y: y,
-                cells_z: z,
-                nodes_x: x + 1,
-                nodes_y: y + 1,
-                nodes_z: z + 1,
-                column_count: strips.columns,
-                strip_layers: strips.layers,
-                strip_count: strips.count,
-                padded_columns: strips.padded_columns,
-                ..Zeroable::zeroed()
-            }
-        }
-        Layout::Fours(_) => Params::zeroed(),
-    };
+fn params(model: &Model, dt: f64) -> Params {
     let solver = &model.scene.solver;
-    let fixed: Vec<u32> = model.faces().iter().map(|f| (0..3).map(|a| u32::from(f.fixed[a]) << a).sum()).collect();
     Params {
-        measure_threads,
-        fixed_x_min: fixed[0],
-        fixed_x_max: fixed[1],
-        fixed_y_min: fixed[2],
-        fixed_y_max: fixed[3],
-        fixed_z_min: fixed[4],
-        fixed_z_max: fixed[5],
         quartic: solver.hourglass_quartic as f32,
         dt: dt as f32,
         mass_damping: solver.mass_damping as f32,
         speed_limit: model.speed_limit(dt) as f32,
-        cell_count: model.mesh.cell_count() as u32,
-        node_count: model.mesh.node_count() as u32,
-        ..block
     }
+}
+
+/// What shaders/shared/mesh_numbers.wgsl leaves open.
+fn mesh_numbers(model: &Model, layout: &Layout, measure_threads: u32) -> MeshNumbers {
+    let mut numbers = MeshNumbers::from([
+        ("CELL_COUNT", model.mesh.cell_count() as u32),
+        ("NODE_COUNT", model.mesh.node_count() as u32),
+        ("MEASURE_THREADS", measure_threads),
+    ]);
+    const FIXED: [&str; 6] = ["FIXED_X_MIN", "FIXED_X_MAX", "FIXED_Y_MIN", "FIXED_Y_MAX", "FIXED_Z_MIN", "FIXED_Z_MAX"];
+    for (name, face) in FIXED.into_iter().zip(model.faces()) {
+        numbers.insert(name, (0..3).map(|a| u32::from(face.fixed[a]) << a).sum());
+    }
+    if let Layout::Strips(strips) = layout {
+        let [x, y, z] = model.mesh.block().cells().map(|c| c as u32);
+        numbers.extend([
+            ("CELLS_X", x),
+            ("CELLS_Y", y),
+            ("CELLS_Z", z),
+            ("NODES_X", x + 1),
+            ("NODES_Y", y + 1),
+            ("NODES_Z", z + 1),
+            ("COLUMN_COUNT", strips.columns),
+            ("STRIP_LAYERS", strips.layers),
+            ("STRIP_COUNT", strips.count),
+            ("PADDED_COLUMNS", strips.padded_columns),
+        ]);
+    }
+    numbers
 }
 
 /// One entry per material of a scene; the rest of the 16 repeats the first.
@@ -1231,14 +1233,13 @@ fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
                     ContactSurface::OuterWall => [0.0, 0.0, 0.0, 1.0],
                     ContactSurface::Bore => [0.0, 0.0, 0.0, -1.0],
                 },
-                node: c.node,
-                slot: layout.strips().owned_slot([i, j, k], cells),
-                pushed: c.pushed.into(),
-                rest_radius: c.rest_radius as f32,
-                rest_axial: c.rest_axial as f32,
-                mass: model.node_mass[node] as f32,
-                faces: c.faces.map_or(0, |f| f.present),
-                share: c.share as f32,
+                numbers: [
+                    c.node,
+                    layout.strips().owned_slot([i, j, k], cells),
+                    c.pushed.into(),
+                    c.faces.map_or(0, |f| f.present),
+                ],
+                sizes: [c.rest_radius, c.rest_axial, model.node_mass[node], c.share].map(|x| x as f32),
                 ring_low,
                 ring_high,
             }
@@ -1460,14 +1461,18 @@ impl Engine for GpuEngine {
                 }
                 "contact_memory" => {
                     state.contact = read_all::<ContactMemory>(bytes)
-                        .map(|m| ContactState {
-                            stick: vector(m.stick),
-                            overlap: m.overlap.into(),
-                            axial_on: m.axial_on.into(),
-                            touching: m.touching != 0.0,
-                            on_shaft: m.on_shaft != 0.0,
-                            rest_radius: m.rest_radius.into(),
-                            passed: m.passed != 0.0,
+                        .map(|m| {
+                            let [overlap, axial_on, touching, on_shaft] = m.touch;
+                            let [passed, rest_radius, ..] = m.path;
+                            ContactState {
+                                stick: vector(m.stick),
+                                overlap: overlap.into(),
+                                axial_on: axial_on.into(),
+                                touching: touching != 0.0,
+                                on_shaft: on_shaft != 0.0,
+                                rest_radius: rest_radius.into(),
+                                passed: passed != 0.0,
+                            }
                         })
                         .collect();
                 }
@@ -1529,15 +1534,13 @@ impl Engine for GpuEngine {
         let memory: Vec<ContactMemory> = state
             .contact
             .iter()
-            .map(|c| ContactMemory {
-                stick: vec4(c.stick),
-                overlap: c.overlap as f32,
-                axial_on: c.axial_on as f32,
-                touching: if c.touching { 1.0 } else { 0.0 },
-                on_shaft: if c.on_shaft { 1.0 } else { 0.0 },
-                passed: if c.passed { 1.0 } else { 0.0 },
-                rest_radius: c.rest_radius as f32,
-                ..Zeroable::zeroed()
+            .map(|c| {
+                let one = |yes: bool| if yes { 1.0 } else { 0.0 };
+                ContactMemory {
+                    stick: vec4(c.stick),
+                    touch: [c.overlap as f32, c.axial_on as f32, one(c.touching), one(c.on_shaft)],
+                    path: [one(c.passed), c.rest_radius as f32, 0.0, 0.0],
+                }
             })
             .collect();
         write("contact_memory", bytemuck::cast_slice(&memory));

@@ -71,6 +71,9 @@ fn validated(stage: Stage, composed: Composed) -> Result<Reflected> {
     Ok(Reflected { stage, composed, module, bindings, workgroup_size })
 }
 
+/// Values of the constants that a shader leaves open (`override`), by name: shaders/shared/mesh_numbers.wgsl.
+pub type MeshNumbers = BTreeMap<&'static str, u32>;
+
 /// Name of the uniform that changes from step to step and is bound with a dynamic offset.
 pub const STEP_INPUT: &str = "step_input";
 
@@ -84,7 +87,7 @@ pub struct Compiled {
 }
 
 impl Compiled {
-    fn new(device: &wgpu::Device, reflected: Reflected) -> Self {
+    fn new(device: &wgpu::Device, reflected: Reflected, numbers: &MeshNumbers) -> Self {
         let Reflected { stage, mut module, bindings, workgroup_size, .. } = reflected;
         let label = Some(stage.name());
         // The groups of the source tell what a binding is for. On the device all bindings of a stage lie in one group:
@@ -117,6 +120,12 @@ impl Compiled {
             bind_group_layouts: &[Some(&group_layout)],
             immediate_size: 0,
         });
+        let constants: Vec<(&str, f64)> = module
+            .overrides
+            .iter()
+            .filter_map(|(_, open)| numbers.get_key_value(open.name.as_deref()?))
+            .map(|(name, value)| (*name, f64::from(*value)))
+            .collect();
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label,
             source: wgpu::ShaderSource::Naga(std::borrow::Cow::Owned(module)),
@@ -129,7 +138,7 @@ impl Compiled {
             // Zeroing of workgroup memory can take seconds on some drivers; the shaders initialise what they read.
             compilation_options: wgpu::PipelineCompilationOptions {
                 zero_initialize_workgroup_memory: false,
-                ..Default::default()
+                constants: &constants,
             },
             cache: None,
         });
@@ -137,15 +146,16 @@ impl Compiled {
     }
 }
 
-/// Name of a stage and its composed source.
-type KernelKey = (&'static str, String);
+/// Name of a stage, its composed source, and what is put into it.
+type KernelKey = (&'static str, String, MeshNumbers);
 
-/// The kernels that a device has compiled, by their source: an engine with other effects or another mesh shares those that are the same.
+/// The kernels that a device has compiled, by their source and the numbers of the mesh: an engine
+/// with other effects shares those that are the same.
 #[derive(Clone, Default)]
 pub struct KernelCache(Arc<Mutex<BTreeMap<KernelKey, Arc<Compiled>>>>);
 
 impl KernelCache {
-    /// The kernel of a stage with these defines.
+    /// The kernel of a stage with these defines, for a mesh with these numbers.
     ///
     /// # Errors
     /// `Error::Shader` for a source that does not validate.
@@ -154,14 +164,15 @@ impl KernelCache {
         device: &wgpu::Device,
         stage: Stage,
         defines: &BTreeSet<&'static str>,
+        numbers: &MeshNumbers,
     ) -> Result<Arc<Compiled>> {
         let composed = compose(&format!("stages/{}", stage.name()), defines)?;
-        let key = (stage.name(), composed.source.clone());
+        let key = (stage.name(), composed.source.clone(), numbers.clone());
         let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = lock().get(&key) {
             return Ok(known.clone());
         }
-        let compiled = Arc::new(Compiled::new(device, validated(stage, composed)?));
+        let compiled = Arc::new(Compiled::new(device, validated(stage, composed)?, numbers));
         lock().insert(key, compiled.clone());
         Ok(compiled)
     }

@@ -6,6 +6,7 @@ pub mod engine;
 pub mod kernel;
 mod layout;
 pub mod structs;
+mod workers;
 
 pub use device::Gpu;
 pub use engine::GpuEngine;

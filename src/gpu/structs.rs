@@ -26,30 +26,10 @@ macro_rules! shared_structs {
 shared_structs! {
     /// shaders/shared/params.wgsl
     struct Params {
-        cells_x: u32,
-        cells_y: u32,
-        cells_z: u32,
-        nodes_x: u32,
-        nodes_y: u32,
-        nodes_z: u32,
-        column_count: u32,
-        strip_layers: u32,
-        strip_count: u32,
-        padded_columns: u32,
-        measure_threads: u32,
-        fixed_x_min: u32,
-        fixed_x_max: u32,
-        fixed_y_min: u32,
-        fixed_y_max: u32,
-        fixed_z_min: u32,
-        fixed_z_max: u32,
         quartic: f32,
         dt: f32,
         mass_damping: f32,
         speed_limit: f32,
-        cell_count: u32,
-        node_count: u32,
-        _pad0: u32,
     }
     /// shaders/shared/elastic.wgsl
     struct Material {
@@ -348,41 +328,23 @@ shared_structs! {
         rest: [f32; 4],
         grid: [u32; 4],
         surface: [f32; 4],
-        node: u32,
-        slot: u32,
-        pushed: u32,
-        rest_radius: f32,
-        rest_axial: f32,
-        mass: f32,
-        faces: u32,
-        share: f32,
+        numbers: [u32; 4],
+        sizes: [f32; 4],
         ring_low: [u32; 4],
         ring_high: [u32; 4],
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactMemory {
         stick: [f32; 4],
-        overlap: f32,
-        axial_on: f32,
-        touching: f32,
-        on_shaft: f32,
-        passed: f32,
-        rest_radius: f32,
-        _pad0: f32,
-        _pad1: f32,
+        touch: [f32; 4],
+        path: [f32; 4],
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactSums {
         impulse: [f32; 4],
         angular_impulse: [f32; 4],
-        cutting: f32,
-        spreading: f32,
-        sliding: f32,
-        work: f32,
-        sliding_dissipation: f32,
-        damping_dissipation: f32,
-        stored: f32,
-        shaft: f32,
+        parts: [f32; 4],
+        energies: [f32; 4],
     }
     /// shaders/shared/cell_sums.wgsl
     struct CellSums {

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use super::engine::{ContactState, Engine, FramePlan, State};
+use super::engine::{ContactState, Engine, FramePlan, State, StepInput};
 use super::simulation::{Purpose, Simulation, choose_step};
 use super::stable_dt::wave_speed_bound;
 use crate::error::{Error, Result};
@@ -65,6 +65,21 @@ impl Change {
             )?),
             None => Box::new(CpuEngine::new(self.model.clone(), self.dt)),
         })
+    }
+}
+
+impl Change {
+    /// Makes an engine of the changed scene and lets it go after one step: its device keeps the kernels, so that the change
+    /// itself finds them compiled. Drivers compile when a kernel is first used.
+    ///
+    /// # Errors
+    /// As [`GpuEngine::new`], and `Error::Device`.
+    pub fn prepare(&self) -> Result<()> {
+        let mut engine = self.engine()?;
+        let steps = vec![StepInput::at(&self.model, 0.0, self.dt)];
+        engine.start_frame(&FramePlan { frame: 0, first_step: 0, steps, centre_line: None })?;
+        engine.collect(true)?;
+        Ok(())
     }
 }
 

@@ -15,6 +15,7 @@ use winit::window::{Window, WindowId};
 use super::ViewOptions;
 use super::camera::Camera;
 use super::devices::Devices;
+use super::foresight::Foresight;
 use super::grip::{Grip, Modifiers, Sight};
 use super::hand::{Desk, InputDevice, Key, Recording};
 use super::marks;
@@ -25,7 +26,7 @@ use super::scene_view::{Area, Field, SceneView};
 use super::section::RestPlane;
 use super::texts;
 use super::tool_shape::{self, ToolPlace};
-use super::tuning::Source;
+use super::tuning::{Pace, Source};
 use super::watch::Watch;
 use crate::gpu::Gpu;
 use crate::gpu::compose::{SOURCES, read_sources};
@@ -40,11 +41,11 @@ use crate::{Error, Result};
 /// Shortest time between two pictures [s].
 const PICTURE: f64 = 1.0 / 60.0;
 /// Longest time between two pictures while the tissue lags behind [s].
-const SLOWEST_PICTURE: f64 = 1.0 / 22.0;
+const SLOWEST_PICTURE: f64 = 1.0 / 21.0;
+/// Longest simulated time that is made up for [s].
+const DEBT: f64 = 0.2;
 /// Way that a notch of the wheel asks for [m].
 const NOTCH: f64 = 0.25e-3;
-/// Speed of the keys at the start [m/s].
-const DESK_SPEED: f64 = 5e-3;
 /// Size of the window at the start, in points.
 const SIZE: [u32; 2] = [1280, 800];
 /// Pictures after which pauses are counted.
@@ -77,6 +78,8 @@ pub struct ViewOutcome {
     /// The same of the frames alone, from their start to their results.
     pub real_time_factor: f64,
     pub latency: Latency,
+    /// How switches of effects went.
+    pub switches: Vec<Pace>,
     /// How the loop of the forces kept its time, where there was one.
     pub haptic: Option<LoopTiming>,
     pub stopped: Option<String>,
@@ -207,12 +210,15 @@ struct Open {
     view: SceneView,
     scan: Scan,
     practice: Practice,
+    foresight: Foresight,
     desk: Desk,
     devices: Devices,
     recording: Option<Recording>,
     recorded: Option<Session>,
     choices: Choices,
     camera: Camera,
+    /// The next frame of the tissue is under way already.
+    ahead: bool,
     /// Simulated time that is due [s], and when it was counted last.
     due: f64,
     counted: Instant,
@@ -376,7 +382,8 @@ impl App {
         let camera = Camera::around(centre.as_vec3(), (0.62 * (high - low).length()) as f32);
         // Open through the entry point, so that the needle is seen.
         let at = (self.scene.motion.entry.y - low.y) / (high.y - low.y);
-        let desk = Desk::new(DESK_SPEED.min(practice.speed_limit));
+        // That of the script, which mass scaling is chosen for; a slider has others.
+        let desk = Desk::new(self.scene.motion.largest_speed().min(practice.speed_limit));
         if self.options.script || self.recorded.is_some() || self.options.frames.is_some() {
             practice.state = State::Running;
         }
@@ -392,12 +399,14 @@ impl App {
             view,
             scan: Scan::default(),
             practice,
+            foresight: Foresight::default(),
             desk,
             devices,
             recording: self.recorded.as_ref().map(|session| Recording::new(session.poses.clone())),
             recorded: self.recorded.clone(),
             choices: Choices::new(Some((1, at))),
             camera,
+            ahead: false,
             due: 0.0,
             counted: now,
             next: now,
@@ -466,7 +475,14 @@ impl App {
             open.practice.again(leader)?;
             open.rebind()?;
         }
+        // Hardware leaves the processor alone; a software adapter needs it for the tissue.
+        if !open.gpu.is_software() || open.practice.state != State::Running {
+            open.foresight.tend(&open.practice.tuning, &open.practice.simulation);
+        }
         open.read_anew(self.options.shaders.as_deref());
+        if open.practice.tuning.waits() {
+            open.settle()?;
+        }
         match open.practice.take_changes()? {
             Renewed::Nothing | Renewed::Constants => {}
             Renewed::Buffers => open.take_buffers()?,
@@ -480,6 +496,9 @@ impl App {
 
     fn close(&mut self, event_loop: &ActiveEventLoop) {
         if let Some(mut open) = self.open.take() {
+            if let Err(error) = open.settle() {
+                self.failure.get_or_insert(error);
+            }
             if let Some(path) = &self.options.screenshot
                 && let Err(error) = open.screenshot(&self.reference, path)
             {
@@ -512,6 +531,8 @@ impl App {
             self.outcome.real_time_factor = open.practice.timing.real_time_factor();
             self.outcome.achieved = open.practice.timing.achieved();
             self.outcome.latency = open.practice.latency;
+            let switches = open.practice.tuning.paces.into_iter().filter(|pace| pace.reach == Reach::Kernels);
+            self.outcome.switches = switches.collect();
             self.outcome.stopped = match &open.practice.state {
                 State::Stopped(reason) => Some(reason.clone()),
                 _ => None,
@@ -602,7 +623,8 @@ impl Open {
         }
     }
 
-    /// True where a frame of the tissue is due. A slow machine shows slow motion and owes nothing.
+    /// True where a frame of the tissue is due. Time that a picture took is made up for; a slow machine shows slow motion and owes
+    /// nothing beyond that.
     fn frame_is_due(&mut self) -> bool {
         let passed = self.counted.elapsed().as_secs_f64();
         self.counted = Instant::now();
@@ -614,7 +636,7 @@ impl Open {
         }
         self.practice.timing.running += passed;
         let frame = self.practice.timing.simulated;
-        self.due = (self.due + passed * self.choices.pace).min(2.0 * frame);
+        self.due = (self.due + passed * self.choices.pace).min(DEBT.max(2.0 * frame));
         let due = self.due >= frame;
         if due {
             self.due -= frame;
@@ -627,10 +649,7 @@ impl Open {
         let begin = Instant::now();
         self.next = begin + Duration::from_secs_f64(PICTURE);
         self.devices.tend(&mut self.practice, &self.desk);
-        let due = self.frame_is_due();
-        if due {
-            self.start()?;
-        }
+        let due = std::mem::take(&mut self.ahead) || self.start_if_due()?;
         // Tissue that lags behind goes first, as long as the eye does not see it.
         let late = self.due >= self.practice.timing.simulated;
         if due && late && self.shown.elapsed().as_secs_f64() < SLOWEST_PICTURE {
@@ -665,6 +684,9 @@ impl Open {
         if due || wishes.step {
             self.finish()?;
         }
+        // A software adapter shows a picture by copying it, on this thread: the tissue goes on meanwhile.
+        let wished = wishes != Wishes::default() || self.practice.tuning.waits();
+        self.ahead = self.gpu.is_software() && !wished && self.start_if_due()?;
         if let Some(shown) = shown {
             self.window.pre_present_notify();
             self.gpu.queue.present(shown);
@@ -683,6 +705,22 @@ impl Open {
             self.follow_range()?;
         }
         Ok(wishes)
+    }
+
+    fn start_if_due(&mut self) -> Result<bool> {
+        let due = self.frame_is_due();
+        if due {
+            self.start()?;
+        }
+        Ok(due)
+    }
+
+    /// Waits for the frame that was begun ahead, if one was: nothing is under way then.
+    fn settle(&mut self) -> Result<()> {
+        match std::mem::take(&mut self.ahead) {
+            true => self.finish(),
+            false => Ok(()),
+        }
     }
 
     /// Gives the device the next frame.
@@ -792,8 +830,12 @@ impl Open {
         let probe = (&look.probe, place.as_ref());
         self.scan.draw(&self.gpu, &mut self.painter, encoder, &mut self.practice, probe)?;
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
-        for (id, deltas) in panels.textures.set.drain() {
-            for delta in &deltas {
+        for (id, mut deltas) in panels.textures.set.drain() {
+            for delta in &mut deltas {
+                if self.gpu.is_software() {
+                    // Letters lie on pixels: mixing four texels takes a software adapter longer, and changes nothing.
+                    delta.options = egui::TextureOptions::NEAREST;
+                }
                 self.painter.update_texture(device, queue, id, delta);
             }
         }

@@ -3,7 +3,7 @@
 use super::texts;
 use super::tuning::{Pace, Tuning};
 use crate::effects::parameter::{COUNT, Parameter};
-use crate::effects::{EFFECTS, Effect};
+use crate::effects::{EFFECTS, Effect, switched};
 use crate::scene::Scene;
 use crate::solver::change::Reach;
 
@@ -39,9 +39,9 @@ pub fn effects(ui: &mut egui::Ui, scene: &Scene, tuning: &mut Tuning) {
     if let Some(refusal) = &tuning.refusal {
         ui.colored_label(ui.visuals().error_fg_color, refusal);
     }
-    ui.small(match (tuning.is_busy(), tuning.last) {
+    ui.small(match (tuning.is_busy(), tuning.paces.last()) {
         (true, _) => texts::CHANGING.into(),
-        (false, Some(pace)) => paced(pace),
+        (false, Some(pace)) => paced(*pace),
         (false, None) => texts::UNCHANGED.to_string(),
     });
 }
@@ -89,13 +89,6 @@ fn told(effect: &Effect) -> String {
     format!("{}\n{}\n{}", effect.summary, effect.source, effect.cost)
 }
 
-/// The override that switches one effect.
-fn switched(on: &[&str], key: &str, is: bool) -> String {
-    let keys: Vec<&str> =
-        EFFECTS.iter().map(|e| e.key).filter(|k| if *k == key { is } else { on.contains(k) }).collect();
-    format!("effects={keys:?}")
-}
-
 fn paced(pace: Pace) -> String {
     let what = match pace.reach {
         Reach::Constants => texts::CHANGED_NUMBERS,
@@ -108,18 +101,4 @@ fn paced(pace: Pace) -> String {
         texts::HALTED,
         1e3 * pace.halted.as_secs_f64()
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_switch_names_all_effects_that_shall_be_on() {
-        assert_eq!(
-            switched(&["friction", "puncture"], "gravity", true),
-            r#"effects=["gravity", "puncture", "friction"]"#
-        );
-        assert_eq!(switched(&["friction", "puncture"], "friction", false), r#"effects=["puncture"]"#);
-    }
 }

@@ -12,6 +12,7 @@ pub mod appearance;
 pub mod camera;
 pub mod devices;
 pub mod effects_panel;
+pub mod foresight;
 pub mod gamepad;
 pub mod grip;
 pub mod hand;

@@ -304,9 +304,10 @@ impl Practice {
             Taken::Engine => Renewed::Buffers,
             Taken::Simulation(source, simulation) => {
                 self.save()?;
-                let (leader, pace, runs) = (self.leader, self.tuning.last, self.state == State::Running);
+                let (leader, runs) = (self.leader, self.state == State::Running);
+                let paces = std::mem::take(&mut self.tuning.paces);
                 self.begin(*simulation, source.scene()?, source, leader)?;
-                self.tuning.last = pace;
+                self.tuning.paces = paces;
                 // What ran goes on running, from its beginning.
                 if runs {
                     self.state = State::Running;
@@ -397,7 +398,7 @@ impl Practice {
                 }
                 if let Some(begin) = self.started.take() {
                     if std::mem::take(&mut self.freshly_changed)
-                        && let Some(pace) = &mut self.tuning.last
+                        && let Some(pace) = self.tuning.paces.last_mut()
                     {
                         pace.halted += begin.elapsed();
                         pace.whole += begin.elapsed();

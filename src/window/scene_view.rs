@@ -5,7 +5,7 @@ use wgpu::util::DeviceExt;
 
 use super::appearance::{ColourMap, Look};
 use super::camera::Camera;
-use super::section::{Outline, RestPlane, TissueCorner};
+use super::section::{self, Outline, RestPlane, TissueCorner};
 use super::tool_shape::ToolCorner;
 use crate::gpu::{Gpu, GpuEngine};
 use crate::mesh::Mesh;
@@ -109,8 +109,10 @@ pub struct SceneView {
     copies: Option<wgpu::Buffer>,
     /// What the table holds.
     map: ColourMap,
-    corners: (wgpu::Buffer, u32),
-    /// So many corners belong to the surface, the rest to the cut.
+    corners: wgpu::Buffer,
+    /// The corners of the triangles, and how many.
+    triangles: (wgpu::Buffer, u32),
+    /// So many of them belong to the surface, the rest to the cut.
     surface: u32,
     tool_corners: (wgpu::Buffer, u32),
     outline: Outline,
@@ -160,8 +162,12 @@ impl SceneView {
                 primitive: wgpu::PrimitiveState { cull_mode: cull, ..Default::default() },
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: DEPTH,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(wgpu::CompareFunction::LessEqual),
+                    // What lies behind everything is drawn first: no pixel of it asks for its depth.
+                    depth_write_enabled: Some(!attributes.is_empty()),
+                    depth_compare: Some(match attributes.is_empty() {
+                        true => wgpu::CompareFunction::Always,
+                        false => wgpu::CompareFunction::LessEqual,
+                    }),
                     stencil: Default::default(),
                     bias: Default::default(),
                 }),
@@ -217,7 +223,8 @@ impl SceneView {
             })
         };
         let mut drawing = SceneView {
-            corners: (nothing(), 0),
+            corners: nothing(),
+            triangles: (nothing(), 0),
             surface: 0,
             tool_corners: (nothing(), 0),
             outline: Outline::of(mesh),
@@ -273,7 +280,9 @@ impl SceneView {
     /// Takes away what lies beyond a plane.
     pub fn cut(&mut self, gpu: &Gpu, mesh: &Mesh, plane: Option<RestPlane>) {
         let cut = self.outline.cut(mesh, plane);
-        self.corners = vertices(gpu, &cut.corners);
+        let (corners, numbers) = section::indexed(&cut.corners);
+        self.corners = vertices(gpu, &corners).0;
+        self.triangles = filled(gpu, &numbers, wgpu::BufferUsages::INDEX);
         self.surface = cut.surface as u32;
     }
 
@@ -351,19 +360,24 @@ impl SceneView {
         let whole = look.opacity >= 1.0;
         let (surface, surface_bindings) =
             if whole { (&self.tissue, &self.tissue_bindings) } else { (&self.veil, &self.veil_bindings) };
-        let (corners, count) = &self.corners;
-        let (tool_corners, tool_count) = &self.tool_corners;
-        for (pipeline, bindings, buffer, range) in [
-            (surface, surface_bindings, corners, 0..self.surface),
-            (&self.tissue, &self.tissue_bindings, corners, self.surface..*count),
-            (&self.tool, &self.tool_bindings, tool_corners, 0..*tool_count),
-        ] {
+        let (triangles, count) = &self.triangles;
+        pass.set_vertex_buffer(0, self.corners.slice(..));
+        pass.set_index_buffer(triangles.slice(..), wgpu::IndexFormat::Uint32);
+        for (pipeline, bindings, range) in
+            [(surface, surface_bindings, 0..self.surface), (&self.tissue, &self.tissue_bindings, self.surface..*count)]
+        {
             if !range.is_empty() {
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, bindings, &[]);
-                pass.set_vertex_buffer(0, buffer.slice(..));
-                pass.draw(range, 0..1);
+                pass.draw_indexed(range, 0, 0..1);
             }
+        }
+        let (corners, count) = &self.tool_corners;
+        if *count > 0 {
+            pass.set_pipeline(&self.tool);
+            pass.set_bind_group(0, &self.tool_bindings, &[]);
+            pass.set_vertex_buffer(0, corners.slice(..));
+            pass.draw(0..*count, 0..1);
         }
     }
 }
@@ -428,11 +442,15 @@ fn node_copies(model: &Model) -> Vec<[u32; 4]> {
 
 /// Corners in a buffer of the device, and how many.
 pub(super) fn vertices<T: Pod>(gpu: &Gpu, corners: &[T]) -> (wgpu::Buffer, u32) {
+    filled(gpu, corners, wgpu::BufferUsages::VERTEX)
+}
+
+fn filled<T: Pod>(gpu: &Gpu, entries: &[T], usage: wgpu::BufferUsages) -> (wgpu::Buffer, u32) {
     let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: Some("corners"),
         // A buffer of no bytes cannot be bound.
-        contents: if corners.is_empty() { &[0; 16] } else { bytemuck::cast_slice(corners) },
-        usage: wgpu::BufferUsages::VERTEX,
+        contents: if entries.is_empty() { &[0; 16] } else { bytemuck::cast_slice(entries) },
+        usage,
     });
-    (buffer, corners.len() as u32)
+    (buffer, entries.len() as u32)
 }

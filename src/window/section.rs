@@ -143,11 +143,26 @@ fn slice_into(mesh: &Mesh, plane: RestPlane, distance: &[f64], corners: &mut Vec
     }
 }
 
-/// Where an edge crosses the plane.
+/// Where an edge crosses the plane; the same corner from either end.
 fn crossing(distance: &[f64], a: u32, b: u32) -> Option<TissueCorner> {
+    let (a, b) = (a.min(b), a.max(b));
     let (from, to) = (distance[a as usize], distance[b as usize]);
     ((from <= 0.0) != (to <= 0.0))
         .then(|| TissueCorner { nodes: [a, b], part: (from / (from - to)).clamp(0.0, 1.0) as f32 })
+}
+
+/// Every corner once, and which of them the triangles have: a corner belongs to some six triangles, and is placed once.
+pub fn indexed(corners: &[TissueCorner]) -> (Vec<TissueCorner>, Vec<u32>) {
+    let mut known = HashMap::new();
+    let mut single = Vec::new();
+    let mut number = |corner: &TissueCorner| {
+        *known.entry((corner.nodes, corner.part.to_bits())).or_insert_with(|| {
+            single.push(*corner);
+            single.len() as u32 - 1
+        })
+    };
+    let numbers = corners.iter().map(&mut number).collect();
+    (single, numbers)
 }
 
 /// Triangles of a convex polygon.
@@ -203,6 +218,20 @@ mod tests {
         let corners = Outline::of(&mesh).cut(&mesh, Some(plane)).corners;
         let expected = (3f64.sqrt() / 2.0 + 1.5) * 1e-6;
         assert!((area(&mesh, &corners) / expected - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn every_corner_is_placed_once() {
+        let mesh = Mesh::Block(block());
+        let whole = Outline::of(&mesh).cut(&mesh, None).corners;
+        let (single, numbers) = indexed(&whole);
+        // 5 x 4 x 3 nodes, of which 3 x 2 x 1 lie inside.
+        assert_eq!(single.len(), 60 - 6);
+        let back: Vec<TissueCorner> = numbers.iter().map(|n| single[*n as usize]).collect();
+        assert_eq!(back, whole);
+        // Between the nodes: 5 x 4 edges cross a plane between two layers.
+        let plane = RestPlane { normal: DVec3::Z, offset: 0.3e-3 };
+        assert_eq!(indexed(&slice(&mesh, plane)).0.len(), 20);
     }
 
     #[test]

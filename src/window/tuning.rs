@@ -99,7 +99,8 @@ pub struct Tuning {
     job: Option<Job>,
     /// Why the last wish could not be granted.
     pub refusal: Option<String>,
-    pub last: Option<Pace>,
+    /// How the changes of this window went, the last one at the end.
+    pub paces: Vec<Pace>,
 }
 
 impl Tuning {
@@ -111,7 +112,7 @@ impl Tuning {
             wanted: None,
             job: None,
             refusal: None,
-            last: None,
+            paces: Vec::new(),
         }
     }
 
@@ -177,6 +178,11 @@ impl Tuning {
         self.wanted = Some((Wanted { source, least }, since));
     }
 
+    /// True while a change is wished for or being made.
+    pub fn waits(&self) -> bool {
+        self.job.is_some() || self.wanted.is_some()
+    }
+
     /// Takes what is ready; call it between frames.
     ///
     /// # Errors
@@ -214,7 +220,7 @@ impl Tuning {
         if reach == Reach::Constants && simulation.retune(&change)? {
             self.refusal = None;
             self.source = wanted.source;
-            self.last = Some(Pace { reach, whole: since.elapsed(), halted: begin.elapsed() });
+            self.paces.push(Pace { reach, whole: since.elapsed(), halted: begin.elapsed() });
             return Ok(Taken::Constants);
         }
         let (sender, made) = channel();
@@ -246,7 +252,7 @@ impl Tuning {
             }
             Made::Simulation(next) => (Taken::Simulation(job.source, next), Reach::Start),
         };
-        self.last = Some(Pace { reach, whole: job.since.elapsed(), halted: begin.elapsed() });
+        self.paces.push(Pace { reach, whole: job.since.elapsed(), halted: begin.elapsed() });
         Ok(taken)
     }
 
