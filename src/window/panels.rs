@@ -228,6 +228,12 @@ fn depth_marks(input: GridInput) -> Vec<GridMark> {
     (from..=to).map(|n| GridMark { value: n as f64 * step_size, step_size }).collect()
 }
 
+/// The number at a line of the depth axis, with the decimals that steps like 0.5 need.
+fn depth_label(mark: GridMark) -> String {
+    let decimals = (-mark.step_size.log10().floor()).max(0.0) as usize;
+    format!("{:.decimals$}", mark.value)
+}
+
 /// Force against depth, numbers and lights on the right.
 pub fn readings(
     ui: &mut egui::Ui,
@@ -254,7 +260,12 @@ pub fn readings(
         .height((0.4 * ui.available_height()).max(140.0))
         // Powers of ten would leave a narrow plot of some millimetres without a number.
         .x_grid_spacer(depth_marks)
-        .custom_x_axes(vec![AxisHints::new_x().label(texts::DEPTH_AXIS).label_spacing(egui::Rangef::new(16.0, 28.0))])
+        .custom_x_axes(vec![
+            AxisHints::new_x()
+                .label(texts::DEPTH_AXIS)
+                .label_spacing(egui::Rangef::new(16.0, 28.0))
+                .formatter(|mark, _| depth_label(mark)),
+        ])
         .y_axis_label(texts::FORCE_AXIS)
         .legend(Legend::default())
         .allow_drag(false)
@@ -349,4 +360,22 @@ fn light(ui: &mut egui::Ui, name: &str, value: &str, good: bool, bearable: bool)
         _ => ("!!", egui::Color32::from_rgb(213, 94, 0)),
     };
     ui.colored_label(colour, format!("{name}: {value} {sign}"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_line_of_the_depth_axis_has_its_own_number() {
+        let labels = |to: f64| -> Vec<String> {
+            depth_marks(GridInput { bounds: (0.0, to), base_step_size: to / 10.0 })
+                .into_iter()
+                .map(depth_label)
+                .collect()
+        };
+        assert_eq!(labels(1.5), ["0.0", "0.5", "1.0", "1.5"]);
+        assert_eq!(labels(0.5), ["0.0", "0.2", "0.4"]);
+        assert_eq!(labels(12.0), ["0", "5", "10"]);
+    }
 }
