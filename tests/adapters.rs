@@ -1,5 +1,7 @@
 //! The same scene on every adapter of this machine and on the CPU engine.
 
+mod common;
+
 use std::process::Command;
 
 use serde_json::Value;
@@ -95,4 +97,32 @@ fn wrong_scenes_are_refused() {
         .unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty() && String::from_utf8_lossy(&output.stderr).contains("way out"));
+}
+
+/// Linux leaves two workers on one processor for long; each is given its own (src/gpu/workers.rs).
+#[test]
+#[cfg(target_os = "linux")]
+fn workers_of_llvmpipe_are_spread_over_the_processors() {
+    let Some(gpu) = common::gpu().filter(|gpu| gpu.info.name.contains("llvmpipe")) else {
+        println!("skipped: no llvmpipe");
+        return;
+    };
+    let mut places: Vec<(String, bool)> = Vec::new();
+    for thread in std::fs::read_dir("/proc/self/task").unwrap().flatten() {
+        let read = |file: &str| std::fs::read_to_string(thread.path().join(file)).unwrap_or_default();
+        let status = read("status");
+        let allowed =
+            status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).unwrap_or_default().trim();
+        if allowed.parse::<u32>().is_ok() {
+            places.push((allowed.to_owned(), read("comm").starts_with("llvmpipe-")));
+        }
+    }
+    drop(gpu);
+    places.sort();
+    let processors = std::thread::available_parallelism().unwrap().get();
+    // On each processor one that computes and one that paints.
+    let painters: Vec<bool> = places.iter().map(|(_, paints)| *paints).collect();
+    assert_eq!(painters, [false, true].repeat(processors), "{places:?}");
+    let used: std::collections::BTreeSet<&String> = places.iter().map(|(processor, _)| processor).collect();
+    assert_eq!(used.len(), processors, "{places:?}");
 }

@@ -360,9 +360,9 @@ fn a_task_is_done_from_briefing_to_debriefing() {
         if depth(&out) == 0.0 {
             display.xdotool(&["key", "space"]);
             display.xdotool(&["keydown", "Down"]);
-            std::thread::sleep(Duration::from_millis(900));
         }
-        depth(&out) > 0.0
+        // The space bar pauses as well: it is pressed again only where it seems to have been lost.
+        until(6, || depth(&out) > 0.0)
     });
     assert!(started, "the keys did not lead the needle");
     display.xdotool(&["search", "--name", "Stylet", "windowsize", "900", "620"]);

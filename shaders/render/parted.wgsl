@@ -19,7 +19,7 @@ fn opening(node: u32) -> f32 {
 fn parted_corner(@location(0) nodes: vec2<u32>, @location(1) part: f32) -> TissueCorner {
     let lane = u32(view.range.z);
     if (lane < 4u) {
-        return placed_corner(nodes, part, mix(drawn_nodes[nodes.x][lane], drawn_nodes[nodes.y][lane], part));
+        return placed_corner(nodes, part, mix(node_field(nodes.x), node_field(nodes.y), part));
     }
     return placed_corner(nodes, part, mix(opening(nodes.x), opening(nodes.y), part));
 }

@@ -5,7 +5,7 @@ struct View {
     towards: vec4<f32>,
     // Low and high end of the field, its lane, 1 where the scale is logarithmic.
     range: vec4<f32>,
-    // How much of the tissue's surface is drawn, 0..1; y, z, w unused.
+    // How much of the tissue's surface, and of layers that are seen through, is drawn, 0..1; z, w unused.
     surface: vec4<f32>,
 }
 
@@ -38,6 +38,13 @@ fn on_scale(value: f32) -> f32 {
     return clamp(select(linear, logarithmic, view.range.w > 0.5), 0.0, 1.0);
 }
 
+// The field that is shown, at a node. The last lane is what of the stiffness is left; damage is what is gone.
+fn node_field(node: u32) -> f32 {
+    let lane = u32(view.range.z);
+    let value = drawn_nodes[node][lane];
+    return select(value, 1.0 - value, lane == 3u);
+}
+
 fn placed_corner(nodes: vec2<u32>, part: f32, value: f32) -> TissueCorner {
     var out: TissueCorner;
     out.place = mix(node_place(nodes.x), node_place(nodes.y), part);
@@ -49,8 +56,7 @@ fn placed_corner(nodes: vec2<u32>, part: f32, value: f32) -> TissueCorner {
 
 @vertex
 fn tissue_corner(@location(0) nodes: vec2<u32>, @location(1) part: f32) -> TissueCorner {
-    let lane = u32(view.range.z);
-    return placed_corner(nodes, part, mix(drawn_nodes[nodes.x][lane], drawn_nodes[nodes.y][lane], part));
+    return placed_corner(nodes, part, mix(node_field(nodes.x), node_field(nodes.y), part));
 }
 
 // Light from the direction of the eye, on both sides of a face; a factor on bytes as the target keeps them (sRGB), which spares every
@@ -75,15 +81,25 @@ fn is_drawn(clip: vec4<f32>, part: f32) -> bool {
     return (f32(rank) + 0.5) / 16.0 < part;
 }
 
-// The surface where it is seen through; the faces of a cut stay whole.
-@fragment
-fn veil_colour(corner: TissueCorner) -> @location(0) vec4<f32> {
+fn veiled(corner: TissueCorner, part: f32) -> vec4<f32> {
     let normal = cross(dpdx(corner.place), dpdy(corner.place));
-    if (!is_drawn(corner.clip, view.surface.x)) {
+    if (!is_drawn(corner.clip, part)) {
         discard;
     }
     let colour = colour_table[u32(corner.field * 255.0 + 0.5)];
     return vec4<f32>(colour.rgb * shade(normal), 1.0);
+}
+
+// The surface where it is seen through; the faces of a cut stay whole.
+@fragment
+fn veil_colour(corner: TissueCorner) -> @location(0) vec4<f32> {
+    return veiled(corner, view.surface.x);
+}
+
+// A layer that is seen through, its cut faces too.
+@fragment
+fn layer_colour(corner: TissueCorner) -> @location(0) vec4<f32> {
+    return veiled(corner, view.surface.y);
 }
 
 // Behind everything, three corners that cover the view.

@@ -568,17 +568,17 @@ impl Open {
         }
     }
 
-    /// Cuts the tissue where the sliders say.
+    /// Cuts the tissue, and sees through layers, as the choices say.
     fn cut(&mut self) {
-        let mesh = &self.practice.simulation.model.mesh;
-        let (low, high) = mesh.bounds();
+        let model = &self.practice.simulation.model;
+        let (low, high) = model.mesh.bounds();
         let plane = self.choices.cut.map(|(axis, at)| {
             // The half towards the viewer is taken away: -x, -y, +z.
             let along = low[axis] + at * (high[axis] - low[axis]);
             let sign = if axis == 2 { 1.0 } else { -1.0 };
             RestPlane { normal: DVec3::AXES[axis] * sign, offset: sign * along }
         });
-        self.view.cut(&self.gpu, mesh, plane);
+        self.view.cut(&self.gpu, model, plane, self.choices.look.through);
     }
 
     /// After a restart: the buffers are new.

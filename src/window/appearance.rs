@@ -45,6 +45,10 @@ pub struct Look {
     pub map: ColourMap,
     /// How much of the tissue's surface is drawn, 0..1; the faces of a cut stay whole.
     pub opacity: f32,
+    /// Bit i: the tissue of material number i is seen through.
+    pub through: u32,
+    /// How much of such tissue is drawn, 0..1.
+    pub veil: f32,
     pub targets: bool,
     pub probe: Probe,
     /// Size of the texts while its slider is held.
@@ -53,7 +57,15 @@ pub struct Look {
 
 impl Default for Look {
     fn default() -> Self {
-        Look { map: ColourMap::default(), opacity: 1.0, targets: true, probe: Probe::default(), zoom: None }
+        Look {
+            map: ColourMap::default(),
+            opacity: 1.0,
+            through: 0,
+            veil: 0.25,
+            targets: true,
+            probe: Probe::default(),
+            zoom: None,
+        }
     }
 }
 
@@ -78,9 +90,46 @@ pub fn controls(ui: &mut egui::Ui, look: &mut Look, targets: bool) {
     }
 }
 
+/// Which layers are seen through; `names` by number of the material. True where that has changed.
+pub fn layers<'a>(ui: &mut egui::Ui, look: &mut Look, names: impl Iterator<Item = &'a str>) -> bool {
+    let before = look.through;
+    egui::CollapsingHeader::new(texts::LAYERS).show(ui, |ui| {
+        for (number, name) in names.enumerate() {
+            let mut through = look.through >> number & 1 == 1;
+            if ui.checkbox(&mut through, name).changed() {
+                look.through ^= 1 << number;
+            }
+        }
+        ui.add(egui::Slider::new(&mut look.veil, 0.0..=1.0).text(texts::VEIL));
+    });
+    look.through != before
+}
+
 #[cfg(test)]
 mod tests {
+    use egui_kittest::Harness;
+    use egui_kittest::kittest::Queryable;
+
     use super::*;
+
+    #[test]
+    fn a_layer_is_seen_through_and_solid_again() {
+        let draw = |ui: &mut egui::Ui, (look, changed): &mut (Look, bool)| {
+            *changed |= layers(ui, look, ["all the rest", "skin", "fat"].into_iter());
+        };
+        let mut harness = Harness::new_ui_state(draw, (Look::default(), false));
+        harness.get_by_label(texts::LAYERS).click();
+        harness.run_steps(12);
+        for (name, through) in [("fat", 0b100), ("all the rest", 0b101), ("fat", 0b001)] {
+            harness.state_mut().1 = false;
+            harness.get_by_label(name).click();
+            harness.run_steps(2);
+            assert_eq!((harness.state().0.through, harness.state().1), (through, true), "{name}");
+        }
+        harness.state_mut().1 = false;
+        harness.run_steps(2);
+        assert!(!harness.state().1, "nothing was clicked");
+    }
 
     /// Lightness grows along every map, so that it is read without its hues.
     #[test]

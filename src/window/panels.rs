@@ -159,6 +159,11 @@ pub fn controls(
     }
     colour_bar(ui, &choices.scale, choices.look.map);
     appearance::controls(ui, &mut choices.look, !practice.scene().targets.is_empty());
+    let regions = &practice.scene().regions;
+    if !regions.is_empty() {
+        let names = std::iter::once(texts::REMAINDER).chain(regions.iter().map(|region| region.name.as_str()));
+        wishes.recut |= appearance::layers(ui, &mut choices.look, names);
+    }
     ui.separator();
     ui.label(texts::CUT);
     ui.horizontal(|ui| {
@@ -190,7 +195,7 @@ pub fn default_scale(field: Field) -> Scale {
         Field::VonMises => (0.0, 10e3),
         Field::Pressure => (-10e3, 10e3),
         Field::Stretch => (1.0, 1.5),
-        Field::StiffnessLeft => (0.0, 1.0),
+        Field::Damage => (0.0, 1.0),
         Field::Opening => (0.0, 2e-3),
     };
     Scale { field, low, high, logarithmic: false }

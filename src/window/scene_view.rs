@@ -8,7 +8,6 @@ use super::camera::Camera;
 use super::section::{self, Outline, RestPlane, TissueCorner};
 use super::tool_shape::ToolCorner;
 use crate::gpu::{Gpu, GpuEngine};
-use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -24,15 +23,14 @@ pub enum Field {
     VonMises,
     Pressure,
     Stretch,
-    /// Part of the stiffness that damage and the needle's path have left.
-    StiffnessLeft,
+    /// Part of the stiffness that damage and the needle's path have taken.
+    Damage,
     /// How far faces that separate have parted.
     Opening,
 }
 
 impl Field {
-    pub const ALL: [Field; 5] =
-        [Field::VonMises, Field::Pressure, Field::Stretch, Field::StiffnessLeft, Field::Opening];
+    pub const ALL: [Field; 5] = [Field::VonMises, Field::Pressure, Field::Stretch, Field::Damage, Field::Opening];
 
     /// Whether a scene has it.
     pub fn is_in(self, scene: &Scene) -> bool {
@@ -45,7 +43,7 @@ impl Field {
             Field::VonMises => "von Mises stress",
             Field::Pressure => "pressure",
             Field::Stretch => "largest stretch",
-            Field::StiffnessLeft => "stiffness left",
+            Field::Damage => "damage",
             Field::Opening => "opening of torn faces",
         }
     }
@@ -54,7 +52,7 @@ impl Field {
     pub fn unit(self) -> (&'static str, f64) {
         match self {
             Field::VonMises | Field::Pressure => ("kPa", 1e3),
-            Field::Stretch | Field::StiffnessLeft => ("-", 1.0),
+            Field::Stretch | Field::Damage => ("-", 1.0),
             Field::Opening => ("mm", 1e-3),
         }
     }
@@ -98,9 +96,11 @@ pub struct SceneView {
     backdrop: wgpu::RenderPipeline,
     tissue: wgpu::RenderPipeline,
     veil: wgpu::RenderPipeline,
+    layer_veil: wgpu::RenderPipeline,
     tool: wgpu::RenderPipeline,
     tissue_bindings: wgpu::BindGroup,
     veil_bindings: wgpu::BindGroup,
+    layer_bindings: wgpu::BindGroup,
     tool_bindings: wgpu::BindGroup,
     view: wgpu::Buffer,
     table: wgpu::Buffer,
@@ -112,10 +112,13 @@ pub struct SceneView {
     corners: wgpu::Buffer,
     /// The corners of the triangles, and how many.
     triangles: (wgpu::Buffer, u32),
-    /// So many of them belong to the surface, the rest to the cut.
+    /// So many of them belong to the surface of solid tissue, and so many to solid tissue in all; the rest is seen through.
     surface: u32,
+    solid: u32,
     tool_corners: (wgpu::Buffer, u32),
     outline: Outline,
+    /// Materials that are seen through there, as in [`Look::through`].
+    through: u32,
     depth: Option<(wgpu::Extent3d, wgpu::TextureView)>,
 }
 
@@ -193,6 +196,13 @@ impl SceneView {
             &wgpu::vertex_attr_array![0 => Uint32x2, 1 => Float32],
             Some(wgpu::Face::Back),
         );
+        let layer_veil = pipeline(
+            tissue_vertex,
+            "layer_colour",
+            size_of::<TissueCorner>(),
+            &wgpu::vertex_attr_array![0 => Uint32x2, 1 => Float32],
+            Some(wgpu::Face::Back),
+        );
         let tool = pipeline(
             "tool_corner",
             "tool_colour",
@@ -213,6 +223,7 @@ impl SceneView {
         buffers.extend(&copies);
         let tissue_bindings = bindings(device, &tissue, &buffers);
         let veil_bindings = bindings(device, &veil, &buffers);
+        let layer_bindings = bindings(device, &layer_veil, &buffers);
         let tool_bindings = bindings(device, &tool, &[&view]);
         let nothing = || {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -226,15 +237,19 @@ impl SceneView {
             corners: nothing(),
             triangles: (nothing(), 0),
             surface: 0,
+            solid: 0,
             tool_corners: (nothing(), 0),
-            outline: Outline::of(mesh),
+            outline: Outline::of(mesh, |_| false),
+            through: 0,
             depth: None,
             backdrop,
             tissue,
             veil,
+            layer_veil,
             tool,
             tissue_bindings,
             veil_bindings,
+            layer_bindings,
             tool_bindings,
             view,
             table,
@@ -242,7 +257,7 @@ impl SceneView {
             copies,
             map,
         };
-        drawing.cut(gpu, mesh, None);
+        drawing.cut(gpu, model, None, 0);
         if let Some(error) = pollster::block_on(scope.pop()) {
             return Err(Error::Device(format!("drawing of the tissue: {error}")));
         }
@@ -258,9 +273,10 @@ impl SceneView {
             return Ok(false);
         }
         (self.rest, self.copies) = mesh_buffers(&gpu.device, model);
-        self.outline = Outline::of(&model.mesh);
+        self.outline = Outline::of(&model.mesh, |_| false);
+        self.through = 0;
         self.take_buffers(gpu, engine)?;
-        self.cut(gpu, &model.mesh, None);
+        self.cut(gpu, model, None, 0);
         Ok(true)
     }
 
@@ -274,16 +290,21 @@ impl SceneView {
         buffers.extend(&self.copies);
         self.tissue_bindings = bindings(&gpu.device, &self.tissue, &buffers);
         self.veil_bindings = bindings(&gpu.device, &self.veil, &buffers);
+        self.layer_bindings = bindings(&gpu.device, &self.layer_veil, &buffers);
         Ok(())
     }
 
-    /// Takes away what lies beyond a plane.
-    pub fn cut(&mut self, gpu: &Gpu, mesh: &Mesh, plane: Option<RestPlane>) {
-        let cut = self.outline.cut(mesh, plane);
+    /// Takes away what lies beyond a plane; `through` as in [`Look::through`].
+    pub fn cut(&mut self, gpu: &Gpu, model: &Model, plane: Option<RestPlane>, through: u32) {
+        if through != self.through {
+            self.outline = Outline::of(&model.mesh, |cell| through >> model.material_index(cell) & 1 == 1);
+            self.through = through;
+        }
+        let cut = self.outline.cut(&model.mesh, plane);
         let (corners, numbers) = section::indexed(&cut.corners);
         self.corners = vertices(gpu, &corners).0;
         self.triangles = filled(gpu, &numbers, wgpu::BufferUsages::INDEX);
-        self.surface = cut.surface as u32;
+        (self.surface, self.solid) = (cut.surface as u32, cut.solid as u32);
     }
 
     /// Puts the tool, and what else stands in the view, to its place.
@@ -324,7 +345,7 @@ impl SceneView {
                 scale.field.lane() as f32,
                 f32::from(u8::from(scale.logarithmic)),
             ],
-            surface: [look.opacity, 0.0, 0.0, 0.0],
+            surface: [look.opacity, look.veil, 0.0, 0.0],
         };
         gpu.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
         if self.map != look.map {
@@ -363,9 +384,11 @@ impl SceneView {
         let (triangles, count) = &self.triangles;
         pass.set_vertex_buffer(0, self.corners.slice(..));
         pass.set_index_buffer(triangles.slice(..), wgpu::IndexFormat::Uint32);
-        for (pipeline, bindings, range) in
-            [(surface, surface_bindings, 0..self.surface), (&self.tissue, &self.tissue_bindings, self.surface..*count)]
-        {
+        for (pipeline, bindings, range) in [
+            (surface, surface_bindings, 0..self.surface),
+            (&self.tissue, &self.tissue_bindings, self.surface..self.solid),
+            (&self.layer_veil, &self.layer_bindings, self.solid..*count),
+        ] {
             if !range.is_empty() {
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, bindings, &[]);

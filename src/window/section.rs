@@ -39,75 +39,111 @@ const HEXAHEDRON_EDGES: [[usize; 2]; 12] =
     [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 const TETRAHEDRON_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
-/// The outer faces of a mesh, found once.
+/// The outer faces of a mesh, found once; where layers are seen through also those of what stays solid behind them.
 pub struct Outline {
-    faces: Vec<Vec<u32>>,
+    /// Outer faces of the solid cells.
+    solid: Vec<Vec<u32>>,
+    /// Outer faces of the tissue that belong to cells that are seen through.
+    veiled: Vec<Vec<u32>>,
+    /// Whether a cell is seen through; empty where none is.
+    through: Vec<bool>,
 }
+
+/// A face of one or two cells, as each of them sees it, and whether that cell is seen through.
+type FaceOwners = Vec<(Vec<u32>, bool)>;
 
 impl Outline {
     /// Faces that belong to one cell only. The flat cells between two copies of a grid line are no tissue, so the two sides of a cut
     /// are faces.
-    pub fn of(mesh: &Mesh) -> Self {
-        let mut seen: HashMap<Vec<u32>, (Vec<u32>, bool)> = HashMap::new();
+    ///
+    /// A cell for which `through` says so is seen through. Where all cells are solid, give `|_| false`.
+    pub fn of(mesh: &Mesh, through: impl Fn(usize) -> bool) -> Self {
+        let mut owners: HashMap<Vec<u32>, FaceOwners> = HashMap::new();
+        let through: Vec<bool> = (0..mesh.cell_count()).map(through).collect();
         for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell)) {
             let nodes = mesh.cell_nodes(cell);
             let mut add = |face: &[usize]| {
                 let face: Vec<u32> = face.iter().map(|n| nodes[*n] as u32).collect();
                 let mut key = face.clone();
                 key.sort_unstable();
-                seen.entry(key).and_modify(|(_, outer)| *outer = false).or_insert((face, true));
+                owners.entry(key).or_default().push((face, through[cell]));
             };
             match nodes.len() {
                 8 => HEXAHEDRON_FACES.iter().for_each(|face| add(face)),
                 _ => TETRAHEDRON_FACES.iter().for_each(|face| add(face)),
             }
         }
-        let mut faces: Vec<Vec<u32>> = seen.into_values().filter(|(_, outer)| *outer).map(|(face, _)| face).collect();
+        let (mut solid, mut veiled) = (Vec::new(), Vec::new());
+        for owners in owners.into_values() {
+            let mut of_solid = owners.iter().filter(|(_, through)| !through);
+            match (of_solid.next(), of_solid.next()) {
+                (Some((face, _)), None) => solid.push(face.clone()),
+                // Between two layers that are both seen through there is nothing to see.
+                (None, _) if owners.len() == 1 => veiled.push(owners[0].0.clone()),
+                _ => {}
+            }
+        }
         // The order of a hash map changes from run to run.
-        faces.sort_unstable();
-        Outline { faces }
+        solid.sort_unstable();
+        veiled.sort_unstable();
+        let through = if through.contains(&true) { through } else { Vec::new() };
+        Outline { solid, veiled, through }
     }
 
     pub fn face_count(&self) -> usize {
-        self.faces.len()
+        self.solid.len() + self.veiled.len()
     }
 
     /// Triangles of the tissue that is left by a plane: its surface and the cut. Three corners each.
     pub fn cut(&self, mesh: &Mesh, plane: Option<RestPlane>) -> Cut {
         let distance = distances(mesh, plane);
-        let mut corners = Vec::with_capacity(6 * self.faces.len());
-        let mut polygon = Vec::with_capacity(8);
-        for face in &self.faces {
-            polygon.clear();
-            for (n, a) in face.iter().enumerate() {
-                let b = face[(n + 1) % face.len()];
-                if distance[*a as usize] <= 0.0 {
-                    polygon.push(TissueCorner { nodes: [*a; 2], part: 0.0 });
-                }
-                polygon.extend(crossing(&distance, *a, b));
-            }
-            fan(&polygon, &mut corners);
-        }
+        let mut corners = Vec::with_capacity(6 * self.face_count());
+        let is_through = |cell: usize| self.through.get(cell).is_some_and(|through| *through);
+        surface_into(&self.solid, &distance, &mut corners);
         let surface = corners.len();
         if let Some(plane) = plane {
-            slice_into(mesh, plane, &distance, &mut corners);
+            slice_into(mesh, plane, &distance, |cell| !is_through(cell), &mut corners);
         }
-        Cut { corners, surface }
+        let solid = corners.len();
+        surface_into(&self.veiled, &distance, &mut corners);
+        if let Some(plane) = plane {
+            slice_into(mesh, plane, &distance, is_through, &mut corners);
+        }
+        Cut { corners, surface, solid }
     }
 }
 
 /// What a plane leaves of the tissue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cut {
+    /// Of the surface of solid tissue, of the cut through it, and of what is seen through.
     pub corners: Vec<TissueCorner>,
-    /// So many of them belong to the surface, the rest to the cut.
+    /// So many of them belong to the surface of solid tissue,
     pub surface: usize,
+    /// and so many to solid tissue in all.
+    pub solid: usize,
+}
+
+/// Triangles of what lies on this side of the plane.
+fn surface_into(faces: &[Vec<u32>], distance: &[f64], corners: &mut Vec<TissueCorner>) {
+    let mut polygon = Vec::with_capacity(8);
+    for face in faces {
+        polygon.clear();
+        for (n, a) in face.iter().enumerate() {
+            let b = face[(n + 1) % face.len()];
+            if distance[*a as usize] <= 0.0 {
+                polygon.push(TissueCorner { nodes: [*a; 2], part: 0.0 });
+            }
+            polygon.extend(crossing(distance, *a, b));
+        }
+        fan(&polygon, corners);
+    }
 }
 
 /// Triangles of the tissue in a plane, three corners each.
 pub fn slice(mesh: &Mesh, plane: RestPlane) -> Vec<TissueCorner> {
     let mut corners = Vec::new();
-    slice_into(mesh, plane, &distances(mesh, Some(plane)), &mut corners);
+    slice_into(mesh, plane, &distances(mesh, Some(plane)), |_| true, &mut corners);
     corners
 }
 
@@ -117,10 +153,16 @@ fn distances(mesh: &Mesh, plane: Option<RestPlane>) -> Vec<f64> {
     (0..mesh.node_count()).map(beyond).collect()
 }
 
-fn slice_into(mesh: &Mesh, plane: RestPlane, distance: &[f64], corners: &mut Vec<TissueCorner>) {
+fn slice_into(
+    mesh: &Mesh,
+    plane: RestPlane,
+    distance: &[f64],
+    is_wanted: impl Fn(usize) -> bool,
+    corners: &mut Vec<TissueCorner>,
+) {
     let mut polygon = Vec::with_capacity(8);
     let (first, second) = crate::needle::lateral_axes(plane.normal);
-    for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell)) {
+    for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell) && is_wanted(*cell)) {
         let nodes = mesh.cell_nodes(cell);
         let edges: &[[usize; 2]] = if nodes.len() == 8 { &HEXAHEDRON_EDGES } else { &TETRAHEDRON_EDGES };
         polygon.clear();
@@ -198,7 +240,7 @@ mod tests {
     fn a_cut_block_is_closed() {
         let tets = Mesh::Tets(Arc::new(TetMesh::from_block(&block())));
         for mesh in [Mesh::Block(block()), tets] {
-            let outline = Outline::of(&mesh);
+            let outline = Outline::of(&mesh, |_| false);
             let whole = 2.0 * (4.0 * 3.0 + 3.0 * 2.0 + 2.0 * 4.0) * 1e-6;
             assert!((area(&mesh, &outline.cut(&mesh, None).corners) / whole - 1.0).abs() < 1e-12);
             for part in [0.3, 1.0, 2.5] {
@@ -209,21 +251,48 @@ mod tests {
                 assert!((found / left - 1.0).abs() < 1e-6, "{part}: {found} against {left}");
                 // The slice alone is what the cut adds to the surface.
                 assert_eq!(cut.corners[cut.surface..], slice(&mesh, plane));
+                assert_eq!(cut.solid, cut.corners.len());
                 assert!((area(&mesh, &cut.corners[cut.surface..]) / 6e-6 - 1.0).abs() < 1e-6);
             }
         }
         // A plane at a slope cuts a triangle off a corner.
         let mesh = Mesh::Block(block());
         let plane = RestPlane { normal: DVec3::ONE.normalize(), offset: 1e-3 / 3f64.sqrt() };
-        let corners = Outline::of(&mesh).cut(&mesh, Some(plane)).corners;
+        let corners = Outline::of(&mesh, |_| false).cut(&mesh, Some(plane)).corners;
         let expected = (3f64.sqrt() / 2.0 + 1.5) * 1e-6;
         assert!((area(&mesh, &corners) / expected - 1.0).abs() < 1e-6);
+    }
+
+    /// Above 1 mm the tissue is seen through: what stays solid is the smaller block, closed, the rest is the outside of the layer.
+    #[test]
+    fn behind_a_layer_that_is_seen_through_the_tissue_is_closed() {
+        let tets = Mesh::Tets(Arc::new(TetMesh::from_block(&block())));
+        for mesh in [Mesh::Block(block()), tets] {
+            let upper = |cell: usize| mesh.cell_centre(cell).z > 1e-3;
+            let outline = Outline::of(&mesh, upper);
+            let whole = outline.cut(&mesh, None);
+            let (solid, veiled) = whole.corners.split_at(whole.solid);
+            assert_eq!(whole.surface, whole.solid);
+            // 4 x 3 x 1 mm below; above the top and the four sides.
+            assert!((area(&mesh, solid) / (2.0 * (12.0 + 3.0 + 4.0) * 1e-6) - 1.0).abs() < 1e-12);
+            assert!((area(&mesh, veiled) / ((12.0 + 2.0 * (3.0 + 4.0)) * 1e-6) - 1.0).abs() < 1e-12);
+            // A cut at x = 1.5 mm leaves 3 x 1 mm of each.
+            let cut = outline.cut(&mesh, Some(RestPlane { normal: DVec3::X, offset: 1.5e-3 }));
+            assert!((area(&mesh, &cut.corners[cut.surface..cut.solid]) / 3e-6 - 1.0).abs() < 1e-6);
+            let veiled = area(&mesh, &cut.corners[cut.solid..]) * 1e6;
+            // Top, two sides, the far end and the cut.
+            assert!((veiled / (4.5 + 2.0 * 1.5 + 3.0 + 3.0) - 1.0).abs() < 1e-6, "{veiled}");
+            // All of it seen through: nothing solid is left.
+            let nothing = Outline::of(&mesh, |_| true).cut(&mesh, None);
+            assert_eq!(nothing.solid, 0);
+            assert_eq!(nothing.corners, Outline::of(&mesh, |_| false).cut(&mesh, None).corners);
+        }
     }
 
     #[test]
     fn every_corner_is_placed_once() {
         let mesh = Mesh::Block(block());
-        let whole = Outline::of(&mesh).cut(&mesh, None).corners;
+        let whole = Outline::of(&mesh, |_| false).cut(&mesh, None).corners;
         let (single, numbers) = indexed(&whole);
         // 5 x 4 x 3 nodes, of which 3 x 2 x 1 lie inside.
         assert_eq!(single.len(), 60 - 6);
@@ -237,6 +306,11 @@ mod tests {
     #[test]
     fn nothing_is_left_beyond_the_block() {
         let mesh = Mesh::Block(block());
-        assert!(Outline::of(&mesh).cut(&mesh, Some(RestPlane { normal: DVec3::X, offset: -1e-3 })).corners.is_empty());
+        assert!(
+            Outline::of(&mesh, |_| false)
+                .cut(&mesh, Some(RestPlane { normal: DVec3::X, offset: -1e-3 }))
+                .corners
+                .is_empty()
+        );
     }
 }
