@@ -2,7 +2,12 @@
 //!
 //! Replayed by the same program on the same adapter it gives the same forces bit for bit; elsewhere within what adapters differ
 //! (`stylet compare-adapters`).
+//!
+//! In the file the head stands in the first line, and every pose and every change in a line of its own behind it: they are appended
+//! while the hand moves, so that a window that goes down in the middle takes nothing with it.
 
+use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -15,9 +20,12 @@ use crate::scene::motion::HandPose;
 use crate::solver::engine::EngineInfo;
 use crate::solver::simulation::Simulation;
 
+/// File of a session in its folder.
+pub const SESSION: &str = "session.json";
+
 /// Version of the format.
-const FORMAT: u32 = 2;
-/// Oldest format that is read; sessions of it have no changes.
+const FORMAT: u32 = 3;
+/// Oldest format that is read: one value that holds all poses; sessions of it have no changes.
 const OLDEST_FORMAT: u32 = 1;
 /// Largest file that is read: an hour at 60 frames/s takes 40 MB.
 const LARGEST_FILE: u64 = 64 << 20;
@@ -37,10 +45,19 @@ pub struct Session {
     pub overrides: Vec<String>,
     pub fingerprint: u64,
     /// Where the hand wanted the needle at the end of every frame; SI.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub poses: Vec<HandPose>,
     /// What was changed while it ran, in order.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub changes: Vec<SceneChange>,
+}
+
+/// A line behind the head.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(untagged)]
+enum Line {
+    Pose(HandPose),
+    Change(SceneChange),
 }
 
 /// Other values of the scene from a frame on.
@@ -73,8 +90,25 @@ impl Session {
     /// # Errors
     /// `Error::File` where the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let text = serde_json::to_string(self).map_err(|e| Error::file(path, std::io::Error::other(e)))?;
+        let head = Session { poses: Vec::new(), changes: Vec::new(), ..self.clone() };
+        let text = line(path, &head)? + &self.lines(path, 0, 0)?;
         whole_file::write(path, text.as_bytes())
+    }
+
+    /// Lines of the poses and changes behind the first so many, each change before the pose that it was made for.
+    fn lines(&self, path: &Path, poses: usize, changes: usize) -> Result<String> {
+        let mut text = String::new();
+        let mut changes = self.changes[changes..].iter().peekable();
+        for (frame, pose) in (0..).zip(&self.poses).skip(poses) {
+            while let Some(change) = changes.next_if(|change| change.frame <= frame) {
+                text += &line(path, &Line::Change(change.clone()))?;
+            }
+            text += &line(path, &Line::Pose(*pose))?;
+        }
+        for change in changes {
+            text += &line(path, &Line::Change(change.clone()))?;
+        }
+        Ok(text)
     }
 
     /// # Errors
@@ -93,7 +127,20 @@ impl Session {
     /// # Errors
     /// As [`Session::read`].
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
-        let session: Session = serde_json::from_slice(bytes).map_err(|e| wrong(path, e.to_string()))?;
+        let mut values = serde_json::Deserializer::from_slice(bytes);
+        let mut session = Session::deserialize(&mut values).map_err(|e| wrong(path, e.to_string()))?;
+        for value in values.into_iter::<Line>() {
+            match value {
+                Ok(Line::Pose(pose)) => session.poses.push(pose),
+                Ok(Line::Change(change)) => session.changes.push(change),
+                // What was being written when the program or the machine went down.
+                Err(error) if error.is_eof() => {
+                    log::warn!("{}: the last line is cut off; {} frames are left", path.display(), session.poses.len());
+                    break;
+                }
+                Err(error) => return Err(wrong(path, error.to_string())),
+            }
+        }
         if !(OLDEST_FORMAT..=FORMAT).contains(&session.format) {
             return Err(wrong(
                 path,
@@ -147,6 +194,54 @@ impl Session {
             ));
         }
         Ok(scene)
+    }
+}
+
+/// One value in one line.
+fn line(path: &Path, value: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string(value).map_err(|e| Error::file(path, std::io::Error::other(e)))?;
+    Ok(text + "\n")
+}
+
+/// The file of a session that grows while it is recorded.
+pub struct SessionFile {
+    path: PathBuf,
+    file: File,
+    /// What of the session stands in it.
+    poses: usize,
+    changes: usize,
+    /// A part of a line may stand at its end.
+    torn: bool,
+}
+
+impl SessionFile {
+    /// Begins the file with what the session holds already; a file of that name is replaced.
+    ///
+    /// # Errors
+    /// `Error::File` where it cannot be written.
+    pub fn create(path: &Path, session: &Session) -> Result<Self> {
+        session.write(path)?;
+        let file = File::options().append(true).open(path).map_err(|e| Error::file(path, e))?;
+        let (poses, changes) = (session.poses.len(), session.changes.len());
+        Ok(SessionFile { path: path.to_path_buf(), file, poses, changes, torn: false })
+    }
+
+    /// Appends what has come to the session since the last time.
+    ///
+    /// # Errors
+    /// `Error::File`. The next time the file is written anew, because a part of a line may stand in it.
+    pub fn append(&mut self, session: &Session) -> Result<()> {
+        if self.torn {
+            *self = SessionFile::create(&self.path, session)?;
+            return Ok(());
+        }
+        let text = session.lines(&self.path, self.poses, self.changes)?;
+        self.file.write_all(text.as_bytes()).map_err(|e| {
+            self.torn = true;
+            Error::file(&self.path, e)
+        })?;
+        (self.poses, self.changes) = (session.poses.len(), session.changes.len());
+        Ok(())
     }
 }
 

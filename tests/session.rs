@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 use stylet::observables::FrameRecord;
 use stylet::scene::Scene;
 use stylet::scene::motion::HandPose;
-use stylet::session::Session;
+use stylet::session::{SceneChange, Session, SessionFile};
 use stylet::solver::simulation::{Purpose, Simulation};
 
 /// A small insertion.
@@ -249,6 +249,43 @@ fn tilts_and_another_entry_come_again_bit_for_bit() {
         let lateral = |r: &FrameRecord| r.force.lateral.to_array().map(f64::to_bits);
         assert!(records.iter().map(lateral).eq(again.iter().map(lateral)));
     }
+}
+
+/// While a hand moves its file grows; what is cut off in the middle of a line costs that line.
+#[test]
+fn a_session_grows_line_by_line() {
+    let scene = scene();
+    let mut engine = Simulation::for_purpose(scene.clone(), None, Purpose { led: true, drawn: false }).unwrap();
+    let mut session = Session::new(&scene, &OVERRIDES.map(String::from), engine.engine().info());
+    let pose = engine.hand().unwrap();
+    let place = Place::new();
+    let path = place.path("session.json");
+    let mut file = SessionFile::create(&path, &session).unwrap();
+    for frame in 0..5u64 {
+        if frame == 3 {
+            let overrides = vec!["friction.coefficient=0.1".into()];
+            session.changes.push(SceneChange { frame, overrides });
+        }
+        session.poses.push(HandPose { depth: 1e-3 * frame as f64 / 3.0, ..pose });
+        file.append(&session).unwrap();
+        assert_eq!(Session::read(&path).unwrap(), session);
+    }
+    let grown = std::fs::read(&path).unwrap();
+    session.write(&path).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), grown, "written in one go or line by line");
+    // Head, three poses, the change, two poses.
+    let ends: Vec<usize> = (0..grown.len()).filter(|n| grown[*n] == b'\n').collect();
+    assert_eq!(ends.len(), 7);
+    let left = |bytes: &[u8]| Session::from_bytes(&path, bytes).map(|s| (s.poses.len(), s.changes.len()));
+    for (lines, frames) in ends.iter().zip([(0, 0), (1, 0), (2, 0), (3, 0), (3, 1), (4, 1)]) {
+        for part in [1, 2, 20] {
+            assert_eq!(left(&grown[..lines + part]).unwrap(), frames);
+        }
+    }
+    assert!(left(&grown[..ends[0] - 5]).is_err(), "without its head it is none");
+    // Of the second format: one value.
+    session.format = 2;
+    assert_eq!(Session::from_bytes(&path, &serde_json::to_vec(&session).unwrap()).unwrap(), session);
 }
 
 #[test]

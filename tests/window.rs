@@ -8,6 +8,8 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use stylet::session::{SESSION, Session};
+
 /// Two windows at once would share the cores, and keys and clicks would come before what they are meant for.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
@@ -173,10 +175,8 @@ fn a_hand_leads_the_needle_and_its_session_is_kept() {
     let told = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
     // What was written is computed again from the session alone.
-    let session: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("session.json")).unwrap()).unwrap();
-    let poses = session["poses"].as_array().unwrap();
-    let deepest = poses.iter().map(|p| p["depth"].as_f64().unwrap()).fold(0.0, f64::max);
+    let poses = Session::read(&out.join(SESSION)).unwrap().poses;
+    let deepest = poses.iter().map(|p| p.depth).fold(0.0, f64::max);
     assert!(poses.len() > 30 && deepest > 1.5e-3, "{} poses, {deepest} m", poses.len());
     let again = display.path("again");
     let replayed = Command::new(env!("CARGO_BIN_EXE_stylet"))
@@ -242,14 +242,11 @@ fn the_mouse_pushes_and_tilts_a_needle_on_a_free_path() {
     }
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let session: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("session.json")).unwrap()).unwrap();
-    let last = session["poses"].as_array().unwrap().last().unwrap();
-    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let last = *Session::read(&out.join(SESSION)).unwrap().poses.last().unwrap();
     // 96 points down on the screen, and 96 to the right: the hub leans there, which is +x and a little +y in this view.
-    assert!(number(&last["depth"]) > 1e-3, "{last}");
-    assert!(number(&last["direction"][0]) < -0.05 && number(&last["direction"][2]) < -0.9, "{last}");
-    assert!(number(&last["entry"][0]).abs() < 1e-9, "{last}");
+    assert!(last.depth > 1e-3, "{last:?}");
+    assert!(last.direction.x < -0.05 && last.direction.z < -0.9, "{last:?}");
+    assert!(last.entry.x.abs() < 1e-9, "{last:?}");
 }
 
 /// Another program over OpenIGTLink leads the needle of a real window, and the forces of the hand are written at 1 kHz.
@@ -453,4 +450,49 @@ fn an_edited_scene_is_read_anew() {
     }
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// The display goes down in the middle of an attempt: what the hand did so far is computed again.
+#[test]
+fn a_lost_display_takes_nothing_with_it() {
+    let Some(mut display) = Display::open() else { return };
+    let out = display.path("attempt");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env("DISPLAY", &display.name)
+        .env_remove("WAYLAND_DISPLAY")
+        .args(["view", "scenes/training/hit_target.toml", "--set", "tissue.cell_size_mm=1.2", "--out"])
+        .arg(&out)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    display.wait();
+    let led = until(60, || {
+        if depth(&out) == 0.0 {
+            display.xdotool(&["key", "space"]);
+            display.xdotool(&["keydown", "Down"]);
+        }
+        until(6, || depth(&out) > 0.5e-3)
+    });
+    display.server.kill().unwrap();
+    let ended = until(20, || child.try_wait().unwrap().is_some());
+    let _ = child.kill();
+    child.wait().unwrap();
+    assert!(led && ended, "led {led}, ended {ended}");
+    let rows = |folder: &Path| -> Vec<String> {
+        std::fs::read_to_string(folder.join("force.csv")).unwrap().lines().map(String::from).collect()
+    };
+    let kept = rows(&out);
+    let poses = Session::read(&out.join(SESSION)).unwrap().poses.len();
+    // The head of the table has a line too; the frame under way may have a pose and no row.
+    assert!(kept.len() > 10 && poses + 1 >= kept.len(), "{poses} poses, {} lines", kept.len());
+    let again = display.path("again");
+    let replayed = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(["replay".as_ref(), out.as_os_str(), "--out".as_ref(), again.as_os_str()])
+        .output()
+        .unwrap();
+    assert!(replayed.status.success(), "{}", String::from_utf8_lossy(&replayed.stderr));
+    assert_eq!(rows(&again)[..kept.len()], kept);
 }

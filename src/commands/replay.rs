@@ -7,7 +7,7 @@ use crate::Result;
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::{DrivenFace, OutputFolder, Tables};
-use crate::session::Session;
+use crate::session::{SESSION, Session};
 use crate::solver::simulation::{EngineChoice, Purpose, Simulation};
 use crate::training::kinematic::Sample;
 use crate::training::score::Score;
@@ -92,9 +92,6 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
     }
     Ok(outcome)
 }
-
-/// File of a session in its folder.
-pub const SESSION: &str = "session.json";
 
 fn place(version: &str, adapter: &str) -> String {
     format!("stylet {version} on {adapter}")

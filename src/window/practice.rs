@@ -16,7 +16,7 @@ use crate::observables::FrameRecord;
 use crate::output::{DrivenFace, OutputFolder, Tables};
 use crate::scene::Scene;
 use crate::scene::motion::HandPose;
-use crate::session::{SceneChange, Session};
+use crate::session::{SESSION, SceneChange, Session, SessionFile};
 use crate::solver::checkpoint::Checkpoint;
 use crate::solver::simulation::{Purpose, Simulation, tool_mach};
 use crate::training::kinematic::Sample;
@@ -29,9 +29,6 @@ const LARGEST_MACH: f64 = 0.3;
 /// Frames between two moments of a script that one can go back to, and how many of them are kept.
 const MARK_EVERY: usize = 30;
 const MOST_MARKS: usize = 64;
-
-/// Frames between two writings of the session: what a crash may cost.
-const SAVE_EVERY: usize = 300;
 
 /// Who leads the needle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -135,6 +132,16 @@ fn speed_limit(simulation: &Simulation) -> f64 {
 struct Written {
     folder: OutputFolder,
     tables: Tables,
+    /// Where a hand leads.
+    session: Option<SessionFile>,
+}
+
+/// The file of what a hand does.
+fn session_file(folder: &OutputFolder, leader: Leader, session: &Session) -> Result<Option<SessionFile>> {
+    match leader {
+        Leader::Hand => SessionFile::create(&folder.file(SESSION), session).map(Some),
+        Leader::Script => Ok(None),
+    }
 }
 
 /// One attempt.
@@ -209,7 +216,8 @@ impl Practice {
                 let folder = OutputFolder::create(Some(out), &scene.name, force)?;
                 let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
                 let tables = Tables::create(&folder, &driven, simulation.model.has_bore(), &scene.targets)?;
-                Some(Written { folder, tables })
+                let file = session_file(&folder, leader, &session)?;
+                Some(Written { folder, tables, session: file })
             }
         };
         let speed_limit = speed_limit(&simulation);
@@ -383,19 +391,13 @@ impl Practice {
                     self.latency.add(self.records.len() as u64 + 1 - frames, since.elapsed().as_secs_f64());
                 }
                 if let Some(written) = self.written.as_mut().filter(|_| self.unwritten.is_none())
-                    && let Err(error) = written.tables.append(&record)
+                    && let Err(error) = written.tables.append(&record).and_then(|()| self.save())
                 {
                     self.hold_back(error);
                 }
                 self.records.push(record);
                 self.timing.done += self.timing.simulated;
                 self.mark()?;
-                if self.records.len().is_multiple_of(SAVE_EVERY)
-                    && self.unwritten.is_none()
-                    && let Err(error) = self.save()
-                {
-                    self.hold_back(error);
-                }
                 if let Some(begin) = self.started.take() {
                     if std::mem::take(&mut self.freshly_changed)
                         && let Some(pace) = self.tuning.paces.last_mut()
@@ -431,11 +433,11 @@ impl Practice {
         let driven = DrivenFace::of_scene(&self.scene.faces, &model.mesh);
         let (folder, targets) = (&written.folder, &self.scene.targets);
         let tables = Tables::with_records(folder, &driven, model.has_bore(), targets, &self.records);
-        let done = tables.and_then(|tables| {
+        let session = || session_file(folder, self.leader, &self.session);
+        let done = tables.and_then(|tables| Ok((tables, session()?))).map(|(tables, session)| {
             if let Some(written) = &mut self.written {
-                written.tables = tables;
+                (written.tables, written.session) = (tables, session);
             }
-            self.save()
         });
         self.unwritten = done.as_ref().err().map(|error| error.to_string());
         done
@@ -488,14 +490,14 @@ impl Practice {
         }
     }
 
-    /// Writes the session beside the tables.
+    /// Writes what the hand did since the last time behind the session beside the tables.
     ///
     /// # Errors
     /// `Error::File`.
-    pub fn save(&self) -> Result<()> {
-        match &self.written {
-            Some(written) if self.leader == Leader::Hand => self.session.write(&written.folder.file("session.json")),
-            _ => Ok(()),
+    pub fn save(&mut self) -> Result<()> {
+        match self.written.as_mut().and_then(|written| written.session.as_mut()) {
+            Some(file) => file.append(&self.session),
+            None => Ok(()),
         }
     }
 
