@@ -1,6 +1,6 @@
 //! The panels around the view: what is shown, who leads, forces, energies, health and times.
 
-use egui_plot::{AxisHints, GridInput, GridMark, Legend, Line, Plot, PlotPoints};
+use egui_plot::{AxisHints, Corner, GridInput, GridMark, Legend, Line, Plot, PlotPoints};
 
 use super::accuracy::Accuracy;
 use super::appearance::{self, ColourMap, Look};
@@ -272,7 +272,7 @@ pub fn readings(
                 .formatter(|mark, _| depth_label(mark)),
         ])
         .y_axis_label(texts::FORCE_AXIS)
-        .legend(Legend::default())
+        .legend(Legend::default().position(Corner::LeftTop))
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
