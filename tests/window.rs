@@ -464,7 +464,7 @@ fn a_lost_display_takes_nothing_with_it() {
         .args(["view", "scenes/training/hit_target.toml", "--set", "tissue.cell_size_mm=1.2", "--out"])
         .arg(&out)
         .stdout(Stdio::null())
-        .stderr(Stdio::null())
+        .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     display.wait();
@@ -478,8 +478,9 @@ fn a_lost_display_takes_nothing_with_it() {
     display.server.kill().unwrap();
     let ended = until(20, || child.try_wait().unwrap().is_some());
     let _ = child.kill();
-    child.wait().unwrap();
+    let told = String::from_utf8_lossy(&child.wait_with_output().unwrap().stderr).into_owned();
     assert!(led && ended, "led {led}, ended {ended}");
+    assert!(told.contains("the display is gone") && told.contains("stylet replay"), "{told}");
     let rows = |folder: &Path| -> Vec<String> {
         std::fs::read_to_string(folder.join("force.csv")).unwrap().lines().map(String::from).collect()
     };

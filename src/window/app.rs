@@ -18,6 +18,7 @@ use super::devices::Devices;
 use super::foresight::Foresight;
 use super::grip::{Grip, Modifiers, Sight};
 use super::hand::{Desk, InputDevice, Key, Recording};
+use super::lost_display::OpenWindow;
 use super::marks;
 use super::panels::{self, Choices, ReferenceCurve, Wishes};
 use super::practice::{Latency, Leader, Practice, Renewed, State};
@@ -201,6 +202,7 @@ struct App {
 
 /// An open window.
 struct Open {
+    alive: OpenWindow,
     window: Arc<Window>,
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
@@ -390,6 +392,7 @@ impl App {
         let devices = Devices::open(&self.options, desk.speed)?;
         let now = Instant::now();
         let mut open = Open {
+            alive: OpenWindow::with(practice.folder()),
             window,
             surface,
             config,
@@ -591,6 +594,7 @@ impl Open {
         }
         self.scan.close(&mut self.painter);
         self.cut();
+        self.alive.writes_to(self.practice.folder());
         self.due = 0.0;
         Ok(())
     }

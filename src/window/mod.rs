@@ -4,7 +4,8 @@
 //! holds, [`grip`] how the mouse takes hold of the needle, [`reach`] what the tissue follows of it, [`devices`] what else is connected.
 //! [`section`], [`tool_shape`], [`marks`] and [`camera`] say what is drawn, [`scene_view`] draws it from the solver's own buffers as
 //! [`appearance`] chooses, [`panels`] stand around it, [`app`] is the window itself. [`probe`] says where an ultrasound slice stands,
-//! [`ultrasound`] draws it and [`scan`] shows it. The window owns no physics: it sends poses and reads records.
+//! [`ultrasound`] draws it and [`scan`] shows it; [`lost_display`] has the last word where the display goes down. The window owns no
+//! physics: it sends poses and reads records.
 
 pub mod accuracy;
 pub mod app;
@@ -18,6 +19,7 @@ pub mod grip;
 pub mod hand;
 #[cfg(feature = "link")]
 pub mod link_device;
+pub mod lost_display;
 pub mod marks;
 #[cfg(feature = "gamepad")]
 pub mod pads;

@@ -344,6 +344,11 @@ impl Practice {
         &self.scene
     }
 
+    /// Where this attempt is written to.
+    pub fn folder(&self) -> Option<&Path> {
+        self.written.as_ref().map(|written| written.folder.path())
+    }
+
     /// Where the tool is at the end of the last frame that was started.
     pub fn depth(&self) -> f64 {
         self.simulation.hand().map_or_else(|| self.records.last().map_or(0.0, |r| r.depth), |pose| pose.depth)
