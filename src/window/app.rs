@@ -288,6 +288,12 @@ impl ApplicationHandler for App {
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(open) = &mut self.open else { return };
+        // A key that is held comes again 25 times a second; every event of the panels has them drawn, which takes longer than tissue and
+        // view together. Only where somebody writes does it mean anything.
+        let repeats = matches!(&event, WindowEvent::KeyboardInput { event, .. } if event.repeat);
+        if repeats && !open.egui.egui_ctx().egui_wants_keyboard_input() {
+            return;
+        }
         let taken = open.egui.on_window_event(&open.window, &event).consumed;
         match event {
             WindowEvent::CloseRequested => self.close(event_loop),
@@ -760,7 +766,10 @@ impl Open {
 
     /// Filling the panels takes a software adapter longer than drawing the tissue.
     fn panels_are_due(&self) -> bool {
-        let input = !self.egui.egui_input().events.is_empty() || self.egui.is_any_pointer_button_down();
+        // A pointer that only wanders over the view says nothing to them.
+        let wanders = |event: &egui::Event| matches!(event, egui::Event::PointerMoved(at) if self.area.contains(*at));
+        let spoken = self.egui.egui_input().events.iter().any(|event| !wanders(event));
+        let input = spoken || self.egui.is_any_pointer_button_down();
         let waited = self.panelled.is_none_or(|at| at.elapsed().as_secs_f64() >= PANELS_EVERY);
         !self.gpu.is_software() || self.stale || input || waited
     }
