@@ -1,7 +1,8 @@
 //! What is told where the display goes down under an open window.
 //!
-//! Xlib ends the program itself then, by `exit` and without a way back into it: what is still to be said has to be said on the way
-//! out. Files need no care here, they are written frame by frame.
+//! Xlib ends the program itself then, by `exit` and without a way back into it, after it has called a handler: that is where something
+//! can still be said. (`atexit` is too late: destructors of drivers, which run before, were seen to end the program.) Files need no
+//! care here, they are written frame by frame. On Wayland the event loop ends with an error, as any program does.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -15,11 +16,11 @@ pub struct OpenWindow(());
 impl OpenWindow {
     /// `folder`: where the attempt is written to.
     pub fn with(folder: Option<&Path>) -> Self {
-        #[cfg(unix)]
-        {
-            static ONCE: std::sync::Once = std::sync::Once::new();
+        // Where there is no Xlib, no display of it goes down.
+        #[cfg(target_os = "linux")]
+        if let Ok(xlib) = x11_dl::xlib::Xlib::open() {
             // SAFETY: the function has the signature that is wanted, and lives as long as the program.
-            ONCE.call_once(|| _ = unsafe { libc::atexit(tell) });
+            unsafe { (xlib.XSetIOErrorHandler)(Some(tell)) };
         }
         let window = OpenWindow(());
         window.writes_to(folder);
@@ -38,19 +39,20 @@ impl Drop for OpenWindow {
     }
 }
 
-/// Runs when the program ends; with a window still open nobody has closed it.
-#[cfg(unix)]
-extern "C" fn tell() {
+/// Called by Xlib before it ends the program.
+#[cfg(target_os = "linux")]
+unsafe extern "C" fn tell(_: *mut x11_dl::xlib::Display) -> std::os::raw::c_int {
     use std::io::Write;
     // Whoever holds the lock has been stopped in the middle.
-    let Ok(open) = OPEN.try_lock() else { return };
+    let Ok(open) = OPEN.try_lock() else { return 0 };
     if let Some(folder) = &*open {
         // A panic must not leave this function.
         let _ = writeln!(std::io::stderr(), "{}", message(folder.as_deref()));
     }
+    0
 }
 
-#[cfg(any(unix, test))]
+#[cfg(any(target_os = "linux", test))]
 fn message(folder: Option<&Path>) -> String {
     let kept = match folder {
         Some(folder) => format!(
