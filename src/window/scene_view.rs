@@ -181,28 +181,12 @@ impl SceneView {
         };
         let backdrop = pipeline("backdrop_corner", "backdrop_colour", 0, &[], None);
         let tissue_vertex = if parts { "parted_corner" } else { "tissue_corner" };
-        let tissue = pipeline(
-            tissue_vertex,
-            "tissue_colour",
-            size_of::<TissueCorner>(),
-            &wgpu::vertex_attr_array![0 => Uint32x2, 1 => Float32],
+        let of_tissue = |fragment| {
+            let attributes = wgpu::vertex_attr_array![0 => Uint32x2, 1 => Float32];
             // The tissue is closed, its faces look outwards.
-            Some(wgpu::Face::Back),
-        );
-        let veil = pipeline(
-            tissue_vertex,
-            "veil_colour",
-            size_of::<TissueCorner>(),
-            &wgpu::vertex_attr_array![0 => Uint32x2, 1 => Float32],
-            Some(wgpu::Face::Back),
-        );
-        let layer_veil = pipeline(
-            tissue_vertex,
-            "layer_colour",
-            size_of::<TissueCorner>(),
-            &wgpu::vertex_attr_array![0 => Uint32x2, 1 => Float32],
-            Some(wgpu::Face::Back),
-        );
+            pipeline(tissue_vertex, fragment, size_of::<TissueCorner>(), &attributes, Some(wgpu::Face::Back))
+        };
+        let [tissue, veil, layer_veil] = ["tissue_colour", "veil_colour", "layer_colour"].map(of_tissue);
         let tool = pipeline(
             "tool_corner",
             "tool_colour",
