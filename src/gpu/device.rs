@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use super::kernel::KernelCache;
+use super::texels::{Access, rewritten};
 use super::workers::Threads;
 use crate::error::{Error, Result};
 
@@ -16,6 +17,8 @@ pub struct Gpu {
     pub failure: Arc<Mutex<Option<String>>>,
     /// What was compiled for this device so far.
     pub kernels: KernelCache,
+    /// Whether arrays lie in textures, see [`super::texels`]; engines that are made later follow it.
+    pub texels: bool,
 }
 
 /// One line about an adapter.
@@ -141,7 +144,8 @@ impl Gpu {
                 note(format!("lost ({reason:?}): {text}"));
             }
         });
-        Ok(Gpu { device, queue, info, failure, kernels: KernelCache::default() })
+        let texels = info.name.contains("llvmpipe");
+        Ok(Gpu { device, queue, info, failure, kernels: KernelCache::default(), texels })
     }
 
     /// Opens the first adapter of an instance that can draw on a surface; `WGPU_ADAPTER_NAME` names another.
@@ -188,6 +192,11 @@ impl Gpu {
         receiver.recv().map_err(|e| failed(e.to_string()))?.map_err(|e| failed(e.to_string()))?;
         let view = staging.get_mapped_range(..).map_err(|e| failed(e.to_string()))?;
         Ok(view.to_vec())
+    }
+
+    /// The source of a shader that draws from arrays of an engine on this device.
+    pub fn drawing(&self, source: &str) -> std::borrow::Cow<'static, str> {
+        if self.texels { rewritten(source, Access::Sampled).into() } else { source.to_string().into() }
     }
 
     /// True for a software adapter.

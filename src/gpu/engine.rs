@@ -9,9 +9,11 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::device::Gpu;
-use super::kernel::{Compiled, Kernel, MeshNumbers, STEP_INPUT};
+use super::kernel::{BindingKind, Compiled, Kernel, MeshNumbers, STEP_INPUT};
 use super::layout::Layout;
+use super::memory::Memory;
 use super::structs::*;
+use super::texels::Texels;
 use crate::effects::EffectSet;
 use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
@@ -183,7 +185,7 @@ pub struct GpuEngine {
     layout: Layout,
     dt: f64,
     kernels: Vec<Kernel>,
-    buffers: BTreeMap<&'static str, wgpu::Buffer>,
+    buffers: BTreeMap<&'static str, Memory>,
     results: Vec<ResultRange>,
     staging: Vec<wgpu::Buffer>,
     in_flight: VecDeque<InFlight>,
@@ -220,7 +222,7 @@ impl GpuEngine {
         // Composing, validating and compiling go side by side: they are most of the time to the first step.
         let compiled = stages(&model.effects, &features)
             .into_par_iter()
-            .map(|stage| gpu.kernels.compiled(&gpu.device, stage, &defines, &numbers))
+            .map(|stage| gpu.kernels.compiled(&gpu.device, stage, &defines, &numbers, gpu.texels))
             .collect::<Result<Vec<Arc<Compiled>>>>()?;
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let mut buffers = BTreeMap::new();
@@ -236,8 +238,8 @@ impl GpuEngine {
                 continue;
             }
             let contents = contents(name, &model, &layout, dt, measure_threads, max_steps);
-            let buffer = create_buffer(&gpu, name, &contents, binding.uniform)?;
-            bytes += buffer.size();
+            let buffer = allocate(&gpu, name, &contents, binding.kind)?;
+            bytes += buffer.device_bytes();
             buffers.insert(*name, buffer);
         }
         // What a shader writes and a later step may read; sums of a frame are written whole.
@@ -314,8 +316,8 @@ impl GpuEngine {
         &self.gpu
     }
 
-    /// A buffer by the name of its shader variable.
-    pub fn buffer(&self, name: &str) -> Option<&wgpu::Buffer> {
+    /// An array by the name of its shader variable.
+    pub fn memory(&self, name: &str) -> Option<&Memory> {
         self.buffers.get(name)
     }
 
@@ -329,7 +331,7 @@ impl GpuEngine {
 
     /// Names and sizes of all device buffers [bytes].
     pub fn buffer_sizes(&self) -> Vec<(&'static str, u64)> {
-        self.buffers.iter().map(|(n, b)| (*n, b.size())).collect()
+        self.buffers.iter().map(|(n, b)| (*n, b.device_bytes())).collect()
     }
 
     /// Wall and process CPU time of one dispatch of every stage [s], each repeated `repeats` times by itself. The state
@@ -500,7 +502,7 @@ impl GpuEngine {
     /// Copies buffers to the host; waits for everything under way.
     fn read_buffers(&mut self, names: &[&'static str]) -> Result<Vec<Vec<u8>>> {
         while self.collect_oldest(true)? {}
-        let wanted: Vec<&wgpu::Buffer> = names.iter().map(|n| &self.buffers[n]).collect();
+        let wanted: Vec<&Memory> = names.iter().map(|n| &self.buffers[n]).collect();
         let total = wanted.iter().map(|b| b.size()).sum();
         let staging = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("state"),
@@ -511,7 +513,7 @@ impl GpuEngine {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let mut offset = 0;
         for buffer in &wanted {
-            encoder.copy_buffer_to_buffer(buffer, 0, &staging, offset, buffer.size());
+            buffer.encode_copy(&mut encoder, (0, buffer.size()), (&staging, offset));
             offset += buffer.size();
         }
         self.gpu.queue.submit([encoder.finish()]);
@@ -829,14 +831,14 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
     }
 }
 
-fn create_buffer(gpu: &Gpu, name: &str, contents: &Contents, uniform: bool) -> Result<wgpu::Buffer> {
+fn allocate(gpu: &Gpu, name: &str, contents: &Contents, kind: BindingKind) -> Result<Memory> {
     let size = match contents {
         Contents::Bytes(bytes) => bytes.len() as u64,
         Contents::Zeros(size) => *size,
     }
     .next_multiple_of(4)
     .max(4);
-    let limit = gpu.device.limits().max_storage_buffer_binding_size;
+    let limit = gpu.device.limits().max_storage_buffer_binding_size.min(Texels::LARGEST);
     if size > limit {
         return Err(Error::input(
             format!(
@@ -847,17 +849,23 @@ fn create_buffer(gpu: &Gpu, name: &str, contents: &Contents, uniform: bool) -> R
             "choose a larger cell_size_mm or a smaller block, or --engine cpu",
         ));
     }
-    let kind = if uniform { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(name),
-        size,
-        usage: kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-        mapped_at_creation: false,
-    });
+    let buffer = |usage| {
+        Memory::Buffer(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(name),
+            size,
+            usage: usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        }))
+    };
+    let memory = match kind {
+        BindingKind::Uniform => buffer(wgpu::BufferUsages::UNIFORM),
+        BindingKind::Storage => buffer(wgpu::BufferUsages::STORAGE),
+        BindingKind::Texels(format) => Memory::Texels(Texels::new(&gpu.device, name, size, format)),
+    };
     if let Contents::Bytes(bytes) = contents {
-        gpu.queue.write_buffer(&buffer, 0, bytes);
+        memory.write(&gpu.queue, bytes);
     }
-    Ok(buffer)
+    Ok(memory)
 }
 
 /// Cells at rest with the slots of their forces.
@@ -1321,10 +1329,10 @@ impl Engine for GpuEngine {
         if let Some(buffer) = self.buffers.get(STEP_INPUT) {
             let numbered = (plan.first_step..).zip(&plan.steps);
             let inputs: Vec<StepInput> = numbered.map(|(n, s)| step_input(s, n, self.dt)).collect();
-            self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&inputs));
+            buffer.write(&self.gpu.queue, bytemuck::cast_slice(&inputs));
         }
         if let (Some(buffer), Some(line)) = (self.buffers.get("centre_line"), &plan.centre_line) {
-            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&centre_line(line)));
+            buffer.write(&self.gpu.queue, bytemuck::bytes_of(&centre_line(line)));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {
@@ -1340,7 +1348,7 @@ impl Engine for GpuEngine {
         let slot = (0..RING).find(|s| self.in_flight.iter().all(|f| f.slot != *s)).unwrap_or(0);
         for range in &self.results {
             let source = &self.buffers[range.name];
-            encoder.copy_buffer_to_buffer(source, range.from, &self.staging[slot], range.offset, range.size);
+            source.encode_copy(&mut encoder, (range.from, range.size), (&self.staging[slot], range.offset));
         }
         let submission = self.gpu.queue.submit([encoder.finish()]);
         let mapped = map_for_reading(&self.staging[slot]);
@@ -1393,7 +1401,7 @@ impl Engine for GpuEngine {
         }
         let state = if viscous { Some(self.read_state()?) } else { None };
         for (buffer, bytes) in &writes {
-            self.gpu.queue.write_buffer(buffer, 0, bytes);
+            buffer.write(&self.gpu.queue, bytes);
         }
         (self.model, self.dt) = (model, dt);
         if let Some(state) = state {
@@ -1514,7 +1522,7 @@ impl Engine for GpuEngine {
         let v: Vec<[f32; 4]> = state.velocity.iter().map(|v| vec4(*v)).collect();
         let write = |name: &str, bytes: &[u8]| {
             if let Some(buffer) = self.buffers.get(name) {
-                self.gpu.queue.write_buffer(buffer, 0, bytes);
+                buffer.write(&self.gpu.queue, bytes);
             }
         };
         write("node_displacement", bytemuck::cast_slice(&u));
@@ -1595,7 +1603,7 @@ impl Engine for GpuEngine {
             return Err(foreign_image("gpu", image));
         }
         for (name, bytes) in buffers {
-            self.gpu.queue.write_buffer(&self.buffers[name.as_str()], 0, bytes);
+            self.buffers[name.as_str()].write(&self.gpu.queue, bytes);
         }
         self.gravity_work = *gravity_work;
         if let Some((_, bytes)) = buffers.iter().find(|(name, _)| name == "node_displacement") {

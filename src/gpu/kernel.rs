@@ -6,6 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use super::compose::{Composed, compose};
+use super::memory::Memory;
+use super::texels::{Access, rewritten};
 use crate::error::{Error, Result};
 use crate::solver::step::Stage;
 
@@ -16,8 +18,35 @@ pub struct Binding {
     pub name: String,
     pub group: u32,
     pub binding: u32,
-    pub uniform: bool,
+    pub kind: BindingKind,
     pub writable: bool,
+}
+
+/// How a resource lies on the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BindingKind {
+    Uniform,
+    Storage,
+    /// A storage texture of this format, see [`super::texels`].
+    Texels(wgpu::TextureFormat),
+}
+
+impl Binding {
+    fn layout(&self) -> wgpu::BindingType {
+        let ty = match self.kind {
+            BindingKind::Uniform => wgpu::BufferBindingType::Uniform,
+            BindingKind::Storage => wgpu::BufferBindingType::Storage { read_only: !self.writable },
+            BindingKind::Texels(format) => {
+                let access = match self.writable {
+                    true => wgpu::StorageTextureAccess::ReadWrite,
+                    false => wgpu::StorageTextureAccess::ReadOnly,
+                };
+                let view_dimension = wgpu::TextureViewDimension::D2;
+                return wgpu::BindingType::StorageTexture { access, format, view_dimension };
+            }
+        };
+        wgpu::BindingType::Buffer { ty, has_dynamic_offset: self.name == STEP_INPUT, min_binding_size: None }
+    }
 }
 
 /// A stage composed and validated, without a device.
@@ -29,9 +58,17 @@ pub struct Reflected {
     pub workgroup_size: u32,
 }
 
-/// Composes and validates a stage and lists the resources that its entry point uses.
-pub fn reflect(stage: Stage, defines: &BTreeSet<&'static str>) -> Result<Reflected> {
-    validated(stage, compose(&format!("stages/{}", stage.name()), defines)?)
+/// Composes and validates a stage and lists the resources that its entry point uses; `texels`: with arrays in textures.
+pub fn reflect(stage: Stage, defines: &BTreeSet<&'static str>, texels: bool) -> Result<Reflected> {
+    validated(stage, composed(stage, defines, texels)?)
+}
+
+fn composed(stage: Stage, defines: &BTreeSet<&'static str>, texels: bool) -> Result<Composed> {
+    let mut composed = compose(&format!("stages/{}", stage.name()), defines)?;
+    if texels {
+        composed.source = rewritten(&composed.source, Access::Storage);
+    }
+    Ok(composed)
 }
 
 fn validated(stage: Stage, composed: Composed) -> Result<Reflected> {
@@ -56,19 +93,30 @@ fn validated(stage: Stage, composed: Composed) -> Result<Reflected> {
         .filter(|(handle, _)| !used[*handle].is_empty())
         .filter_map(|(_, variable)| {
             let at = variable.binding.as_ref()?;
-            let writable = matches!(variable.space,
-                naga::AddressSpace::Storage { access } if access.contains(naga::StorageAccess::STORE));
-            Some(Binding {
-                name: variable.name.clone().unwrap_or_default(),
-                group: at.group,
-                binding: at.binding,
-                uniform: variable.space == naga::AddressSpace::Uniform,
-                writable,
-            })
+            let stores = |access: naga::StorageAccess| access.contains(naga::StorageAccess::STORE);
+            let (kind, writable) = match (variable.space, &module.types[variable.ty].inner) {
+                (naga::AddressSpace::Uniform, _) => (BindingKind::Uniform, false),
+                (_, naga::TypeInner::Image { class: naga::ImageClass::Storage { format, access }, .. }) => {
+                    (BindingKind::Texels(texel_format(*format)?), stores(*access))
+                }
+                (naga::AddressSpace::Storage { access }, _) => (BindingKind::Storage, stores(access)),
+                _ => return None,
+            };
+            let name = variable.name.clone().unwrap_or_default();
+            Some(Binding { name, group: at.group, binding: at.binding, kind, writable })
         })
         .collect();
     let workgroup_size = module.entry_points[entry].workgroup_size.iter().product();
     Ok(Reflected { stage, composed, module, bindings, workgroup_size })
+}
+
+fn texel_format(format: naga::StorageFormat) -> Option<wgpu::TextureFormat> {
+    match format {
+        naga::StorageFormat::R32Float => Some(wgpu::TextureFormat::R32Float),
+        naga::StorageFormat::R32Sint => Some(wgpu::TextureFormat::R32Sint),
+        naga::StorageFormat::R32Uint => Some(wgpu::TextureFormat::R32Uint),
+        _ => None,
+    }
 }
 
 /// Values of the constants that a shader leaves open (`override`), by name: shaders/shared/mesh_numbers.wgsl.
@@ -102,14 +150,7 @@ impl Compiled {
         let entry = |(binding, b): (u32, &Binding)| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: match b.uniform {
-                    true => wgpu::BufferBindingType::Uniform,
-                    false => wgpu::BufferBindingType::Storage { read_only: !b.writable },
-                },
-                has_dynamic_offset: b.name == STEP_INPUT,
-                min_binding_size: None,
-            },
+            ty: b.layout(),
             count: None,
         };
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..).zip(&bindings).map(entry).collect();
@@ -155,7 +196,7 @@ type KernelKey = (&'static str, String, MeshNumbers);
 pub struct KernelCache(Arc<Mutex<BTreeMap<KernelKey, Arc<Compiled>>>>);
 
 impl KernelCache {
-    /// The kernel of a stage with these defines, for a mesh with these numbers.
+    /// The kernel of a stage with these defines, for a mesh with these numbers; `texels`: with arrays in textures.
     ///
     /// # Errors
     /// `Error::Shader` for a source that does not validate.
@@ -165,8 +206,9 @@ impl KernelCache {
         stage: Stage,
         defines: &BTreeSet<&'static str>,
         numbers: &MeshNumbers,
+        texels: bool,
     ) -> Result<Arc<Compiled>> {
-        let composed = compose(&format!("stages/{}", stage.name()), defines)?;
+        let composed = composed(stage, defines, texels)?;
         let key = (stage.name(), composed.source.clone(), numbers.clone());
         let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = lock().get(&key) {
@@ -196,23 +238,21 @@ impl Kernel {
     pub fn new(
         device: &wgpu::Device,
         compiled: Arc<Compiled>,
-        buffers: &BTreeMap<&'static str, wgpu::Buffer>,
+        buffers: &BTreeMap<&'static str, Memory>,
         step_input_size: u64,
         threads: u32,
     ) -> Result<Self> {
         let stage = compiled.stage;
-        let mut entries = Vec::new();
-        for (binding, b) in (0..).zip(&compiled.bindings) {
-            let buffer = buffers.get(b.name.as_str()).ok_or_else(|| Error::Shader {
+        let mut bound = Vec::new();
+        for b in &compiled.bindings {
+            let memory = buffers.get(b.name.as_str()).ok_or_else(|| Error::Shader {
                 stage: stage.name().into(),
                 message: format!("no buffer for binding `{}`", b.name),
             })?;
-            let size = (b.name == STEP_INPUT).then_some(step_input_size).and_then(wgpu::BufferSize::new);
-            entries.push(wgpu::BindGroupEntry {
-                binding,
-                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size }),
-            });
+            bound.push(memory.bound((b.name == STEP_INPUT).then_some(step_input_size)));
         }
+        let entries: Vec<wgpu::BindGroupEntry> =
+            (0..).zip(&bound).map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.resource() }).collect();
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(stage.name()),
             layout: &compiled.group_layout,

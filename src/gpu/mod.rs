@@ -5,8 +5,11 @@ pub mod device;
 pub mod engine;
 pub mod kernel;
 mod layout;
+mod memory;
 pub mod structs;
+pub mod texels;
 mod workers;
 
 pub use device::Gpu;
 pub use engine::GpuEngine;
+pub use memory::{Bound, Memory};

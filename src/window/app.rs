@@ -29,7 +29,7 @@ use super::texts;
 use super::tool_shape::{self, ToolPlace};
 use super::tuning::{Pace, Source};
 use super::watch::Watch;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, Memory};
 use crate::gpu::compose::{SOURCES, read_sources};
 use crate::haptic::LoopTiming;
 use crate::scene::Scene;
@@ -886,7 +886,7 @@ impl Open {
             return Ok(());
         }
         let Some(engine) = self.practice.simulation.engine().on_device() else { return Ok(()) };
-        let Some(buffer) = engine.buffer("drawn_nodes") else { return Ok(()) };
+        let Some(buffer) = engine.memory("drawn_nodes").and_then(Memory::buffer) else { return Ok(()) };
         let bytes = self.gpu.read_back(buffer)?;
         let lane = scale.field as usize;
         let mut values: Vec<f32> =

@@ -7,7 +7,7 @@ use super::appearance::{ColourMap, Look};
 use super::camera::Camera;
 use super::section::{self, Outline, RestPlane, TissueCorner};
 use super::tool_shape::ToolCorner;
-use crate::gpu::{Gpu, GpuEngine};
+use crate::gpu::{Bound, Gpu, GpuEngine};
 use crate::model::Model;
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -139,7 +139,7 @@ impl SceneView {
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("tissue"),
-            source: wgpu::ShaderSource::Wgsl(if parts { format!("{SHADER}{PARTED}").into() } else { SHADER.into() }),
+            source: wgpu::ShaderSource::Wgsl(gpu.drawing(&if parts { format!("{SHADER}{PARTED}") } else { SHADER.into() })),
         });
         let pipeline = |vertex: &str, fragment: &str, stride: usize, attributes: &[wgpu::VertexAttribute], cull| {
             let buffers = [Some(wgpu::VertexBufferLayout {
@@ -202,13 +202,12 @@ impl SceneView {
         let map = ColourMap::default();
         let table = filled("colour_table", bytemuck::cast_slice(&colour_table(map)), uniform);
         let (rest, copies) = mesh_buffers(device, model);
-        let [displacement, fields] = drawn_buffers(engine)?;
-        let mut buffers = vec![&view, &table, displacement, &rest, fields];
-        buffers.extend(&copies);
-        let tissue_bindings = bindings(device, &tissue, &buffers);
-        let veil_bindings = bindings(device, &veil, &buffers);
-        let layer_bindings = bindings(device, &layer_veil, &buffers);
-        let tool_bindings = bindings(device, &tool, &[&view]);
+        let drawn = drawn_arrays(engine)?;
+        let resources = tissue_resources(&view, &table, &drawn, &rest, copies.as_ref());
+        let tissue_bindings = bindings(device, &tissue, &resources);
+        let veil_bindings = bindings(device, &veil, &resources);
+        let layer_bindings = bindings(device, &layer_veil, &resources);
+        let tool_bindings = bindings(device, &tool, &[view.as_entire_binding()]);
         let nothing = || {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: None,
@@ -269,12 +268,11 @@ impl SceneView {
     /// # Errors
     /// `Error::Device` where it was not made to be drawn.
     pub fn take_buffers(&mut self, gpu: &Gpu, engine: &GpuEngine) -> Result<()> {
-        let [displacement, fields] = drawn_buffers(engine)?;
-        let mut buffers = vec![&self.view, &self.table, displacement, &self.rest, fields];
-        buffers.extend(&self.copies);
-        self.tissue_bindings = bindings(&gpu.device, &self.tissue, &buffers);
-        self.veil_bindings = bindings(&gpu.device, &self.veil, &buffers);
-        self.layer_bindings = bindings(&gpu.device, &self.layer_veil, &buffers);
+        let drawn = drawn_arrays(engine)?;
+        let resources = tissue_resources(&self.view, &self.table, &drawn, &self.rest, self.copies.as_ref());
+        self.tissue_bindings = bindings(&gpu.device, &self.tissue, &resources);
+        self.veil_bindings = bindings(&gpu.device, &self.veil, &resources);
+        self.layer_bindings = bindings(&gpu.device, &self.layer_veil, &resources);
         Ok(())
     }
 
@@ -390,22 +388,36 @@ impl SceneView {
 }
 
 /// Displacements and fields of an engine that was made to be drawn.
-fn drawn_buffers(engine: &GpuEngine) -> Result<[&wgpu::Buffer; 2]> {
+fn drawn_arrays(engine: &GpuEngine) -> Result<[Bound<'_>; 2]> {
     let of_engine = |name: &str| {
-        engine.buffer(name).ok_or_else(|| Error::Device(format!("the engine was not made to be drawn: no {name}")))
+        let memory = engine.memory(name).map(|memory| memory.bound(None));
+        memory.ok_or_else(|| Error::Device(format!("the engine was not made to be drawn: no {name}")))
     };
     Ok([of_engine("node_displacement")?, of_engine("drawn_nodes")?])
 }
 
-/// Binds buffers in the order of the shader.
+/// What the tissue is drawn from, in the order of the shader.
+fn tissue_resources<'a>(
+    view: &'a wgpu::Buffer,
+    table: &'a wgpu::Buffer,
+    [displacement, fields]: &'a [Bound<'_>; 2],
+    rest: &'a wgpu::Buffer,
+    copies: Option<&'a wgpu::Buffer>,
+) -> Vec<wgpu::BindingResource<'a>> {
+    let own = |buffer: &'a wgpu::Buffer| buffer.as_entire_binding();
+    let first = [own(view), own(table), displacement.resource(), own(rest), fields.resource()];
+    first.into_iter().chain(copies.map(own)).collect()
+}
+
+/// Binds resources in the order of the shader.
 pub(super) fn bindings(
     device: &wgpu::Device,
     pipeline: &wgpu::RenderPipeline,
-    buffers: &[&wgpu::Buffer],
+    resources: &[wgpu::BindingResource],
 ) -> wgpu::BindGroup {
     let entries: Vec<wgpu::BindGroupEntry> = (0..)
-        .zip(buffers)
-        .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+        .zip(resources)
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
         .collect();
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,

@@ -347,7 +347,7 @@ impl Ultrasound {
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("ultrasound"),
-            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+            source: wgpu::ShaderSource::Wgsl(gpu.drawing(SHADER)),
         });
         let pipeline = |[vertex, fragment]: [&str; 2], stride: usize, attributes: &[wgpu::VertexAttribute], blend| {
             let buffers = [Some(wgpu::VertexBufferLayout {
@@ -418,12 +418,14 @@ impl Ultrasound {
             (0..mesh.node_count()).map(|node| mesh.rest_position(node).as_vec3().extend(0.0).into()).collect();
         let rest = filled("node_rest", bytemuck::cast_slice(&rest), wgpu::BufferUsages::STORAGE);
         let displacement = engine
-            .buffer("node_displacement")
+            .memory("node_displacement")
+            .map(|memory| memory.bound(None))
             .ok_or_else(|| Error::Device("the engine has no buffer node_displacement".into()))?;
+        let [of_slice, of_table, of_rest] = [&slice, &table, &rest].map(wgpu::Buffer::as_entire_binding);
         let bindings = [
-            bindings(device, &tissue, &[&slice, &table, displacement, &rest]),
-            bindings(device, &shadow, &[&slice]),
-            bindings(device, &needle, &[&slice]),
+            bindings(device, &tissue, &[of_slice.clone(), of_table, displacement.resource(), of_rest]),
+            bindings(device, &shadow, &[of_slice.clone()]),
+            bindings(device, &needle, &[of_slice]),
         ];
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("ultrasound"),

@@ -93,7 +93,7 @@ fn reflected(set: &EffectSet, features: &Features) -> Vec<Reflected> {
     let defines = defines(set, features);
     stages(set, features)
         .into_iter()
-        .map(|stage| reflect(stage, &defines).unwrap_or_else(|e| panic!("{:?} {features:?}: {e}", set.keys())))
+        .map(|stage| reflect(stage, &defines, false).unwrap_or_else(|e| panic!("{:?} {features:?}: {e}", set.keys())))
         .collect()
 }
 
@@ -120,7 +120,7 @@ fn everything() -> &'static [(String, Reflected)] {
         texts
             .into_par_iter()
             .map(|(what, stage, defines)| {
-                let reflected = reflect(stage, &defines).unwrap_or_else(|e| panic!("{what}: {e}"));
+                let reflected = reflect(stage, &defines, false).unwrap_or_else(|e| panic!("{what}: {e}"));
                 (what, reflected)
             })
             .collect()
@@ -487,7 +487,7 @@ fn a_broken_stage_names_file_and_line() {
         assert_eq!(text.lines().nth(number.parse::<usize>().unwrap() - 1).unwrap(), line, "{place}");
     }
     // A define without the others that belong to it: `driven_faces` then names a step input that nobody imported.
-    let error = reflect(Stage::IntegrateNodes, &BTreeSet::from(["DRIVEN_FACES"])).err().unwrap().to_string();
+    let error = reflect(Stage::IntegrateNodes, &BTreeSet::from(["DRIVEN_FACES"]), false).err().unwrap().to_string();
     assert!(error.contains("shaders/shared/driven_faces.wgsl:"), "{error}");
     let line: usize = error.split("driven_faces.wgsl:").nth(1).unwrap().split('\n').next().unwrap().parse().unwrap();
     let text = SOURCES.iter().find(|s| s.0 == "shared/driven_faces").unwrap().1;
