@@ -110,8 +110,6 @@ struct PathCell {
 @group(3) @binding(3) var<storage, read_write> path_cells: array<PathCell>;
 // Remaining stiffness per cell, 1 = intact.
 @group(3) @binding(0) var<storage, read_write> cell_stiffness: array<f32>;
-@group(3) @binding(1) var<storage, read_write> tip_state: TipState;
-@group(3) @binding(2) var<storage, read_write> tip_anchor_loads: array<TipAnchorLoad>;
 
 #ifdef BORE
 const ANCHOR_COUNT: u32 = 24u;

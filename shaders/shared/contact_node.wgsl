@@ -43,13 +43,17 @@ struct Contact {
     share: f32,
 }
 
-// What a contact node remembers, as it lies in the buffer; see `Memory`.
-struct ContactMemory {
+// What a contact node remembers, as it lies in the buffer, see `Memory`; and what it sums over the steps of a frame, see `ContactSums`.
+struct ContactRecord {
     stick: vec4<f32>,
     // overlap, axial_on, touching, on_shaft
     touch: vec4<f32>,
     // passed, rest_radius; z, w unused
     path: vec4<f32>,
+    impulse: vec4<f32>,
+    angular_impulse: vec4<f32>,
+    parts: vec4<f32>,
+    energies: vec4<f32>,
 }
 
 // What a contact node remembers.
@@ -88,9 +92,10 @@ struct StepSums {
     stored: f32,
 }
 
+// How many there are.
+override CONTACT_COUNT: u32 = 1u;
 @group(1) @binding(4) var<storage, read> contact_nodes: array<ContactNode>;
-@group(3) @binding(4) var<storage, read_write> contact_memory: array<ContactMemory>;
-@group(3) @binding(5) var<storage, read_write> contact_sums: array<ContactSums>;
+@group(3) @binding(4) var<storage, read_write> contact_records: array<ContactRecord>;
 
 fn contact_at(index: u32) -> Contact {
     let c = contact_nodes[index];
@@ -112,16 +117,14 @@ fn contact_at(index: u32) -> Contact {
 }
 
 fn remembered(index: u32) -> Memory {
-    let m = contact_memory[index];
+    let m = contact_records[index];
     return Memory(m.stick.xyz, m.touch.x, m.touch.y, m.touch.z, m.touch.w, m.path.x, m.path.y);
 }
 
 fn remember(index: u32, m: Memory) {
-    contact_memory[index] = ContactMemory(
-        vec4<f32>(m.stick, 0.0),
-        vec4<f32>(m.overlap, m.axial_on, m.touching, m.on_shaft),
-        vec4<f32>(m.passed, m.rest_radius, 0.0, 0.0),
-    );
+    contact_records[index].stick = vec4<f32>(m.stick, 0.0);
+    contact_records[index].touch = vec4<f32>(m.overlap, m.axial_on, m.touching, m.on_shaft);
+    contact_records[index].path = vec4<f32>(m.passed, m.rest_radius, 0.0, 0.0);
 }
 
 // Books one step of contact node `index`: tip, normal and tangential force, lever about the tip, and what else there is.
@@ -140,10 +143,10 @@ fn book_contact(
 #ifdef FREE_PATH
     power += dot(torque, angular_velocity());
 #endif
-    contact_sums[index].impulse += vec4<f32>(total * params.dt, 0.0);
-    contact_sums[index].angular_impulse += vec4<f32>(torque * params.dt + more.angular_impulse, 0.0);
-    contact_sums[index].parts += vec4<f32>(dot(tip, d), dot(normal, d), dot(tangential, d), more.shaft);
-    let before = contact_sums[index].energies.xyz;
+    contact_records[index].impulse += vec4<f32>(total * params.dt, 0.0);
+    contact_records[index].angular_impulse += vec4<f32>(torque * params.dt + more.angular_impulse, 0.0);
+    contact_records[index].parts += vec4<f32>(dot(tip, d), dot(normal, d), dot(tangential, d), more.shaft);
+    let before = contact_records[index].energies.xyz;
     let taken = vec3<f32>(power * params.dt + more.work, more.sliding_dissipation, more.damping_dissipation);
-    contact_sums[index].energies = vec4<f32>(before + taken, more.stored);
+    contact_records[index].energies = vec4<f32>(before + taken, more.stored);
 }

@@ -5,6 +5,7 @@
 #import shared/displacement
 #import shared/grid_lines
 #import effects/puncture
+#import shared/tip_written
 #import effects/free_path
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;

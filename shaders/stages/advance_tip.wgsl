@@ -5,6 +5,7 @@
 #import shared/displacement
 #import shared/grid_lines
 #import effects/puncture
+#import shared/tip_written
 #ifdef ADHESION
 #import effects/adhesion
 #endif

@@ -9,6 +9,7 @@
 #ifdef PUNCTURE
 #import shared/contact_node
 #import effects/puncture
+#import shared/tip_read
 #endif
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
@@ -45,7 +46,7 @@ fn cohesive_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     damage = max(damage, select(0.0, 1.0, backward && above));
 #endif
     // Where both copies lie on the full shaft the bond is gone.
-    damage = max(damage, contact_memory[pair.contacts.x].touch.w * contact_memory[pair.contacts.y].touch.w);
+    damage = max(damage, contact_records[pair.contacts.x].touch.w * contact_records[pair.contacts.y].touch.w);
 #endif
     let k = cohesive.penalty * pair.first_way_and_area.w;
     let closed = normal_opening < 0.0;

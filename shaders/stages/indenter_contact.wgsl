@@ -17,7 +17,7 @@
 @compute @workgroup_size(64)
 fn indenter_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let index = thread_index(id, groups);
-    if (index >= arrayLength(&contact_nodes)) {
+    if (index >= CONTACT_COUNT) {
         return;
     }
     let contact = contact_at(index);

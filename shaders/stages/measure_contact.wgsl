@@ -5,6 +5,7 @@
 #import shared/contact_node
 #ifdef PUNCTURE
 #import effects/puncture
+#import shared/tip_written
 #endif
 
 @group(3) @binding(6) var<storage, read_write> contact_totals: array<ContactSums, 64>;
@@ -27,23 +28,26 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
 #ifdef FLEXIBLE_NEEDLE
     // The loads are shared over the entries of the centre-line.
     var load = vec4<f32>(0.0);
-    for (var index = 0u; index < arrayLength(&contact_nodes); index++) {
+    for (var index = 0u; index < CONTACT_COUNT; index++) {
         let place = contact_nodes[index].rest.xyz
             + vec3<f32>(node_displacement[contact_nodes[index].numbers.x].xyz) * DISPLACEMENT_UNIT;
         let s = dot(step_input.tip.xyz - place, step_input.direction.xyz);
-        load += contact_sums[index].impulse * max(0.0, 1.0 - abs(centre_line_entry(s) - f32(lane)));
+        load += contact_records[index].impulse * max(0.0, 1.0 - abs(centre_line_entry(s) - f32(lane)));
     }
     needle_loads[lane] = load;
     storageBarrier();
 #endif
     var total: ContactSums;
-    for (var index = lane; index < arrayLength(&contact_nodes); index += 64u) {
-        let sums = contact_sums[index];
-        total.impulse += sums.impulse;
-        total.angular_impulse += sums.angular_impulse;
-        total.parts += sums.parts;
-        total.energies += sums.energies;
-        contact_sums[index] = ContactSums();
+    for (var index = lane; index < CONTACT_COUNT; index += 64u) {
+        let record = contact_records[index];
+        total.impulse += record.impulse;
+        total.angular_impulse += record.angular_impulse;
+        total.parts += record.parts;
+        total.energies += record.energies;
+        contact_records[index].impulse = vec4<f32>(0.0);
+        contact_records[index].angular_impulse = vec4<f32>(0.0);
+        contact_records[index].parts = vec4<f32>(0.0);
+        contact_records[index].energies = vec4<f32>(0.0);
     }
     contact_totals[lane] = total;
 #ifdef FREE_PATH

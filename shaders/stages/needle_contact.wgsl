@@ -8,6 +8,7 @@
 #import shared/corner_force
 #import shared/contact_node
 #import effects/puncture
+#import shared/tip_read
 #ifdef FRICTION
 #import effects/friction
 #endif
@@ -54,7 +55,7 @@ fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> FreeCo
     let ahead = dot(relative, T);
     let radius = length(relative - T * ahead);
     let ring = puncture.ring_radius;
-    let known = contact_memory[index].path;
+    let known = contact_records[index].path;
     let old = known.x == 1.0;
     // The dimple before the puncture is no opened path.
     let passes = free_tip.coordinate > 0.0 && ahead <= 0.0 && ahead > -ring && radius < ring;
@@ -110,7 +111,7 @@ fn overlap_of(
 @compute @workgroup_size(64)
 fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let index = thread_index(id, groups);
-    if (index >= arrayLength(&contact_nodes)) {
+    if (index >= CONTACT_COUNT) {
         return;
     }
     let contact = contact_at(index);
@@ -243,13 +244,13 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         book_contact(index, tip, normal, tangential, lever, sums);
     }
     // A node that the needle has left forgets.
-    for (var once = select(0u, 1u, passed); once == 0u && contact_memory[index].touch.z != 0.0; once++) {
+    for (var once = select(0u, 1u, passed); once == 0u && contact_records[index].touch.z != 0.0; once++) {
         var left = Memory();
 #ifdef FREE_PATH
-        left.passed = contact_memory[index].path.x;
-        left.rest_radius = contact_memory[index].path.y;
+        left.passed = contact_records[index].path.x;
+        left.rest_radius = contact_records[index].path.y;
 #endif
         remember(index, left);
-        contact_sums[index].energies.w = 0.0;
+        contact_records[index].energies = vec4<f32>(contact_records[index].energies.xyz, 0.0);
     }
 }

@@ -9,6 +9,7 @@
 #import shared/material_point
 #import shared/hexahedron_energy
 #import effects/puncture
+#import shared/tip_read
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;

@@ -67,6 +67,8 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/slit_contact", include_str!("../../shaders/shared/slit_contact.wgsl")),
     ("shared/tied_nodes", include_str!("../../shaders/shared/tied_nodes.wgsl")),
     ("shared/thread_index", include_str!("../../shaders/shared/thread_index.wgsl")),
+    ("shared/tip_read", include_str!("../../shaders/shared/tip_read.wgsl")),
+    ("shared/tip_written", include_str!("../../shaders/shared/tip_written.wgsl")),
     ("stages/advance_free_tip", include_str!("../../shaders/stages/advance_free_tip.wgsl")),
     ("stages/advance_tip", include_str!("../../shaders/stages/advance_tip.wgsl")),
     ("stages/average_pressure", include_str!("../../shaders/stages/average_pressure.wgsl")),

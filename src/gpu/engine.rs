@@ -13,7 +13,7 @@ use super::kernel::{BindingKind, Compiled, Kernel, MeshNumbers, STEP_INPUT};
 use super::layout::Layout;
 use super::memory::Memory;
 use super::structs::*;
-use super::texels::Texels;
+use super::texels::{Texels, texel_numbers};
 use crate::effects::EffectSet;
 use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
@@ -238,7 +238,10 @@ impl GpuEngine {
                 continue;
             }
             let contents = contents(name, &model, &layout, dt, measure_threads, max_steps);
-            let buffer = allocate(&gpu, name, &contents, binding.kind)?;
+            // One stage may read what another one writes.
+            let kinds: Vec<BindingKind> =
+                compiled.iter().flat_map(|r| &r.bindings).filter(|b| b.name == *name).map(|b| b.kind).collect();
+            let buffer = allocate(&gpu, name, &contents, &kinds)?;
             bytes += buffer.device_bytes();
             buffers.insert(*name, buffer);
         }
@@ -609,7 +612,7 @@ const DRAWN: [&str; 2] = ["drawn_cells", "drawn_nodes"];
 const PER_FRAME: [&str; 2] = [STEP_INPUT, "centre_line"];
 
 /// All buffers by the name of their shader variable.
-const BUFFERS: [&str; 57] = [
+const BUFFERS: [&str; 56] = [
     "cohesive",
     "face_pairs",
     "pair_states",
@@ -643,8 +646,7 @@ const BUFFERS: [&str; 57] = [
     "tip_anchor_loads",
     "free_tip",
     "free_cells",
-    "contact_memory",
-    "contact_sums",
+    "contact_records",
     "face_sums",
     "materials",
     "cell_material",
@@ -792,8 +794,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "tip_anchor_loads" => zeros(LARGEST_ANCHOR_COUNT as u64, size_of::<TipAnchorLoad>()),
         "free_tip" => bytes_of(&[free_tip(&model.free_tip())]),
         "free_cells" => bytes_of(&free_cells(model, &[])),
-        "contact_memory" => zeros(contacts, size_of::<ContactMemory>()),
-        "contact_sums" => zeros(contacts, size_of::<ContactSums>()),
+        "contact_records" => zeros(contacts, size_of::<ContactRecord>()),
         "face_sums" => zeros(6 * FACE_PARTS as u64, 16),
         "materials" => bytes_of(&per_material(model, |m| material(model, m))),
         "cell_material" => bytes_of(&model.cell_material.iter().map(|m| u32::from(*m)).collect::<Vec<_>>()),
@@ -831,7 +832,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
     }
 }
 
-fn allocate(gpu: &Gpu, name: &str, contents: &Contents, kind: BindingKind) -> Result<Memory> {
+fn allocate(gpu: &Gpu, name: &str, contents: &Contents, kinds: &[BindingKind]) -> Result<Memory> {
     let size = match contents {
         Contents::Bytes(bytes) => bytes.len() as u64,
         Contents::Zeros(size) => *size,
@@ -849,18 +850,20 @@ fn allocate(gpu: &Gpu, name: &str, contents: &Contents, kind: BindingKind) -> Re
             "choose a larger cell_size_mm or a smaller block, or --engine cpu",
         ));
     }
-    let buffer = |usage| {
+    let memory = if kinds.iter().any(|kind| matches!(kind, BindingKind::Texels | BindingKind::Sampled)) {
+        Memory::Texels(Texels::new(&gpu.device, name, size, texel_numbers(name)))
+    } else {
+        let usage = |kind: &BindingKind| match kind {
+            BindingKind::Uniform => wgpu::BufferUsages::UNIFORM,
+            _ => wgpu::BufferUsages::STORAGE,
+        };
+        let copied = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
         Memory::Buffer(gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(name),
             size,
-            usage: usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            usage: kinds.iter().map(usage).fold(copied, |all, usage| all | usage),
             mapped_at_creation: false,
         }))
-    };
-    let memory = match kind {
-        BindingKind::Uniform => buffer(wgpu::BufferUsages::UNIFORM),
-        BindingKind::Storage => buffer(wgpu::BufferUsages::STORAGE),
-        BindingKind::Texels(format) => Memory::Texels(Texels::new(&gpu.device, name, size, format)),
     };
     if let Contents::Bytes(bytes) = contents {
         memory.write(&gpu.queue, bytes);
@@ -923,6 +926,7 @@ fn mesh_numbers(model: &Model, layout: &Layout, measure_threads: u32) -> MeshNum
         ("CELL_COUNT", model.mesh.cell_count() as u32),
         ("NODE_COUNT", model.mesh.node_count() as u32),
         ("MEASURE_THREADS", measure_threads),
+        ("CONTACT_COUNT", model.contact_nodes.len().max(1) as u32),
     ]);
     const FIXED: [&str; 6] = ["FIXED_X_MIN", "FIXED_X_MAX", "FIXED_Y_MIN", "FIXED_Y_MAX", "FIXED_Z_MIN", "FIXED_Z_MAX"];
     for (name, face) in FIXED.into_iter().zip(model.faces()) {
@@ -1419,7 +1423,7 @@ impl Engine for GpuEngine {
             "tip_state",
             "free_tip",
             "free_cells",
-            "contact_memory",
+            "contact_records",
             "plastic_state",
             "viscous_state",
             "point_history",
@@ -1467,8 +1471,8 @@ impl Engine for GpuEngine {
                     let marked = |c: FreeCell| u64::from(c.marked_low) | u64::from(c.marked_high) << 32;
                     state.cut_samples = read_all::<FreeCell>(bytes).map(marked).collect();
                 }
-                "contact_memory" => {
-                    state.contact = read_all::<ContactMemory>(bytes)
+                "contact_records" => {
+                    state.contact = read_all::<ContactRecord>(bytes)
                         .map(|m| {
                             let [overlap, axial_on, touching, on_shaft] = m.touch;
                             let [passed, rest_radius, ..] = m.path;
@@ -1539,19 +1543,20 @@ impl Engine for GpuEngine {
         write("tip_state", bytemuck::bytes_of(&tip));
         write("free_tip", bytemuck::bytes_of(&free_tip(&state.tip)));
         write("free_cells", bytemuck::cast_slice(&free_cells(&self.model, &state.cut_samples)));
-        let memory: Vec<ContactMemory> = state
+        let memory: Vec<ContactRecord> = state
             .contact
             .iter()
             .map(|c| {
                 let one = |yes: bool| if yes { 1.0 } else { 0.0 };
-                ContactMemory {
+                ContactRecord {
                     stick: vec4(c.stick),
                     touch: [c.overlap as f32, c.axial_on as f32, one(c.touching), one(c.on_shaft)],
                     path: [one(c.passed), c.rest_radius as f32, 0.0, 0.0],
+                    ..Zeroable::zeroed()
                 }
             })
             .collect();
-        write("contact_memory", bytemuck::cast_slice(&memory));
+        write("contact_records", bytemuck::cast_slice(&memory));
         let pairs: Vec<PairState> =
             state.pairs.iter().map(|d| PairState { damage: *d as f32, ..Zeroable::zeroed() }).collect();
         write("pair_states", bytemuck::cast_slice(&pairs));

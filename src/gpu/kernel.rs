@@ -7,7 +7,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use super::compose::{Composed, compose};
 use super::memory::Memory;
-use super::texels::{Access, rewritten};
+use super::texels::{Access, format_of, rewritten};
 use crate::error::{Error, Result};
 use crate::solver::step::Stage;
 
@@ -27,8 +27,9 @@ pub struct Binding {
 pub enum BindingKind {
     Uniform,
     Storage,
-    /// A storage texture of this format, see [`super::texels`].
-    Texels(wgpu::TextureFormat),
+    /// A texture, see [`super::texels`]: one that can be written, or one that is sampled.
+    Texels,
+    Sampled,
 }
 
 impl Binding {
@@ -36,7 +37,15 @@ impl Binding {
         let ty = match self.kind {
             BindingKind::Uniform => wgpu::BufferBindingType::Uniform,
             BindingKind::Storage => wgpu::BufferBindingType::Storage { read_only: !self.writable },
-            BindingKind::Texels(format) => {
+            BindingKind::Sampled => {
+                return wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Uint,
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                };
+            }
+            BindingKind::Texels => {
+                let format = format_of(1);
                 let access = match self.writable {
                     true => wgpu::StorageTextureAccess::ReadWrite,
                     false => wgpu::StorageTextureAccess::ReadOnly,
@@ -96,9 +105,10 @@ fn validated(stage: Stage, composed: Composed) -> Result<Reflected> {
             let stores = |access: naga::StorageAccess| access.contains(naga::StorageAccess::STORE);
             let (kind, writable) = match (variable.space, &module.types[variable.ty].inner) {
                 (naga::AddressSpace::Uniform, _) => (BindingKind::Uniform, false),
-                (_, naga::TypeInner::Image { class: naga::ImageClass::Storage { format, access }, .. }) => {
-                    (BindingKind::Texels(texel_format(*format)?), stores(*access))
+                (_, naga::TypeInner::Image { class: naga::ImageClass::Storage { access, .. }, .. }) => {
+                    (BindingKind::Texels, stores(*access))
                 }
+                (_, naga::TypeInner::Image { .. }) => (BindingKind::Sampled, false),
                 (naga::AddressSpace::Storage { access }, _) => (BindingKind::Storage, stores(access)),
                 _ => return None,
             };
@@ -108,15 +118,6 @@ fn validated(stage: Stage, composed: Composed) -> Result<Reflected> {
         .collect();
     let workgroup_size = module.entry_points[entry].workgroup_size.iter().product();
     Ok(Reflected { stage, composed, module, bindings, workgroup_size })
-}
-
-fn texel_format(format: naga::StorageFormat) -> Option<wgpu::TextureFormat> {
-    match format {
-        naga::StorageFormat::R32Float => Some(wgpu::TextureFormat::R32Float),
-        naga::StorageFormat::R32Sint => Some(wgpu::TextureFormat::R32Sint),
-        naga::StorageFormat::R32Uint => Some(wgpu::TextureFormat::R32Uint),
-        _ => None,
-    }
 }
 
 /// Values of the constants that a shader leaves open (`override`), by name: shaders/shared/mesh_numbers.wgsl.

@@ -334,10 +334,14 @@ shared_structs! {
         ring_high: [u32; 4],
     }
     /// shaders/shared/contact_node.wgsl
-    struct ContactMemory {
+    struct ContactRecord {
         stick: [f32; 4],
         touch: [f32; 4],
         path: [f32; 4],
+        impulse: [f32; 4],
+        angular_impulse: [f32; 4],
+        parts: [f32; 4],
+        energies: [f32; 4],
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactSums {
