@@ -91,8 +91,9 @@ pub const SOURCES: &[(&str, &str)] = &[
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 19] = [
+pub const SCENE_DEFINES: [&str; 20] = [
     "TIED",
+    "CONTACT",
     "SLIT",
     "BORE",
     "FREE_PATH",
