@@ -7,7 +7,7 @@ struct ContactNode {
     rest: vec4<f32>,
     grid: vec4<u32>,
     surface: vec4<f32>,
-    // node, pushed, faces; w unused
+    // node, slot, pushed, faces
     numbers: vec4<u32>,
     // rest_radius, rest_axial, mass, share
     sizes: vec4<f32>,
@@ -25,6 +25,8 @@ struct Contact {
     // needle, -1 at its bore.
     surface: vec4<f32>,
     node: u32,
+    // Slot of `corner_force` that takes the force on this node.
+    slot: u32,
     // 1: pushed by the tool; 0: only carries forces of the tip.
     pushed: u32,
     // On a slit: faces around the node (bits: lower and higher along the first way, those again higher along the second), and the
@@ -104,6 +106,7 @@ fn contact_at(index: u32) -> Contact {
         c.numbers.x,
         c.numbers.y,
         c.numbers.z,
+        c.numbers.w,
         c.ring_low,
         c.ring_high,
         c.sizes.x,

@@ -6,13 +6,6 @@
 // x, y, z: force on the node [N]; w: bound of the stiffness there [N/m].
 @group(2) @binding(2) var<storage, read_write> corner_force: array<vec4<f32>>;
 
-#ifdef CONTACT
-// Behind them every node has a slot for what touches it: it is written in every step, by the stage of the contact.
-fn contact_slot(node: u32) -> u32 {
-    return STRIP_COUNT * (STRIP_LAYERS + 1u) * 4u * PADDED_COLUMNS + node;
-}
-#endif
-
 fn padded_column(i: u32, j: u32) -> u32 {
     return (j + 1u) * (CELLS_X + 2u) + i + 1u;
 }

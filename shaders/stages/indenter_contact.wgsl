@@ -60,6 +60,6 @@ fn indenter_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
         memory.touching = 0.0;
     }
     remember(index, memory);
-    corner_force[contact_slot(contact.node)] = vec4<f32>(normal + tangential, 0.0);
+    corner_force[contact.slot] += vec4<f32>(normal + tangential, 0.0);
     book_contact(index, vec3<f32>(0.0), normal, tangential, lever, sums);
 }

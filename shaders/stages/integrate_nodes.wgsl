@@ -48,12 +48,12 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let copies = tied.copies;
     var sum = vec4<f32>(0.0);
     for (var copy = 0u; copy < 4u && copies[copy] != NO_NODE; copy++) {
-        sum += gathered_force(copies[copy], node_place(copies[copy]));
+        sum += gathered_force(node_place(copies[copy]));
     }
     let scaled_mass = tied.whole_mass;
     let share = tied.mass / scaled_mass;
 #else
-    let sum = gathered_force(node, place);
+    let sum = gathered_force(place);
     let scaled_mass = node_mass[node];
 #endif
     var force = sum.xyz;

@@ -1,5 +1,5 @@
 // Stage needle_contact: nodes around the opened path are kept outside the needle, the shaft rubs, the tip pushes.
-// One thread per contact node, which has a slot of its own for its force: nothing is scattered.
+// One thread per contact node; adds to the corner-force slot that this node owns, so nothing is scattered.
 // Equations: src/effects/puncture.rs and CpuEngine::needle_contact.
 #import shared/params
 #import shared/thread_index
@@ -237,7 +237,9 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
 #ifdef FLEXIBLE_NEEDLE
     sums.work += dot(total, bend.rate) * params.dt;
 #endif
-    corner_force[contact_slot(contact.node)] = vec4<f32>(total, bound);
+    for (var once = select(1u, 0u, dot(total, total) > 0.0); once == 0u; once++) {
+        corner_force[contact.slot] += vec4<f32>(total, bound);
+    }
     for (var once = select(1u, 0u, passed || dot(total, total) > 0.0); once == 0u; once++) {
         book_contact(index, tip, normal, tangential, lever, sums);
     }

@@ -91,9 +91,8 @@ pub const SOURCES: &[(&str, &str)] = &[
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 20] = [
+pub const SCENE_DEFINES: [&str; 19] = [
     "TIED",
-    "CONTACT",
     "SLIT",
     "BORE",
     "FREE_PATH",

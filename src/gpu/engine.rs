@@ -119,7 +119,6 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     let separates = !features.tetrahedra && effects.cohesive.is_some() && effects.puncture.is_some();
     // Grid lines are doubled where faces may separate: copies that stay together move as one.
     define("TIED", !features.tetrahedra && effects.cohesive.is_some());
-    define("CONTACT", !features.tetrahedra && touched(effects));
     define("BORE", features.bore && separates);
     define("SLIT", features.slit && separates);
     define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
@@ -132,11 +131,6 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     define("INVARIANT_LAWS", features.laws.iter().any(|key| *key != "ogden"));
     define("SEVERAL_LAWS", features.laws.len() > 1);
     defines
-}
-
-/// True where a tool touches nodes.
-fn touched(effects: &EffectSet) -> bool {
-    effects.puncture.is_some() || effects.indentation.is_some()
 }
 
 /// The stages that a set of effects needs, in the order of the step.
@@ -753,7 +747,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "node_mass" => bytes_of(&model.node_mass.iter().map(|m| *m as f32).collect::<Vec<_>>()),
         "node_load" => bytes_of(&model.node_load.iter().map(|f| vec4(*f)).collect::<Vec<_>>()),
         "grid_lines" => bytes_of(&model.mesh.block().lines.iter().flatten().map(|x| *x as f32).collect::<Vec<_>>()),
-        "contact_nodes" => bytes_of(&contact_nodes(model)),
+        "contact_nodes" => bytes_of(&contact_nodes(model, layout)),
         "tip_anchors" => {
             let plan = model.puncture.as_ref();
             let anchors = plan.map_or(&[][..], |p| &p.anchors);
@@ -782,8 +776,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
             bytes_of(&cells)
         }
         "node_displacement" | "node_velocity" => zeros(nodes, 16),
-        // Cells on their corners, and what touches the nodes.
-        "corner_force" => zeros(layout.slot_count() + if touched(&model.effects) { nodes } else { 0 }, 16),
+        "corner_force" => zeros(layout.slot_count(), 16),
         "tetrahedra" => bytes_of(&tetrahedra(model, layout)),
         "mesh_nodes" => bytes_of(&mesh_nodes(model, layout)),
         "node_cells" => bytes_of(&layout.fours().cells),
@@ -1231,7 +1224,8 @@ fn tied_nodes(model: &Model) -> Vec<TiedNode> {
         .collect()
 }
 
-fn contact_nodes(model: &Model) -> Vec<ContactNode> {
+fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
+    let cells = model.mesh.block().cells();
     let mut nodes: Vec<ContactNode> = model
         .contact_nodes
         .iter()
@@ -1251,7 +1245,12 @@ fn contact_nodes(model: &Model) -> Vec<ContactNode> {
                     ContactSurface::OuterWall => [0.0, 0.0, 0.0, 1.0],
                     ContactSurface::Bore => [0.0, 0.0, 0.0, -1.0],
                 },
-                numbers: [c.node, c.pushed.into(), c.faces.map_or(0, |f| f.present), 0],
+                numbers: [
+                    c.node,
+                    layout.strips().owned_slot([i, j, k], cells),
+                    c.pushed.into(),
+                    c.faces.map_or(0, |f| f.present),
+                ],
                 sizes: [c.rest_radius, c.rest_axial, model.node_mass[node], c.share].map(|x| x as f32),
                 ring_low,
                 ring_high,
@@ -1388,16 +1387,11 @@ impl Engine for GpuEngine {
         let mut writes = Vec::new();
         for (name, buffer) in &self.buffers {
             // Cells of the path count what they lose; between frames that has been told.
-            let state = self.kept.contains(name) && !["path_cells", "corner_force"].contains(name);
+            let state = self.kept.contains(name) && *name != "path_cells";
             if state || FRAME_RESULTS.contains(name) || DRAWN.contains(name) || PER_FRAME.contains(name) {
                 continue;
             }
-            // What touched a node before may not be there any more.
-            let found = match contents(name, &model, &self.layout, dt, measured, self.max_steps) {
-                Contents::Zeros(size) if *name == "corner_force" => Contents::Bytes(vec![0; size as usize]),
-                found => found,
-            };
-            if let Contents::Bytes(bytes) = found {
+            if let Contents::Bytes(bytes) = contents(name, &model, &self.layout, dt, measured, self.max_steps) {
                 if (bytes.len() as u64).next_multiple_of(4).max(4) != buffer.size() {
                     return Ok(false);
                 }

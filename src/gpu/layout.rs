@@ -92,6 +92,13 @@ impl Strips {
         ((strip * (self.layers + 1) + k - strip * self.layers) * 4 + corner) * self.padded_columns + column
     }
 
+    /// A slot of node (i, j, k) that the element stage writes in every step.
+    pub fn owned_slot(&self, [i, j, k]: [usize; 3], cells: [usize; 3]) -> u32 {
+        let strip = ((k as u32) / self.layers).min(self.count - 1);
+        let (right, back) = (u32::from(i == cells[0]), u32::from(j == cells[1]));
+        self.slot(strip, k as u32, right + 2 * back, i as u32 - right, j as u32 - back)
+    }
+
     /// A slot of node (i, j, k) for a pair across the given axis. Stages that work on pairs of different axes at one node
     /// find different slots: the other column along x for axis y, along y for axis z.
     pub fn pair_slot(&self, [i, j, k]: [usize; 3], cells: [usize; 3], axis: usize) -> u32 {
