@@ -2,9 +2,13 @@
 
 mod common;
 
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
+use stylet::gpu::Gpu;
+use stylet::scene::Scene;
+use stylet::solver::simulation::Simulation;
 
 /// `compare-adapters` of a scene of the repository with these variables of the environment; the table as JSON.
 fn compared(scene: &str, overrides: &[&str], variables: &[(&str, &str)]) -> Value {
@@ -97,6 +101,36 @@ fn wrong_scenes_are_refused() {
         .unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty() && String::from_utf8_lossy(&output.stderr).contains("way out"));
+}
+
+/// Arrays in textures (src/gpu/texels.rs) are another place for the same numbers: not a bit of a force differs, whatever acts.
+#[test]
+fn arrays_in_textures_and_in_buffers_give_the_same_forces() {
+    let Some(gpu) = common::gpu() else { return };
+    for (file, overrides, frames) in [
+        ("scenes/muscle_biopsy.toml", &["tissue.cell_size_mm=1.2", "motion.phase.0.speed_mm_s=10.0"][..], 40),
+        ("scenes/lv2022/hollow.toml", &["motion.phase.0.speed_mm_s=10.0"], 10),
+        ("scenes/slit.toml", &["motion.phase.0.speed_mm_s=10.0"], 10),
+        ("scenes/free_hand/entry_45.toml", &[], 20),
+        ("scenes/effects/indentation.toml", &[], 10),
+        ("scenes/validation/compression_30.toml", &[], 10),
+        ("scenes/layers.toml", &["motion.phase.0.speed_mm_s=10.0"], 20),
+    ] {
+        let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();
+        let run = |texels: bool| {
+            let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(file).as_path(), &overrides).unwrap();
+            let mut simulation = Simulation::on(scene, Some(Gpu { texels, ..gpu.clone() })).unwrap();
+            for _ in 0..frames {
+                simulation.next_frame().unwrap().unwrap();
+            }
+            simulation.engine().read_state().unwrap()
+        };
+        let (buffers, textures) = (run(false), run(true));
+        assert!(buffers.displacement.iter().any(|u| u.length() > 1e-6), "{file}: nothing moved");
+        assert_eq!(buffers.displacement, textures.displacement, "{file}");
+        assert_eq!(buffers.velocity, textures.velocity, "{file}");
+        assert_eq!(buffers.stiffness, textures.stiffness, "{file}");
+    }
 }
 
 /// Linux leaves two workers on one processor for long; each is given its own (src/gpu/workers.rs).

@@ -11,7 +11,8 @@ const ROW: u64 = 32768;
 
 /// Arrays that steps change: one number per texel, so that a shader may read and write them. At most four occur in one stage, as many
 /// storage textures as a portable device binds.
-pub const STATE: [&str; 5] = ["node_displacement", "node_velocity", "corner_force", "cell_stiffness", "contact_records"];
+pub const STATE: [&str; 5] =
+    ["node_displacement", "node_velocity", "corner_force", "cell_stiffness", "contact_records"];
 
 /// Arrays that no shader writes, in textures that are sampled: one vector per texel, or one number where the array has numbers.
 pub const CONSTANT: [&str; 10] = [
@@ -125,7 +126,9 @@ fn declaration(source: &str, line: &str, access: Access) -> Option<String> {
         // The texels of an entry lie in one row.
         (true, 0) => format!("vec2<u32>(n % {0}u * {per_entry}u, n / {0}u)", per_row / per_entry),
         (true, t) => format!("vec2<u32>(n % {0}u * {per_entry}u + {t}u, n / {0}u)", per_row / per_entry),
-        (false, t) => format!("vec2<u32>((n * {per_entry}u + {t}u) % {per_row}u, (n * {per_entry}u + {t}u) / {per_row}u)"),
+        (false, t) => {
+            format!("vec2<u32>((n * {per_entry}u + {t}u) % {per_row}u, (n * {per_entry}u + {t}u) / {per_row}u)")
+        }
     };
     let load = |m: &Member| {
         let bits = |lane: u64| format!("textureLoad({name}, {}{level})", texel(m.first + lane));
@@ -196,9 +199,9 @@ fn in_word(c: char) -> bool {
 
 /// Where the text indexes the array of this name.
 fn find_use(text: &str, name: &str) -> Option<usize> {
-    text.match_indices(name).map(|(at, _)| at).find(|at| {
-        !text[..*at].chars().next_back().is_some_and(in_word) && text[at + name.len()..].starts_with('[')
-    })
+    text.match_indices(name)
+        .map(|(at, _)| at)
+        .find(|at| !text[..*at].chars().next_back().is_some_and(in_word) && text[at + name.len()..].starts_with('['))
 }
 
 /// Where the bracket closes with which the text begins.
@@ -384,7 +387,9 @@ contact_records[i].touch += contact_records[j].touch.zzzz;
         let text = rewritten(SOURCE, Access::Storage);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), SOURCE.lines().count());
-        assert!(lines[6].starts_with("@group(2) @binding(1) var node_velocity: texture_storage_2d<r32uint, read_write>;"));
+        assert!(
+            lines[6].starts_with("@group(2) @binding(1) var node_velocity: texture_storage_2d<r32uint, read_write>;")
+        );
         assert!(lines[6].contains("fn node_velocity_put(n: u32, v: vec4<f32>)"));
         assert!(lines[7].contains("node_mass: texture_2d<u32>;") && !lines[7].contains("node_mass_put"));
         assert_eq!(lines[8], SOURCE.lines().nth(8).unwrap());

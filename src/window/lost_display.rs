@@ -7,10 +7,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// While a window is open: where its attempt is written to, if anywhere.
+/// Once a window is open: where its attempt is written to, if anywhere. It stays so to the end: a driver may see first that the display
+/// is gone, and Xlib when the window is closed for that reason.
 static OPEN: Mutex<Option<Option<PathBuf>>> = Mutex::new(None);
 
-/// While it lives a window is open.
+/// A window has been opened.
 pub struct OpenWindow(());
 
 impl OpenWindow {
@@ -30,12 +31,6 @@ impl OpenWindow {
     /// The next attempt has a folder of its own.
     pub fn writes_to(&self, folder: Option<&Path>) {
         *OPEN.lock().unwrap_or_else(PoisonError::into_inner) = Some(folder.map(Path::to_path_buf));
-    }
-}
-
-impl Drop for OpenWindow {
-    fn drop(&mut self) {
-        *OPEN.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 }
 

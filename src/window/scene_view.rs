@@ -139,7 +139,11 @@ impl SceneView {
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("tissue"),
-            source: wgpu::ShaderSource::Wgsl(gpu.drawing(&if parts { format!("{SHADER}{PARTED}") } else { SHADER.into() })),
+            source: wgpu::ShaderSource::Wgsl(gpu.drawing(&if parts {
+                format!("{SHADER}{PARTED}")
+            } else {
+                SHADER.into()
+            })),
         });
         let pipeline = |vertex: &str, fragment: &str, stride: usize, attributes: &[wgpu::VertexAttribute], cull| {
             let buffers = [Some(wgpu::VertexBufferLayout {

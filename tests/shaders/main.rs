@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use stylet::effects::{EFFECTS, EffectSet, mass_scaling};
 use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose, compose_without_effects};
 use stylet::gpu::engine::{Features, LAWS, defines, stages};
-use stylet::gpu::kernel::{Reflected, reflect};
+use stylet::gpu::kernel::{BindingKind, Reflected, reflect};
 use stylet::gpu::structs::layouts;
 use stylet::solver::step::Stage;
 
@@ -97,9 +97,12 @@ fn reflected(set: &EffectSet, features: &Features) -> Vec<Reflected> {
         .collect()
 }
 
+/// What a stage is called here, the stage, and what is defined for it.
+type Variant = (String, Stage, BTreeSet<&'static str>);
+
 /// Every stage of every set in every kind of scene; of those that compose to the same text only the first.
-fn everything() -> &'static [(String, Reflected)] {
-    static ALL: OnceLock<Vec<(String, Reflected)>> = OnceLock::new();
+fn variants() -> &'static [Variant] {
+    static ALL: OnceLock<Vec<Variant>> = OnceLock::new();
     ALL.get_or_init(|| {
         let mut seen = BTreeSet::new();
         let (none, every) = (effect_set(|_| false), effect_set(|_| true));
@@ -118,20 +121,45 @@ fn everything() -> &'static [(String, Reflected)] {
             }
         }
         texts
-            .into_par_iter()
+    })
+}
+
+/// The same, composed and validated.
+fn everything() -> &'static [(String, Reflected)] {
+    static ALL: OnceLock<Vec<(String, Reflected)>> = OnceLock::new();
+    ALL.get_or_init(|| {
+        variants()
+            .par_iter()
             .map(|(what, stage, defines)| {
-                let reflected = reflect(stage, &defines, false).unwrap_or_else(|e| panic!("{what}: {e}"));
-                (what, reflected)
+                let reflected = reflect(*stage, defines, false).unwrap_or_else(|e| panic!("{what}: {e}"));
+                (what.clone(), reflected)
             })
             .collect()
     })
 }
 
 #[test]
+fn arrays_in_textures_keep_the_budget() {
+    let most = variants()
+        .par_iter()
+        .map(|(what, stage, defines)| {
+            let r = reflect(*stage, defines, true).unwrap_or_else(|e| panic!("{what} with arrays in textures: {e}"));
+            let count = |kind| r.bindings.iter().filter(|b| b.kind == kind).count();
+            let counts = [BindingKind::Texels, BindingKind::Sampled, BindingKind::Storage].map(count);
+            let [texels, sampled, storage] = counts;
+            assert!(texels <= 4 && sampled <= 16 && storage <= 8, "{what}: {texels}, {sampled}, {storage}");
+            counts
+        })
+        .reduce(|| [0; 3], |a, b| std::array::from_fn(|n| a[n].max(b[n])));
+    println!("at most {} storage textures, {} sampled ones, {} storage buffers", most[0], most[1], most[2]);
+    assert!(most[0] >= 3 && most[1] >= 2, "nothing lies in textures");
+}
+
+#[test]
 fn every_combination_composes_validates_and_keeps_the_budget() {
     let (mut most_buffers, mut most_memory) = (0, 0);
     for (place, r) in everything() {
-        let storage = r.bindings.iter().filter(|b| !b.uniform).count();
+        let storage = r.bindings.iter().filter(|b| b.kind != BindingKind::Uniform).count();
         assert!(storage <= 8, "{place}: {storage} storage buffers");
         assert!(r.bindings.iter().all(|b| b.group < 4), "{place}: more than 4 groups");
         assert!(r.workgroup_size <= 256, "{place}: workgroup of {}", r.workgroup_size);
