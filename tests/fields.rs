@@ -3,6 +3,7 @@
 mod common;
 
 use common::*;
+use stylet::gpu::Memory;
 use stylet::scene::Scene;
 use stylet::solver::simulation::{Purpose, Simulation};
 
@@ -28,7 +29,7 @@ fn compare(scene: &str, overrides: &[&str], frames: u64) {
     engine.encode_fields(&mut encoder);
     gpu.queue.submit([encoder.finish()]);
     let read = |name: &str| -> Fields {
-        let bytes = gpu.read_back(engine.buffer(name).unwrap()).unwrap();
+        let bytes = gpu.read_back(engine.memory(name).and_then(Memory::buffer).unwrap()).unwrap();
         bytemuck::cast_slice(&bytes).to_vec()
     };
     let (cells, nodes) = (read("drawn_cells"), read("drawn_nodes"));

@@ -424,8 +424,8 @@ impl Ultrasound {
         let [of_slice, of_table, of_rest] = [&slice, &table, &rest].map(wgpu::Buffer::as_entire_binding);
         let bindings = [
             bindings(device, &tissue, &[of_slice.clone(), of_table, displacement.resource(), of_rest]),
-            bindings(device, &shadow, &[of_slice.clone()]),
-            bindings(device, &needle, &[of_slice]),
+            bindings(device, &shadow, std::slice::from_ref(&of_slice)),
+            bindings(device, &needle, std::slice::from_ref(&of_slice)),
         ];
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("ultrasound"),
