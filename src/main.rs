@@ -146,6 +146,9 @@ struct ViewArgs {
     /// Show an ultrasound-like slice from the start on
     #[arg(long)]
     ultrasound: bool,
+    /// Simulated time over wall time that is aimed at: less than 1 is slow motion
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pace: f64,
     /// Start at once and close after so many pictures
     #[arg(long)]
     frames: Option<u64>,
@@ -569,6 +572,7 @@ fn view(args: ViewArgs, start: Instant) -> Result<String> {
         out: args.out,
         force: args.force,
         ultrasound: args.ultrasound,
+        pace: args.pace,
         frames: args.frames,
         screenshot: args.screenshot,
         reference: args.reference,

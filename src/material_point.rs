@@ -13,8 +13,8 @@ use glam::DMat3;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::{damage, fibres, plasticity, viscoelastic};
-use crate::material::ElasticLaw;
 use crate::material::kinematics::{cofactor, double_dot, jacobian_minus_one, norm_squared};
+use crate::material::{ElasticLaw, TangentBound};
 
 /// Constants of one material with the effects that are on.
 #[derive(Debug, Clone, PartialEq)]
@@ -212,13 +212,14 @@ impl Material {
         }
     }
 
-    /// Bound of the isochoric tangent modulus [Pa] for the stable step; flow and relaxation only lower it.
-    pub fn tangent_bound(&self, h: DMat3, state: &PointState) -> f64 {
-        let matrix = match self.plasticity {
+    /// Bound of the isochoric tangent modulus for the stable step; flow and relaxation only lower it.
+    pub fn tangent_bound(&self, h: DMat3, state: &PointState) -> TangentBound {
+        let mut bound = match self.plasticity {
             None => self.law.tangent_bound(h),
             Some(_) => self.law.tangent_bound(plasticity::elastic_gradient(h, &state.plastic)),
         };
-        matrix + self.fibres.map_or(0.0, |fibres| fibres.tangent_bound(h))
+        bound.straight += self.fibres.map_or(0.0, |fibres| fibres.tangent_bound(h));
+        bound
     }
 
     /// True where a point of this material remembers something.

@@ -52,7 +52,7 @@ const MARKED_BEHIND: f32 = 0.5;
 const LOOK_AHEAD: f32 = 1.05;
 const PASSED_MARGIN: f32 = 0.05e-3;
 const WATCHED: f32 = 1.5;
-const SLIP_CAP: f32 = 13e-6;
+const SLIP_CAP: f32 = 22e-6;
 const SOFTENING_RATE: f32 = 1.5;
 const END_FADE: f32 = 0.25;
 

@@ -111,6 +111,10 @@ struct PathCell {
 // Remaining stiffness per cell, 1 = intact.
 @group(3) @binding(0) var<storage, read_write> cell_stiffness: array<f32>;
 
+// Constants of src/effects/puncture.rs [m].
+const FIRST_ADVANCE: f32 = 5e-6;
+const LARGEST_ADVANCE: f32 = 22e-6;
+
 #ifdef BORE
 const ANCHOR_COUNT: u32 = 24u;
 #else

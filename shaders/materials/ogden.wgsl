@@ -62,6 +62,7 @@ fn ogden_stress(c: vec4<f32>, H: mat3x3<f32>) -> IsochoricStress {
     let rise = s.a.x * (2.0 * s.slope + 4.0 * c_i * s.curvature)
         + 4.0 * s.a.y * (1.0 + out.dj) * s.slope + s.a.z * sum * others;
     out.tangent = factor * max(max(rise.x, rise.y), max(rise.z, 0.0));
+    out.turned_tangent = 0.0;
     return out;
 }
 

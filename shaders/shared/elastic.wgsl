@@ -30,10 +30,11 @@ struct Slopes {
 struct IsochoricStress {
     // P_iso [Pa], by columns.
     P: mat3x3<f32>,
-    // cof F, J - 1, and the bound of the tangent modulus [Pa].
+    // cof F, J - 1, and the bound of the tangent modulus: beside |N|^2, and beside |cof F N|^2 [Pa].
     cof: mat3x3<f32>,
     dj: f32,
     tangent: f32,
+    turned_tangent: f32,
 }
 
 #ifdef NEO_HOOKEAN
@@ -132,6 +133,7 @@ fn invariant_stress(material: Material, H: mat3x3<f32>) -> IsochoricStress {
     let gradient_squared = f.a * f.a * i1 * (f.a * f.a * f.a * i1 * i2 * 0.11111111 - 1.0);
     out.tangent = 2.6666667 * (s.w1 + s.w2) * max(1.0, i1 * 0.33333333)
         + 4.0 * max(s.w11, 0.0) * max(gradient_squared, 0.0);
+    out.turned_tangent = max(s.w1 * (f.a_curvature * i1 - 3.3333333) + s.w2 * (f.b_curvature * i2 - 9.3333333), 0.0);
     return out;
 }
 #endif

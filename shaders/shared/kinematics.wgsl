@@ -27,6 +27,9 @@ struct IsochoricFactors {
     a_fall: f32,
     b: f32,
     b_fall: f32,
+    // Second derivatives.
+    a_curvature: f32,
+    b_curvature: f32,
 }
 
 fn isochoric_factors(J: f32) -> IsochoricFactors {
@@ -41,6 +44,9 @@ fn isochoric_factors(J: f32) -> IsochoricFactors {
     f.a_fall = select(r2 * r3, -1.5 * (A1 + d * A2), below);
     f.b = select(r4, B0 + d * (B1 + 0.5 * d * B2), below);
     f.b_fall = select(r4 * r3, -0.75 * (B1 + d * B2), below);
+    // r is that of J = 0.3 below, as are the second derivatives.
+    f.a_curvature = 1.1111111 * (r4 * r4);
+    f.b_curvature = 3.1111111 * (r4 * r4 * r2);
     return f;
 }
 

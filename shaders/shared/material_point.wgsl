@@ -31,11 +31,12 @@ struct PointPlace {
 }
 
 struct PointAnswer {
-    // Stress without its volumetric part [Pa], cof F, J - 1, bound of the tangent modulus [Pa].
+    // Stress without its volumetric part [Pa], cof F, J - 1, bounds of the tangent modulus [Pa].
     P: mat3x3<f32>,
     cof: mat3x3<f32>,
     dj: f32,
     tangent: f32,
+    turned_tangent: f32,
     // Part of the stiffness that is left; P does not know it yet.
     intact: f32,
 }
@@ -80,6 +81,7 @@ fn material_point(place: PointPlace, H: mat3x3<f32>) -> PointAnswer {
     out.cof = matrix.cof;
     out.dj = matrix.dj;
     out.tangent = matrix.tangent;
+    out.turned_tangent = matrix.turned_tangent;
 #ifdef FIBRES
     // On the whole F: fibres bridge a matrix that flows.
     let fibre = fibre_stress(place.material, H, out.cof, out.dj);

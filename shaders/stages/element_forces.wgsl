@@ -25,6 +25,19 @@ fn store_plane(slot: u32, z: vec3<f32>, x: vec3<f32>, y: vec3<f32>, xy: vec3<f32
     corner_force[slot + 3u * stride] = vec4<f32>(-(z + x + y + xy), bound);
 }
 
+// 1 where a cell ends at a face of the block that does not hold its normal component.
+fn open_side(at: u32, last: u32, normal: u32, fixed_min: u32, fixed_max: u32) -> u32 {
+    return select(0u, 1u, (at == 0u && (fixed_min & normal) == 0u) || (at == last && (fixed_max & normal) == 0u));
+}
+
+// Bound of |sum of t_m a_m|^2 from the Gram matrix of three vectors, diagonal and the others' magnitudes: unit vectors t within
+// the block; on its open edges each |t_m| <= 1.
+fn largest_square(diagonal: vec3<f32>, xy: f32, yz: f32, zx: f32, on_edge: bool) -> f32 {
+    let row = max(max(diagonal.x + xy + zx, diagonal.y + xy + yz), diagonal.z + yz + zx);
+    let all = diagonal.x + diagonal.y + diagonal.z + 2.0 * (xy + yz + zx);
+    return select(row, all, on_edge);
+}
+
 @compute @workgroup_size(64)
 fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let thread = thread_index(id, groups);
@@ -39,6 +52,8 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     let last = min(first + STRIP_LAYERS, CELLS_Z);
 
     let shape = column_at(i, j);
+    let open_sides = open_side(i, CELLS_X - 1u, 1u, FIXED_X_MIN, FIXED_X_MAX)
+        + open_side(j, CELLS_Y - 1u, 2u, FIXED_Y_MIN, FIXED_Y_MAX);
     let area = column_area(shape);
     let area_cube_root = column_cube_root(shape);
     let row = NODES_X;
@@ -101,17 +116,29 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let point = material_point(PointPlace(cell, number, size, kept, hourglass_energy, 0.0), H);
         let hourglass = point.intact * modulus * size * (1.0 + params.quartic * q2) * 0.125;
 
-        // Stiffness bound: V (K |cof B|max sum|cof B| + tangent |B| sum|B|) + hourglass.
+        // Stiffness bound: 8 V ((K + turned tangent) max|cof B t|^2 + tangent max|B t|^2) + hourglass over the vectors t of waves.
         let cx = pull_xi(shape, point.cof[0], point.cof[1]);
         let cy = pull_eta(shape, point.cof[0], point.cof[1]);
         let cz = point.cof[2] * edge_z.quarter_inverse;
-        let cof_b = dot(cx, cx) + dot(cy, cy) + dot(cz, cz)
-            + 2.0 * (abs(dot(cx, cy)) + abs(dot(cy, cz)) + abs(dot(cz, cx)));
+#ifdef TIED
+        // Faces that part have edges of their own.
+        let on_edge = true;
+#else
+        let on_edge = open_sides + open_side(k, CELLS_Z - 1u, 4u, FIXED_Z_MIN, FIXED_Z_MAX) > 1u;
+#endif
+        let cof_b = largest_square(
+            vec3<f32>(dot(cx, cx), dot(cy, cy), dot(cz, cz)),
+            abs(dot(cx, cy)),
+            abs(dot(cy, cz)),
+            abs(dot(cz, cx)),
+            on_edge,
+        );
         let bx = pull_xi(shape, vec3<f32>(1.0, 0.0, 0.0), vec3<f32>(0.0, 1.0, 0.0));
         let by = pull_eta(shape, vec3<f32>(1.0, 0.0, 0.0), vec3<f32>(0.0, 1.0, 0.0));
-        let b = dot(bx, bx) + dot(by, by) + 2.0 * abs(dot(bx, by)) + edge_z.quarter_inverse * edge_z.quarter_inverse;
+        let bz = edge_z.quarter_inverse * edge_z.quarter_inverse;
+        let b = largest_square(vec3<f32>(dot(bx, bx), dot(by, by), bz), abs(dot(bx, by)), 0.0, 0.0, on_edge);
         let bound = point.intact * (8.0 * volume
-            * (materials[number].bulk_modulus * cof_b + point.tangent * b)
+            * ((materials[number].bulk_modulus + point.turned_tangent) * cof_b + point.tangent * b)
             + modulus * size * (1.0 + 3.0 * params.quartic * q2) * 0.125);
         let factor = point.intact * volume;
         let pressure = materials[number].bulk_modulus * point.dj;

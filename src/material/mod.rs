@@ -27,7 +27,7 @@ pub use ogden::Ogden;
 pub use yeoh::Yeoh;
 
 use glam::{DMat3, DVec3};
-use kinematics::{cofactor, double_dot, invariants, isochoric_factor, jacobian_minus_one};
+use kinematics::{cofactor, double_dot, invariants, isochoric_factor, isochoric_factor_curvature, jacobian_minus_one};
 
 /// Largest stretch that a numerical verdict looks at.
 pub const LARGEST_STRETCH: f64 = 6.0;
@@ -120,6 +120,16 @@ impl Isochoric {
             Isochoric::Demiray(l) => l.verdict(),
         }
     }
+}
+
+/// What the isochoric law adds to the modulus that a wave finds, `straight |N|^2 + turned |cof F N|^2` for its direction N
+/// at rest; kappa stands beside `turned`.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct TangentBound {
+    /// [Pa]
+    pub straight: f64,
+    /// [Pa]
+    pub turned: f64,
 }
 
 /// Isochoric energy and bulk modulus.
@@ -223,26 +233,35 @@ impl ElasticLaw {
         self.first_piola_kirchhoff(h) * f.transpose() * (1.0 / f.determinant())
     }
 
-    /// Estimate of the isochoric tangent modulus for the stable step [Pa]: what a wave finds, `(a N) : d2W_iso/dF2 :
+    /// Estimate of the isochoric tangent modulus for the stable step: what a wave finds, `(a N) : d2W_iso/dF2 :
     /// (a N)` for unit vectors a and N. At rest it is 4/3 mu0, and exact.
     ///
-    /// `4/3 2 (w1 + w2) max(1, I1/3) + 4 w11 a^2 I1 (I1 I2/(9 J^2) - 1)`, the same as in the kernel. The second term is
-    /// the square of the gradient of I1bar and bounds the stiffening for every J >= 0.3. The first is no bound away
-    /// from rest: it leaves out `10/9 w1 I1bar |cof F N|^2 / J^2`, which stands beside the `kappa |cof F N|^2` of the
-    /// penalty. With stretches 0.4..2.5, J 0.8..1.25 and nu 0.45, kappa and this estimate together reach at least 0.48
-    /// (all in c01) or 0.6 (laws of I1bar) of the true modulus, and come closer to it with larger nu except where an
-    /// exponential w1 outgrows kappa; the sum over the corners of a cell that they enter exceeds the true stiffness by a
-    /// factor of 3. Ogden's law has its own form, which is a bound.
-    pub fn tangent_bound(&self, h: DMat3) -> f64 {
+    /// ```text
+    /// straight = 4/3 2 (w1 + w2) max(1, I1/3) + 4 w11 a^2 I1 (I1 I2/(9 J^2) - 1)
+    /// turned   = w1 (a'' I1 - 10/3) + w2 (b'' I2 - 28/3),   a = J^(-2/3), b = J^(-4/3)
+    /// ```
+    /// the same as in the kernel. The second term of `straight` is the square of the gradient of I1bar and bounds the
+    /// stiffening for every J >= 0.3; `turned` is what the curvatures of a and b have beyond rest. It is an estimate: with
+    /// stretches 0.4..2.5 and J 0.8..1.25, kappa and this together reach at least 0.8 of the true modulus at nu 0.45 and
+    /// 0.95 at 0.49 (`tests/material/waves.rs`), and 0.6 at nu 0.3. Ogden's law has its own form, which is a bound.
+    pub fn tangent_bound(&self, h: DMat3) -> TangentBound {
         if let Isochoric::Ogden(l) = &self.isochoric {
-            return l.tangent_bound(h);
+            return TangentBound { straight: l.tangent_bound(h), turned: 0.0 };
         }
         let f = DMat3::IDENTITY + h;
-        let (a, _) = isochoric_factor(1.0 + jacobian_minus_one(h), -2.0 / 3.0);
+        let j = 1.0 + jacobian_minus_one(h);
+        let (a, _) = isochoric_factor(j, -2.0 / 3.0);
         let (i1, i2) = invariants(f);
         let s = self.isochoric.slopes(a * i1 - 3.0).unwrap_or_default();
         let gradient_squared = a * a * i1 * (a * a * a * i1 * i2 / 9.0 - 1.0);
-        8.0 / 3.0 * (s.w1 + s.w2) * (i1 / 3.0).max(1.0) + 4.0 * s.w11.max(0.0) * gradient_squared.max(0.0)
+        let curvature = |p: f64, invariant: f64| {
+            isochoric_factor_curvature(j, p) * invariant - isochoric_factor_curvature(1.0, p) * 3.0
+        };
+        TangentBound {
+            straight: 8.0 / 3.0 * (s.w1 + s.w2) * (i1 / 3.0).max(1.0)
+                + 4.0 * s.w11.max(0.0) * gradient_squared.max(0.0),
+            turned: (s.w1 * curvature(-2.0 / 3.0, i1) + s.w2 * curvature(-4.0 / 3.0, i2)).max(0.0),
+        }
     }
 }
 

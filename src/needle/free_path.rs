@@ -60,7 +60,7 @@ pub const PASSED_MARGIN: f64 = 0.05e-3;
 pub const WATCHED: f64 = 1.5;
 
 /// Largest sideways slip and retreat in one step beside what the needle travels [m].
-pub const SLIP_CAP: f64 = 13e-6;
+pub const SLIP_CAP: f64 = 22e-6;
 
 /// Largest loss of stiffness of a cell, as a part of the whole, per cell edge of advance: a plane of samples is passed at
 /// once, and a jump of a quarter of the stiffness would shake the tissue.

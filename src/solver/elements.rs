@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use crate::material::TangentBound;
 use crate::material::kinematics::{J_CONTINUATION, cofactor, jacobian_minus_one};
 use crate::material_point::{Material, PointState, Surroundings, Volumetric};
 use crate::mesh::tets::TetMesh;
@@ -100,10 +101,15 @@ impl Hexahedron {
         Hexahedron { edges, taper, modes }
     }
 
-    /// Largest |sum of +- a_m|^2 over the corners of three vectors.
-    fn largest_corner(a: [DVec3; 3]) -> f64 {
-        let squares: f64 = a.iter().map(|a| a.length_squared()).sum();
-        squares + 2.0 * (a[0].dot(a[1]).abs() + a[1].dot(a[2]).abs() + a[2].dot(a[0]).abs())
+    /// Bound of |sum of t_m a_m|^2 from the Gram matrix of three vectors: over unit vectors t, or `on_edge` with every
+    /// |t_m| <= 1.
+    fn largest_square(a: [DVec3; 3], on_edge: bool) -> f64 {
+        let [xx, yy, zz] = a.map(|a| a.length_squared());
+        let [xy, yz, zx] = [a[0].dot(a[1]).abs(), a[1].dot(a[2]).abs(), a[2].dot(a[0]).abs()];
+        match on_edge {
+            false => (xx + xy + zx).max(yy + xy + yz).max(zz + yz + zx),
+            true => xx + yy + zz + 2.0 * (xy + yz + zx),
+        }
     }
 
     /// Smallest J at a corner, from its three edges.
@@ -309,10 +315,22 @@ impl Elements {
         }
     }
 
-    /// Bound of the stiffness that a cell adds to each of its corners [N/m]:
-    /// `V (kappa |cof B_i| sum|cof B_j| + t |B_i| sum|B_j|)` with the tangent bound t, and the hourglass stiffness. For a
-    /// hexahedron the largest corner counts for all.
-    pub fn stiffness_bound(&self, model: &Model, cell: usize, cof: DMat3, tangent: f64, q2: f64) -> [f64; 8] {
+    /// Bound of the stiffness that a cell adds to each of its corners [N/m], with the tangent bound t of the material:
+    /// ```text
+    /// tetrahedron: V (kappa |cof B_i| sum|cof B_j| + t_straight |B_i| sum|B_j|)
+    /// hexahedron:  8 V ((kappa + t_turned) max|cof B t|^2 + t_straight max|B t|^2) + hourglass
+    /// ```
+    /// The first is Gershgorin's, by the rows of the cell's own stiffness; it exceeds the assembled stiffness by up to 3.
+    /// The second is that of a plane wave in a regular block in this state. With the phases p_m from cell to cell, the
+    /// gradient of one-point hexahedra is `sum_m t_m grad xi_m`,
+    /// `t_m = 2 sin(p_m/2) product over n != m of cos(p_n/2)`, so `sum t_m^2 / 4 = sum_m s_m product (1 - s_n)` with
+    /// `s = sin^2`: linear in every s, at most 1 in the corners of 0 <= s <= 1. Cells therefore never move along all three
+    /// axes at once with their largest gradient, as rows of a single cell have it. At rest this is `(2 c_P / h)^2` times
+    /// the mass, and the shortest edge alone counts. One open face changes nothing, since a chain of lumped masses keeps
+    /// `s` within 0..1 at its ends. Where two of them meet, motions along both fall together: a free block of 8 x 8 x 8
+    /// cells has a limit 1.17 times shorter, a column one cell wide 1.51, a single cell 1.72 times (`tests/dynamics.rs`);
+    /// cells there, and all cells where faces may part, take every |t_m| as 1, which is Gershgorin's bound of the cell.
+    pub fn stiffness_bound(&self, model: &Model, cell: usize, cof: DMat3, tangent: TangentBound, q2: f64) -> [f64; 8] {
         let shape = CellShape::new(&model.mesh, cell);
         let bulk = model.material(cell).law.bulk_modulus;
         let volume = shape.volume;
@@ -321,17 +339,40 @@ impl Elements {
             let lengths = shape.gradients().iter().map(|b| ((cof * *b).length(), b.length()));
             let (sum_cof, sum) = lengths.clone().fold((0.0, 0.0), |s, l| (s.0 + l.0, s.1 + l.1));
             for (bound, l) in bound.iter_mut().zip(lengths) {
-                *bound = volume * (bulk * l.0 * sum_cof + tangent * l.1 * sum);
+                *bound = volume * (bulk * l.0 * sum_cof + tangent.straight * l.1 * sum);
             }
             return bound;
         };
         let modes = hexahedron.modes;
-        let cof_b = Hexahedron::largest_corner(modes.map(|b| cof * b));
-        let b = Hexahedron::largest_corner(modes);
+        let on_edge = self.is_on_edge(model, cell);
+        let cof_b = Hexahedron::largest_square(modes.map(|b| cof * b), on_edge);
+        let b = Hexahedron::largest_square(modes, on_edge);
         let edge = shape.edge();
         let folding = q2 / (shape.scale() * shape.scale());
         let hourglass = self.hourglass(model, cell) * edge * (1.0 + 3.0 * self.quartic * folding) / 8.0;
-        [8.0 * volume * (bulk * cof_b + tangent * b) + hourglass; 8]
+        [8.0 * volume * ((bulk + tangent.turned) * cof_b + tangent.straight * b) + hourglass; 8]
+    }
+
+    /// The same of a cell without history where the displacement of the nodes is `u`.
+    pub fn stiffness_bound_at(&self, model: &Model, cell: usize, u: &[DVec3]) -> [f64; 8] {
+        let shape = CellShape::new(&model.mesh, cell);
+        let corners = shape.gather(u);
+        let h = shape.displacement_gradient(&corners);
+        let q2 = shape.hourglass_modes(&corners).iter().map(|q| q.length_squared()).sum();
+        let tangent = model.material(cell).tangent_bound(h, &PointState::default());
+        self.stiffness_bound(model, cell, cofactor(DMat3::IDENTITY + h), tangent, q2)
+    }
+
+    /// True where open faces of the block meet in a cell, or faces within it may part.
+    fn is_on_edge(&self, model: &Model, cell: usize) -> bool {
+        if model.effects.cohesive.is_some() {
+            return true;
+        }
+        let block = model.mesh.block();
+        let (at, cells) = (block.cell_coordinates(cell), block.cells());
+        let open = |face: usize| !model.scene.faces[face].fixed[face / 2];
+        let open_sides = (0..3).filter(|a| at[*a] == 0 && open(2 * a) || at[*a] + 1 == cells[*a] && open(2 * a + 1));
+        open_sides.count() > 1
     }
 
     fn hourglass(&self, model: &Model, cell: usize) -> f64 {

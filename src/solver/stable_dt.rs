@@ -1,29 +1,21 @@
 //! The stable time step, computed before the run.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::elements::{CellStates, Elements};
-use crate::material_point::PointState;
 use crate::mesh::Mesh;
 use crate::model::Model;
 
-/// Wave-speed bound of the undamped central difference at rest [s]: `2 sqrt(m / k)` with the Gershgorin bound `k` of
-/// the nodal stiffness, a lower bound of the stable step.
+/// Wave-speed bound of the undamped central difference at rest [s]: the shortest `2 sqrt(m / k)` of all nodes with the
+/// bound `k` of their stiffness ([`Elements::stiffness_bound`]): for cells of one size the edge over the speed of
+/// pressure waves.
 ///
-/// A run takes this one times the safety factor. The true limit at rest ([`power_iteration`]) is about 1.8 times
-/// larger, but squeezed cells and contact use that margin up: with 0.8 of it the default scene clamps thousands of
-/// nodes and creates a third of the work as energy (measured), with 0.8 of this bound none.
+/// A run takes this one times the safety factor. Squeezed cells and contact are stiffer than at rest: with mass scaling
+/// the mass of their nodes is raised for as long as they are.
 pub fn wave_speed_bound(model: &Model) -> f64 {
-    let elements = Elements::new(model);
-    let mut bound = vec![0.0; model.mesh.node_count()];
-    for cell in 0..model.mesh.cell_count() {
-        let tangent = model.material(cell).tangent_bound(DMat3::ZERO, &PointState::default());
-        let k = elements.stiffness_bound(model, cell, DMat3::IDENTITY, tangent, 0.0);
-        for (node, k) in model.mesh.cell_nodes(cell).iter().zip(k) {
-            bound[*node] += k;
-        }
-    }
+    let rest = vec![DVec3::ZERO; model.mesh.node_count()];
+    let mut bound = stiffness_bounds(model, &rest);
     let mut mass = model.node_mass.clone();
     for tie in &model.separation.ties {
         let sum = |values: &[f64]| tie.iter().map(|n| values[*n as usize]).sum::<f64>();
@@ -42,10 +34,30 @@ pub fn wave_speed_bound(model: &Model) -> f64 {
     steps.fold(f64::INFINITY, f64::min)
 }
 
+/// Bound of the stiffness that the cells add at every node where the displacement is `u` [N/m]; no history, intact cells.
+pub fn stiffness_bounds(model: &Model, u: &[DVec3]) -> Vec<f64> {
+    let elements = Elements::new(model);
+    let mut bound = vec![0.0; model.mesh.node_count()];
+    for cell in 0..model.mesh.cell_count() {
+        let k = elements.stiffness_bound_at(model, cell, u);
+        for (node, k) in model.mesh.cell_nodes(cell).iter().zip(k) {
+            bound[*node] += k;
+        }
+    }
+    bound
+}
+
 /// Limit of the undamped central difference at rest [s], `2 / omega_max` with the largest eigenfrequency of the
 /// linearised block by power iteration on M^-1 K. Converges from above.
 pub fn power_iteration(model: &Model) -> f64 {
+    2.0 / largest_frequency(model, &vec![DVec3::ZERO; model.mesh.node_count()], &model.node_mass)
+}
+
+/// Largest frequency [rad/s] of small motions about the displacement `base`, with these nodal masses [kg]: power iteration on
+/// M^-1 K. Converges from below.
+pub fn largest_frequency(model: &Model, base: &[DVec3], mass: &[f64]) -> f64 {
     let elements = Elements::new(model);
+    let at_base = elements.internal_forces(model, base, CellStates::default());
     const ITERATIONS: usize = 60;
     let count = model.mesh.node_count();
     let smallest = model.mesh.smallest_edge();
@@ -73,15 +85,16 @@ pub fn power_iteration(model: &Model) -> f64 {
         }
         let largest = mode.iter().map(|v| v.length()).fold(0.0, f64::max);
         if largest == 0.0 {
-            return f64::INFINITY;
+            return 0.0;
         }
         let scale = 1e-5 * smallest / largest;
-        let u: Vec<DVec3> = mode.iter().map(|v| *v * scale).collect();
+        let u: Vec<DVec3> = base.iter().zip(&mode).map(|(u, v)| *u + *v * scale).collect();
         let force = elements.internal_forces(model, &u, CellStates::default());
-        let next: Vec<DVec3> = force.par_iter().zip(&model.node_mass).map(|(f, m)| *f / (*m * scale)).collect();
+        let rise = force.par_iter().zip(&at_base).map(|(f, f0)| *f - *f0);
+        let next: Vec<DVec3> = rise.zip(mass).map(|(f, m)| f / (*m * scale)).collect();
         // Rayleigh quotient with the mass matrix.
         let (mut top, mut bottom) = (0.0, 0.0);
-        for ((v, a), m) in mode.iter().zip(&next).zip(&model.node_mass) {
+        for ((v, a), m) in mode.iter().zip(&next).zip(mass) {
             top += m * v.dot(*a);
             bottom += m * v.length_squared();
         }
@@ -89,5 +102,5 @@ pub fn power_iteration(model: &Model) -> f64 {
         let largest = next.iter().map(|v| v.length()).fold(0.0, f64::max);
         mode = next.into_iter().map(|v| v / largest).collect();
     }
-    2.0 / omega_squared.sqrt()
+    omega_squared.sqrt()
 }

@@ -12,7 +12,6 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::{Window, WindowId};
 
-use super::ViewOptions;
 use super::camera::Camera;
 use super::devices::Devices;
 use super::foresight::Foresight;
@@ -29,6 +28,7 @@ use super::texts;
 use super::tool_shape::{self, ToolPlace};
 use super::tuning::{Pace, Source};
 use super::watch::Watch;
+use super::{PACES, ViewOptions};
 use crate::gpu::compose::{SOURCES, read_sources};
 use crate::gpu::{Gpu, Memory};
 use crate::haptic::LoopTiming;
@@ -71,6 +71,7 @@ pub struct ViewOutcome {
     pub frames: u64,
     pub depth: f64,
     pub force: f64,
+    /// Pictures a second, mean from the first to the last one.
     pub frames_per_second: f64,
     /// Longest time between two pictures [s].
     pub longest_pause: f64,
@@ -91,6 +92,10 @@ pub struct ViewOutcome {
 /// # Errors
 /// Those of the scene come first. `Error::Input` where there is no display, `Error::Adapter` where no adapter can draw on it.
 pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome> {
+    if !PACES.contains(&options.pace) {
+        let way_out = format!("write a number from {} to {}", PACES.start(), PACES.end());
+        return Err(Error::input(format!("--pace {} is no pace that the window can aim at", options.pace), way_out));
+    }
     let (source, scene, recorded) = match &options.session {
         None => {
             let (source, scene) = Source::read(options.scene.clone(), options.overrides.clone())?;
@@ -418,7 +423,7 @@ impl App {
             devices,
             recording: self.recorded.as_ref().map(|session| Recording::new(session.poses.clone())),
             recorded: self.recorded.clone(),
-            choices: Choices::new(Some((1, at))),
+            choices: Choices::new(Some((1, at)), self.options.pace),
             camera,
             ahead: false,
             due: 0.0,
@@ -541,7 +546,8 @@ impl App {
             self.outcome.depth = last.map_or(0.0, |r| r.depth);
             self.outcome.force = last.map_or(0.0, |r| r.force.axial);
             self.outcome.longest_pause = open.longest_pause;
-            self.outcome.frames_per_second = open.practice.timing.frames_per_second();
+            self.outcome.frames_per_second = (open.pictures.saturating_sub(1)) as f64
+                / (self.program_start.elapsed().as_secs_f64() - self.outcome.first_picture).max(f64::MIN_POSITIVE);
             self.outcome.real_time_factor = open.practice.timing.real_time_factor();
             self.outcome.achieved = open.practice.timing.achieved();
             self.outcome.latency = open.practice.latency;

@@ -52,8 +52,11 @@ pub struct LinkChoice {
     pub allow_control: bool,
 }
 
+/// Simulated time over wall time that may be aimed at: from slow motion to as fast as this machine can.
+pub const PACES: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+
 /// What the command line asks for.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct ViewOptions {
     pub scene: PathBuf,
     pub overrides: Vec<String>,
@@ -66,6 +69,8 @@ pub struct ViewOptions {
     pub force: bool,
     /// The ultrasound slice is shown from the start on.
     pub ultrasound: bool,
+    /// Simulated time over wall time that is aimed at, one of [`PACES`].
+    pub pace: f64,
     /// Close after so many pictures.
     pub frames: Option<u64>,
     /// Write the last picture to this file.

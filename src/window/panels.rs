@@ -31,12 +31,12 @@ pub struct Choices {
 }
 
 impl Choices {
-    pub fn new(cut: Option<(usize, f64)>) -> Self {
+    pub fn new(cut: Option<(usize, f64)>, pace: f64) -> Self {
         Choices {
             scale: Scale { field: Field::VonMises, low: 0.0, high: 10e3, logarithmic: false },
             automatic: true,
             cut,
-            pace: 1.0,
+            pace,
             show_parts: false,
             save_as: String::new(),
             accuracy: None,
@@ -107,7 +107,7 @@ pub fn controls(
             }
         }
     });
-    ui.add(egui::Slider::new(&mut choices.pace, 0.1..=1.0).text(texts::PACE));
+    ui.add(egui::Slider::new(&mut choices.pace, super::PACES).logarithmic(true).text(texts::PACE));
     if practice.may_go_back() {
         let last = practice.records.last().map_or(0.0, |r| r.time);
         let mut time = last;
