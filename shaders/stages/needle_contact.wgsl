@@ -23,9 +23,9 @@
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
 
 #ifdef FREE_PATH
-// Share of the tip springs that acts on a grid node [N]; nothing for nodes that no anchor can reach.
-fn tip_share(grid: vec3<u32>, rest: vec3<f32>) -> vec3<f32> {
-    var force = vec3<f32>(0.0);
+// Share of the tip springs that acts on a grid node [N], and of how many springs; nothing for nodes that no anchor can reach.
+fn tip_share(grid: vec3<u32>, rest: vec3<f32>) -> vec4<f32> {
+    var share = vec4<f32>(0.0);
     let away = rest - free_tip.place.xyz;
     let near = free_tip.inside == 1.0 && dot(away, away) <= puncture.anchor_reach * puncture.anchor_reach;
     for (var anchor = select(ANCHOR_COUNT, 0u, near); anchor < ANCHOR_COUNT; anchor++) {
@@ -34,9 +34,9 @@ fn tip_share(grid: vec3<u32>, rest: vec3<f32>) -> vec3<f32> {
         let weight = select(vec3<f32>(0.0), 1.0 - local, grid == cell)
             + select(vec3<f32>(0.0), local, grid == cell + 1u);
         let axial = step_input.direction.xyz * tip_anchor_loads[anchor].force;
-        force += (axial + free_tip.sway.xyz) * (weight.x * weight.y * weight.z);
+        share += vec4<f32>(axial + free_tip.sway.xyz, 1.0) * (weight.x * weight.y * weight.z);
     }
-    return force;
+    return share;
 }
 
 struct FreeContact {
@@ -76,19 +76,20 @@ fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> FreeCo
     return FreeContact(met || in_ring, rest_radius, weight, select(0.0, puncture.tip_length, met));
 }
 #else
-// Share of the tip springs that acts on a grid node, along the insertion direction [N]. The loop is empty for nodes
-// that no anchor can reach.
-fn tip_share(grid: vec3<u32>, rest_axial: f32) -> f32 {
-    var force = 0.0;
+// Share of the tip springs that acts on a grid node, along the insertion direction [N], and of how many stretched springs.
+// The loop is empty for nodes that no anchor can reach.
+fn tip_share(grid: vec3<u32>, rest_axial: f32) -> vec2<f32> {
+    var share = vec2<f32>(0.0);
     let near = abs(rest_axial - tip_state.coordinate) <= puncture.anchor_reach;
     for (var anchor = select(ANCHOR_COUNT, 0u, near); anchor < ANCHOR_COUNT; anchor++) {
         let cell = tip_anchor_loads[anchor].cell.xyz;
         let local = tip_anchor_loads[anchor].local.xyz;
         let weight = select(vec3<f32>(0.0), 1.0 - local, grid == cell)
             + select(vec3<f32>(0.0), local, grid == cell + 1u);
-        force += tip_anchor_loads[anchor].force * weight.x * weight.y * weight.z;
+        let force = tip_anchor_loads[anchor].force;
+        share += vec2<f32>(force, select(0.0, 1.0, force != 0.0)) * (weight.x * weight.y * weight.z);
     }
-    return force;
+    return share;
 }
 #endif
 
@@ -128,12 +129,16 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     let needle_velocity = step_input.velocity.xyz;
 #endif
 #ifdef FREE_PATH
-    let tip = tip_share(contact.grid, contact.rest);
+    let share = tip_share(contact.grid, contact.rest);
+    let tip = share.xyz;
+    let springs = share.w;
     let met = free_contact(index, contact.rest, from_axis, s);
     let passed = met.touches;
     let rest_radius = met.rest_radius;
 #else
-    let tip = step_input.direction.xyz * tip_share(contact.grid, contact.rest_axial);
+    let share = tip_share(contact.grid, contact.rest_axial);
+    let tip = step_input.direction.xyz * share.x;
+    let springs = share.y;
     var passed = contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0;
 #ifdef SLIT
     // Its faces may touch where the node does not.
@@ -144,7 +149,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     var normal = vec3<f32>(0.0);
     var tangential = vec3<f32>(0.0);
     var sums = StepSums();
-    // Stiffness that contact adds at the node [N/m].
+    // Stiffness that contact and tip springs add at the node [N/m].
     var bound = 0.0;
     // Loops that run once or not at all: software adapters skip them, where they would walk through an `if`.
     for (var once = select(1u, 0u, passed); once == 0u; once++) {
@@ -209,7 +214,8 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         sums.stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
         sums.shaft = select(0.0, dot(normal, step_input.direction.xyz) * params.dt, s >= puncture.tip_length);
         sums.damping_dissipation = select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
-        bound = select(0.0, 2.0 * k * steep * steep, depth > 0.0);
+        // Whether it touches or not: a mass that came and went with the contact would make the node chatter.
+        bound = 2.0 * k * steep * steep;
 #ifdef COHESIVE
         memory.on_shaft = select(0.0, 1.0, depth > 0.0 && s >= puncture.tip_length);
 #endif
@@ -233,6 +239,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
 #endif
         remember(index, memory);
     }
+    bound += springs * (puncture.tip_stiffness / f32(ANCHOR_COUNT));
     let total = tip + normal + tangential;
 #ifdef FLEXIBLE_NEEDLE
     sums.work += dot(total, bend.rate) * params.dt;

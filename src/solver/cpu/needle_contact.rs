@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::slit_contact::SlitContact;
 use super::{ContactSums, CpuEngine};
-use crate::model::{ContactSurface, PuncturePlan};
+use crate::model::{ANCHOR_COUNT, ContactSurface, PuncturePlan};
 use crate::needle::centre_line::Bend;
 use crate::needle::free_path::{END_FADE, FreeTip, PASSED_MARGIN, WATCHED, faded_at_end};
 use crate::needle::gap::{Overlap, Profile};
@@ -24,12 +24,18 @@ impl CpuEngine {
         let cone = profile.tip_length;
         let mut stored = self.tip_energy;
         let line = self.centre_line;
-        let mut tip_on_node: std::collections::HashMap<usize, DVec3> = Default::default();
+        // Force of the tip springs, and of how many of them.
+        let mut tip_on_node: std::collections::HashMap<usize, (DVec3, f64)> = Default::default();
         for (force, nodes, weights) in &self.tip_forces {
+            let acts = if plan.free.is_some() { tip.inside } else { *force != 0.0 };
             for (n, w) in nodes.iter().zip(weights) {
-                *tip_on_node.entry(*n).or_default() += (pose.direction * *force + self.tip_sway) * *w;
+                let share = tip_on_node.entry(*n).or_default();
+                share.0 += (pose.direction * *force + self.tip_sway) * *w;
+                share.1 += if acts { *w } else { 0.0 };
             }
         }
+        let count = if plan.anchors.is_empty() { ANCHOR_COUNT } else { plan.anchors.len() };
+        let spring = plan.params.tip_stiffness / count as f64;
         let State { contact: memories, displacement, velocity, .. } = &mut self.state;
         let slit = SlitContact {
             model: &model,
@@ -45,8 +51,9 @@ impl CpuEngine {
             let node = contact.node as usize;
             let x = model.mesh.rest_position(node) + displacement[node];
             let mut sums = ContactSums::default();
-            if let Some(f) = tip_on_node.get(&node) {
-                sums.tip = *f;
+            if let Some((force, springs)) = tip_on_node.get(&node) {
+                sums.tip = *force;
+                self.added_bound[node] += springs * spring;
             }
             let relative = x - pose.tip;
             let s = relative.dot(d);
@@ -129,10 +136,10 @@ impl CpuEngine {
                     sums.stored = 0.5 * k * depth * depth;
                     sums.damping_power = (elastic - normal) * vn;
                 }
-                if depth > 0.0 {
-                    // On a fine mesh, and where a separated face has half the mass of other nodes, contact limits the step.
-                    self.added_bound[node] += 2.0 * k * steep * steep;
-                }
+                // On a fine mesh, and where a separated face has half the mass of other nodes, contact limits the step. This
+                // counts whether the node touches or not: a mass that came and went with the contact would make it chatter,
+                // heavy on its way in and light on its way out.
+                self.added_bound[node] += 2.0 * k * steep * steep;
                 memory.on_shaft = depth > 0.0 && s >= cone;
                 let fade = model.effects.friction.map_or(1.0, |f| f.fade_length);
                 let rubs = ((s - cone) / fade).clamp(0.0, 1.0);
