@@ -151,7 +151,7 @@ fn the_price_of_a_finer_mesh_is_told_before_it_is_paid() {
     let panel = panel(&[]);
     let timing = Timing { simulated: 1.0 / 60.0, physics: 0.010, ..Default::default() };
     let mut harness = Harness::builder().with_size([400.0, 600.0]).build_ui_state(
-        move |ui, panel: &mut Panel| panel.accuracy.show(ui, &panel.scene, &mut panel.tuning, &timing, (5175, 12)),
+        move |ui, panel: &mut Panel| panel.accuracy.show(ui, &panel.scene, &mut panel.tuning, &timing, (5175, 8)),
         panel,
     );
     harness.run_steps(3);

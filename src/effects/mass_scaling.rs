@@ -2,7 +2,8 @@
 //!
 //! Uniform part: `m = S rho V / 8` per cell corner, so `dt ~ sqrt(S)`; weight is not scaled.
 //! Selective part: where cells are squeezed and stiffen, the nodal mass of one step is raised to
-//! `m* = max(m, k dt^2 / (4 * 0.9^2))` with `k` the Gershgorin bound of the nodal stiffness [N/m], which keeps
+//! `m* = max(m, k dt^2 / (4 * 0.9^2))` with `k` the bound of the nodal stiffness [N/m] (tissue, contact, tip springs;
+//! `Elements::stiffness_bound`), which keeps
 //! the step stable and leaves statics untouched. Range of validity: needle speed well below the scaled shear
 //! wave speed; kinetic over internal energy is reported and should stay below 5 %.
 //! Source: Olovsson, Simonsson & Unosson 2005 (selective mass scaling); Joldes et al. 2008 (tissue).

@@ -329,7 +329,8 @@ impl Elements {
     /// the mass, and the shortest edge alone counts. One open face changes nothing, since a chain of lumped masses keeps
     /// `s` within 0..1 at its ends. Where two of them meet, motions along both fall together: a free block of 8 x 8 x 8
     /// cells has a limit 1.17 times shorter, a column one cell wide 1.51, a single cell 1.72 times (`tests/dynamics.rs`);
-    /// cells there, and all cells where faces may part, take every |t_m| as 1, which is Gershgorin's bound of the cell.
+    /// cells there, and all cells where faces may part or where mass scaling raises no mass, take every |t_m| as 1, which is
+    /// Gershgorin's bound of the cell.
     pub fn stiffness_bound(&self, model: &Model, cell: usize, cof: DMat3, tangent: TangentBound, q2: f64) -> [f64; 8] {
         let shape = CellShape::new(&model.mesh, cell);
         let bulk = model.material(cell).law.bulk_modulus;
@@ -363,9 +364,10 @@ impl Elements {
         self.stiffness_bound(model, cell, cofactor(DMat3::IDENTITY + h), tangent, q2)
     }
 
-    /// True where open faces of the block meet in a cell, or faces within it may part.
+    /// True where open faces of the block meet in a cell, or faces within it may part. Without mass scaling nothing follows the
+    /// stiffness of squeezed cells and of contact: the margin of the coarse bound is theirs, in all cells.
     fn is_on_edge(&self, model: &Model, cell: usize) -> bool {
-        if model.effects.cohesive.is_some() {
+        if model.effects.cohesive.is_some() || model.effects.mass_scaling.is_none() {
             return true;
         }
         let block = model.mesh.block();

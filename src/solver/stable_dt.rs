@@ -12,7 +12,7 @@ use crate::model::Model;
 /// pressure waves.
 ///
 /// A run takes this one times the safety factor. Squeezed cells and contact are stiffer than at rest: with mass scaling
-/// the mass of their nodes is raised for as long as they are.
+/// the mass of their nodes is raised for as long as they are; without, the bound is up to 1.73 times shorter.
 pub fn wave_speed_bound(model: &Model) -> f64 {
     let rest = vec![DVec3::ZERO; model.mesh.node_count()];
     let mut bound = stiffness_bounds(model, &rest);

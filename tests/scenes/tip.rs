@@ -49,7 +49,7 @@ fn every_membrane_has_its_drop_at_its_depth() {
     // The tip is in a membrane or it is not: one of the two parts is the force of the tip, but for a frame in between.
     assert!(run.records.iter().any(|r| r.force.membrane > 0.5));
     assert!(run.records.iter().any(|r| r.force.cutting > 0.2 && r.force.membrane == 0.0));
-    for r in run.records.iter().filter(|r| (5.2e-3..7.9e-3).contains(&r.tip_coordinate)) {
+    for r in run.records.iter().filter(|r| (5.3e-3..7.9e-3).contains(&r.tip_coordinate)) {
         assert!(r.force.membrane.abs() < 1e-9 && r.force.cutting > 0.2, "{:?}", r.force);
     }
 }
