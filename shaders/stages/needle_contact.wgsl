@@ -46,6 +46,9 @@ struct FreeContact {
     rest_radius: f32,
     weight: f32,
     end: f32,
+    // Part of that stiffness that counts in the step: it grows steadily towards the shaft, for a mass that jumped at a distance
+    // would pump energy into a node that swings there.
+    nearness: f32,
 }
 
 // Brings what node `index` knows of the tip to this step.
@@ -70,10 +73,14 @@ fn free_contact(index: u32, rest: vec3<f32>, lever: vec3<f32>, s: f32) -> FreeCo
     }
     // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.
     let reach = WATCHED * puncture.needle_radius;
-    let met = free_tip.inside == 1.0 && !passed && s > puncture.tip_length && dot(lever, lever) - s * s < reach * reach;
+    let square = dot(lever, lever) - s * s;
+    let met = free_tip.inside == 1.0 && !passed && s > puncture.tip_length && square < reach * reach;
     let in_ring = passed && s > 0.0 && rest_radius > puncture.softened_radius;
     let weight = select(ring_weight(rest_radius), 1.0, met);
-    return FreeContact(met || in_ring, rest_radius, weight, select(0.0, puncture.tip_length, met));
+    let beside = (reach - sqrt(max(square, 0.0))) / (reach - puncture.needle_radius);
+    let behind = (s - puncture.tip_length) / (END_FADE * puncture.tip_length);
+    let nearness = select(1.0, clamp(beside, 0.0, 1.0) * clamp(behind, 0.0, 1.0), met);
+    return FreeContact(met || in_ring, rest_radius, weight, select(0.0, puncture.tip_length, met), nearness);
 }
 #else
 // Share of the tip springs that acts on a grid node, along the insertion direction [N], and of how many stretched springs.
@@ -216,6 +223,9 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         sums.damping_dissipation = select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
         // Whether it touches or not: a mass that came and went with the contact would make the node chatter.
         bound = 2.0 * k * steep * steep;
+#ifdef FREE_PATH
+        bound *= met.nearness;
+#endif
 #ifdef COHESIVE
         memory.on_shaft = select(0.0, 1.0, depth > 0.0 && s >= puncture.tip_length);
 #endif
@@ -244,7 +254,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
 #ifdef FLEXIBLE_NEEDLE
     sums.work += dot(total, bend.rate) * params.dt;
 #endif
-    for (var once = select(1u, 0u, dot(total, total) > 0.0); once == 0u; once++) {
+    for (var once = select(1u, 0u, dot(total, total) > 0.0 || bound > 0.0); once == 0u; once++) {
         corner_force[contact.slot] += vec4<f32>(total, bound);
     }
     for (var once = select(1u, 0u, passed || dot(total, total) > 0.0); once == 0u; once++) {

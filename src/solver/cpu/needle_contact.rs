@@ -59,12 +59,13 @@ impl CpuEngine {
             let s = relative.dot(d);
             let bend = line.map_or(Bend::default(), |l| l.at(s, (step - l.first_step) as f64 * self.dt));
             let from_axis = relative - bend.offset;
-            let Touch { touches, rest_radius, weight, end } = match &plan.free {
+            let Touch { touches, rest_radius, weight, end, nearness } = match &plan.free {
                 None => Touch {
                     touches: contact.pushed && contact.rest_axial < a && s > 0.0,
                     rest_radius: contact.rest_radius,
                     weight: plan.params.ring_weight(contact.rest_radius),
                     end: 0.0,
+                    nearness: 1.0,
                 },
                 Some(_) => free_contact(plan, &tip, model.mesh.rest_position(node), memory, from_axis, s, d),
             };
@@ -139,7 +140,7 @@ impl CpuEngine {
                 // On a fine mesh, and where a separated face has half the mass of other nodes, contact limits the step. This
                 // counts whether the node touches or not: a mass that came and went with the contact would make it chatter,
                 // heavy on its way in and light on its way out.
-                self.added_bound[node] += 2.0 * k * steep * steep;
+                self.added_bound[node] += 2.0 * k * steep * steep * nearness;
                 memory.on_shaft = depth > 0.0 && s >= cone;
                 let fade = model.effects.friction.map_or(1.0, |f| f.fade_length);
                 let rubs = ((s - cone) / fade).clamp(0.0, 1.0);
@@ -193,6 +194,9 @@ struct Touch {
     weight: f64,
     /// Front end of what it touches, behind the tip [m].
     end: f64,
+    /// Part of that stiffness that counts in the step: it grows steadily towards the shaft, for a mass that jumped at a
+    /// distance would pump energy into a node that swings there.
+    nearness: f64,
 }
 
 /// On a free path: brings what the node knows of the tip to this step, and tells how it meets the needle. `lever` from the
@@ -219,12 +223,16 @@ fn free_contact(
     let needle = plan.profile;
     // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.
     let reach = WATCHED * needle.radius;
-    let met = tip.inside && !passed && s > needle.tip_length && (lever - d * s).length_squared() < reach * reach;
+    let distance = (lever - d * s).length();
+    let met = tip.inside && !passed && s > needle.tip_length && distance < reach;
+    let beside = ((reach - distance) / (reach - needle.radius)).clamp(0.0, 1.0);
+    let behind = ((s - needle.tip_length) / (END_FADE * needle.tip_length)).clamp(0.0, 1.0);
     let in_ring = passed && s > 0.0 && memory.rest_radius > plan.params.softened_radius;
     Touch {
         touches: met || in_ring,
         rest_radius: memory.rest_radius,
         weight: if met { 1.0 } else { plan.params.ring_weight(memory.rest_radius) },
         end: if met { needle.tip_length } else { 0.0 },
+        nearness: if met { beside * behind } else { 1.0 },
     }
 }
