@@ -1,26 +1,11 @@
 //! Adapter choice and device. Our own selection, so that a wrong name lists the right ones.
 
-use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use super::kernel::KernelCache;
 use super::texels::{Access, rewritten};
 use super::workers::Threads;
 use crate::error::{Error, Result};
-
-/// Sets of effects, by their keys, whose kernels the driver has compiled.
-#[derive(Clone, Default)]
-pub struct Ready(Arc<Mutex<BTreeSet<Vec<&'static str>>>>);
-
-impl Ready {
-    pub fn add(&self, effects: Vec<&'static str>) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(effects);
-    }
-
-    pub fn holds(&self, effects: &[&'static str]) -> bool {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).contains(effects)
-    }
-}
 
 /// An opened device and what is known about its adapter.
 #[derive(Clone)]
@@ -32,7 +17,6 @@ pub struct Gpu {
     pub failure: Arc<Mutex<Option<String>>>,
     /// What was compiled for this device so far.
     pub kernels: KernelCache,
-    pub ready: Ready,
     /// Whether arrays lie in textures, see [`super::texels`]; engines that are made later follow it.
     pub texels: bool,
 }
@@ -161,7 +145,7 @@ impl Gpu {
             }
         });
         let texels = info.name.contains("llvmpipe");
-        Ok(Gpu { device, queue, info, failure, kernels: KernelCache::default(), ready: Ready::default(), texels })
+        Ok(Gpu { device, queue, info, failure, kernels: KernelCache::default(), texels })
     }
 
     /// Opens the first adapter of an instance that can draw on a surface; `WGPU_ADAPTER_NAME` names another.
@@ -213,17 +197,6 @@ impl Gpu {
     /// The source of a shader that draws from arrays of an engine on this device.
     pub fn drawing(&self, source: &str) -> std::borrow::Cow<'static, str> {
         if self.texels { rewritten(source, Access::Sampled).into() } else { source.to_string().into() }
-    }
-
-    /// Another device of the same software adapter, with a queue of its own. Such an adapter compiles a kernel in its queue when it is
-    /// first used, and keeps it on disk: what was compiled beside this device halts it no more. `None` for hardware, and where
-    /// another adapter opens first.
-    pub fn beside(&self) -> Option<Gpu> {
-        if !self.is_software() {
-            return None;
-        }
-        let same = |other: &Gpu| (&other.info.name, other.info.backend) == (&self.info.name, self.info.backend);
-        Gpu::open().ok().filter(same)
     }
 
     /// True for a software adapter.

@@ -55,11 +55,7 @@ impl Change {
     /// # Errors
     /// As [`GpuEngine::new`].
     pub fn engine(&self) -> Result<Box<dyn Engine>> {
-        self.engine_on(self.device.as_ref())
-    }
-
-    fn engine_on(&self, device: Option<&Gpu>) -> Result<Box<dyn Engine>> {
-        Ok(match device {
+        Ok(match &self.device {
             Some(gpu) => Box::new(GpuEngine::for_purpose(
                 self.model.clone(),
                 gpu.clone(),
@@ -73,39 +69,16 @@ impl Change {
 }
 
 impl Change {
-    /// True where the kernels of these effects have been used on this device or beside it.
-    pub fn is_prepared(&self) -> bool {
-        self.device.as_ref().is_none_or(|gpu| gpu.ready.holds(&self.scene().effects.keys()))
-    }
-
-    /// Makes an engine of the changed scene and lets it go after one step, so that the change itself finds its kernels compiled:
-    /// drivers compile when a kernel is first used.
+    /// Makes an engine of the changed scene and lets it go after one step: its device keeps the kernels, so that the change
+    /// itself finds them compiled. Drivers compile when a kernel is first used.
     ///
     /// # Errors
     /// As [`GpuEngine::new`], and `Error::Device`.
     pub fn prepare(&self) -> Result<()> {
-        self.prepare_on(self.device.as_ref())
-    }
-
-    /// The same beside a software adapter's device ([`Gpu::beside`]), whose frames go on meanwhile; nothing for hardware.
-    ///
-    /// # Errors
-    /// As [`Change::prepare`].
-    pub fn prepare_beside(&self) -> Result<()> {
-        match self.device.as_ref().and_then(Gpu::beside) {
-            Some(beside) => self.prepare_on(Some(&beside)),
-            None => Ok(()),
-        }
-    }
-
-    fn prepare_on(&self, device: Option<&Gpu>) -> Result<()> {
-        let mut engine = self.engine_on(device)?;
+        let mut engine = self.engine()?;
         let steps = vec![StepInput::at(&self.model, 0.0, self.dt)];
         engine.start_frame(&FramePlan { frame: 0, first_step: 0, steps, centre_line: None })?;
         engine.collect(true)?;
-        if let Some(gpu) = &self.device {
-            gpu.ready.add(self.scene().effects.keys());
-        }
         Ok(())
     }
 }
@@ -146,9 +119,6 @@ impl Simulation {
             (true, true) => Reach::Constants,
         };
         let (device, purpose) = (self.device().cloned(), self.purpose);
-        if let Some(gpu) = &device {
-            gpu.ready.add(now.effects.keys());
-        }
         Ok(Change { reach, model, stable_dt, dt, steps_per_frame, device, purpose })
     }
 

@@ -1,8 +1,8 @@
 //! The effects that somebody may switch next, made ready while nothing else is to be done.
 //!
 //! A switch needs kernels that no run has used: validating and compiling them takes most of the time to the first frame that has the
-//! effect. While a software adapter computes tissue there is no time to spare (beside a run, by a thread of the lowest priority, it
-//! still cost a third of the real time); while the window waits, before an attempt and in a pause, there is.
+//! effect. While a software adapter computes tissue there is no time to spare; while the window waits, before an attempt and in a
+//! pause, there is.
 
 use std::collections::BTreeSet;
 use std::thread::JoinHandle;

@@ -231,13 +231,7 @@ impl Tuning {
                 Reach::Start => {
                     Simulation::for_purpose(scene, Some(gpu), purpose).map(|s| Made::Simulation(Box::new(s)))
                 }
-                _ => {
-                    // Frames go on while the driver compiles. What goes wrong here goes wrong again with the engine itself.
-                    if !shared.is_prepared() {
-                        let _ = shared.prepare_beside();
-                    }
-                    shared.engine().map(Made::Engine)
-                }
+                _ => shared.engine().map(Made::Engine),
             };
             // Nobody waits any more where the window was closed.
             let _ = sender.send(result);
