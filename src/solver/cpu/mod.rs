@@ -191,7 +191,7 @@ impl CpuEngine {
         let gravity = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling());
         let (cells, elements) = (&self.cells, &self.elements);
         let (external, added_bound) = (&self.external, &self.added_bound);
-        let result: (f64, f64, u32, u32) = self
+        let nodes: Vec<(f64, f64, u32, u32)> = self
             .state
             .displacement
             .par_iter_mut()
@@ -258,7 +258,9 @@ impl CpuEngine {
                 *u += new * dt;
                 (share * alpha * mass * free_mid.length_squared() * dt, share * work, clamped, raised)
             })
-            .reduce(|| (0.0, 0.0, 0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3));
+            .collect();
+        // In the order of the nodes: sums of threads that come as they come would differ in their last bits from run to run.
+        let result = nodes.iter().fold((0.0, 0.0, 0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3));
         self.sums.damping_dissipation += result.0;
         self.sums.load_work += result.1;
         self.sums.clamped_nodes += result.2;
