@@ -115,6 +115,11 @@ struct PathCell {
 const FIRST_ADVANCE: f32 = 5e-6;
 const LARGEST_ADVANCE: f32 = 22e-6;
 
+// How far the tip may advance in a step in which the needle travels `travel` [m]; `first`: it is still at the surface.
+fn advance_limit(first: bool, travel: f32) -> f32 {
+    return min(max(select(LARGEST_ADVANCE, FIRST_ADVANCE, first), 1.25 * travel), 4.0 * travel);
+}
+
 #ifdef BORE
 const ANCHOR_COUNT: u32 = 24u;
 #else

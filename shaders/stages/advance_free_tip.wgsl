@@ -174,8 +174,7 @@ fn move_tip() {
 
     let at_surface = free_tip.coordinate == 0.0;
     let travel = (speed + puncture.needle_radius * length(angular_velocity())) * params.dt;
-    // A stab travels more than the least cap in one step.
-    let cap = min(max(select(LARGEST_ADVANCE, FIRST_ADVANCE, at_surface), 1.25 * travel), 4.0 * travel);
+    let cap = advance_limit(at_surface, travel);
     let slip_cap = 4.0 * travel + SLIP_CAP;
     let advance = clamp((force - threshold) / (puncture.tip_stiffness * stretch), 0.0, cap);
     let retreat = clamp((-SLACK - gap) / stretch, 0.0, slip_cap);

@@ -103,10 +103,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         let excess = spring * gap - threshold;
         var advance = 0.0;
         if (excess > 0.0) {
-            // At most four times the speed of the needle: a faster tip would leave nodes inside the needle. A stab travels
-            // more than the largest advance in one step.
-            let travel = speed * params.dt;
-            let cap = min(max(select(LARGEST_ADVANCE, FIRST_ADVANCE, before == 0.0), 1.25 * travel), 4.0 * travel);
+            let cap = advance_limit(before == 0.0, speed * params.dt);
             let lambda = clamp(stretch / f32(ANCHOR_COUNT), 0.2, 3.0);
             advance = min(excess / (puncture.tip_stiffness * lambda), cap);
         }

@@ -43,6 +43,13 @@ use super::parameter::Parameter;
 pub const FIRST_ADVANCE: f64 = 5e-6;
 pub const LARGEST_ADVANCE: f64 = 22e-6;
 
+/// How far the tip may advance in a step in which the needle travels `travel` [m]; `first`: it is still at the surface. At most four
+/// times that way: a faster tip would leave nodes inside the needle. A stab travels more than [`LARGEST_ADVANCE`] in a step.
+pub fn advance_limit(first: bool, travel: f64) -> f64 {
+    let least = if first { FIRST_ADVANCE } else { LARGEST_ADVANCE };
+    least.max(1.25 * travel).min(4.0 * travel)
+}
+
 pub const EFFECT: Effect = Effect {
     key: "puncture",
     define: "PUNCTURE",

@@ -546,7 +546,7 @@ impl App {
             self.outcome.depth = last.map_or(0.0, |r| r.depth);
             self.outcome.force = last.map_or(0.0, |r| r.force.axial);
             self.outcome.longest_pause = open.longest_pause;
-            self.outcome.frames_per_second = (open.pictures.saturating_sub(1)) as f64
+            self.outcome.frames_per_second = open.pictures.saturating_sub(1) as f64
                 / (self.program_start.elapsed().as_secs_f64() - self.outcome.first_picture).max(f64::MIN_POSITIVE);
             self.outcome.real_time_factor = open.practice.timing.real_time_factor();
             self.outcome.achieved = open.practice.timing.achieved();

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::CpuEngine;
-use crate::effects::puncture::{FIRST_ADVANCE, LARGEST_ADVANCE};
+use crate::effects::puncture::advance_limit;
 use crate::material::kinematics::cofactor;
 use crate::mesh::BlockMesh;
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
@@ -156,9 +156,7 @@ impl CpuEngine {
                 }
             };
             let travel = (pose.velocity.length() + radius * pose.angular_velocity.length()) * self.dt;
-            let least = if tip.coordinate == 0.0 { FIRST_ADVANCE } else { LARGEST_ADVANCE };
-            // A stab travels more than that in one step.
-            let cap = f64::min(f64::max(least, 1.25 * travel), 4.0 * travel);
+            let cap = advance_limit(tip.coordinate == 0.0, travel);
             let slip_cap = 4.0 * travel + SLIP_CAP;
             let advance = ((force - threshold) / (p.tip_stiffness * stretch)).clamp(0.0, cap);
             let retreat = ((-SLACK - before.mean_gap) / stretch).clamp(0.0, slip_cap);

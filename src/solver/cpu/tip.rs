@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::CpuEngine;
 use crate::effects::adhesion::{self, Bond};
-use crate::effects::puncture::{FIRST_ADVANCE, LARGEST_ADVANCE};
+use crate::effects::puncture::advance_limit;
 use crate::mesh::BlockMesh;
 use crate::model::PuncturePlan;
 use crate::needle::ToolPose;
@@ -81,9 +81,7 @@ impl CpuEngine {
         let threshold = plan.threshold(a) * p.rate_factor(speed);
         if force > threshold {
             let lambda = anchors.iter().map(|p| p.stretch).sum::<f64>() / count;
-            let cap = if a == 0.0 { FIRST_ADVANCE } else { LARGEST_ADVANCE };
-            // A stab travels more than that in one step.
-            let cap = f64::min(f64::max(cap, 1.25 * speed * self.dt), 4.0 * speed * self.dt);
+            let cap = advance_limit(a == 0.0, speed * self.dt);
             let advance = ((force - threshold) / (p.tip_stiffness * lambda.clamp(0.2, 3.0))).min(cap);
             self.state.tip_coordinate = a + advance;
             let before = anchors;
