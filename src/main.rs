@@ -11,6 +11,7 @@ use clap::{Args, Parser, Subcommand};
 use stylet::commands::advise::AdviseOptions;
 use stylet::commands::compare_adapters::CompareOptions;
 use stylet::commands::fit::{FitOptions, Volumetric};
+use stylet::commands::prepare::{Part, PrepareOptions};
 use stylet::commands::report::{ReportOptions, ReportOutcome};
 use stylet::commands::study::{StudyOptions, StudyOutcome};
 use stylet::commands::{self, bench::BenchOptions, run::RunOptions};
@@ -57,6 +58,8 @@ enum Command {
     Study(StudyArgs),
     /// Propose settings with which a scene keeps real time on this machine
     Advise(AdviseArgs),
+    /// Have the driver compile a scene and the switches of its effects, so that no window waits for them
+    Prepare(PrepareArgs),
     /// List the GPU adapters
     Adapters,
     /// Run a scene on every adapter and on the CPU engine, and compare forces, displacements and energies
@@ -315,6 +318,28 @@ struct AdviseArgs {
     study: Option<PathBuf>,
 }
 
+#[derive(Args)]
+struct PrepareArgs {
+    /// Scene file
+    #[arg(default_value = DEFAULT_SCENE)]
+    scene: PathBuf,
+    /// Override a key of the scene, e.g. --set tissue.cell_size_mm=0.8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Only as a hand leads the needle [default: hand and script]
+    #[arg(long, conflicts_with = "script")]
+    hand: bool,
+    /// Only as the script leads the needle
+    #[arg(long)]
+    script: bool,
+    /// Only this scene, without the switches of its effects
+    #[arg(long)]
+    only: bool,
+    /// Only the switches, at the side of a window that runs the scene
+    #[arg(long, hide = true, conflicts_with = "only")]
+    beside: bool,
+}
+
 /// Prints to standard output; a closed pipe (`| head`) is no failure.
 fn print(text: &str) {
     let mut out = std::io::stdout().lock();
@@ -424,6 +449,20 @@ fn advise(args: AdviseArgs) -> Result<String> {
         rate: args.rate,
         study: args.study,
     })
+}
+
+fn prepare(args: PrepareArgs) -> Result<String> {
+    let options = PrepareOptions {
+        scene: args.scene,
+        overrides: args.overrides,
+        led: (args.hand || args.script).then_some(args.hand),
+        part: match (args.only, args.beside) {
+            (true, _) => Part::Scene,
+            (_, true) => Part::Switches,
+            _ => Part::All,
+        },
+    };
+    commands::prepare::prepare(&options, print)
 }
 
 fn run(args: &RunArgs, start: Instant) -> Result<u8> {
@@ -538,6 +577,10 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
         Some(Command::Study(args)) => study(args),
         Some(Command::Advise(args)) => {
             print(&advise(args)?);
+            Ok(0)
+        }
+        Some(Command::Prepare(args)) => {
+            print(&prepare(args)?);
             Ok(0)
         }
         Some(Command::FirstStep { engine }) => {

@@ -7,6 +7,7 @@ pub mod check;
 pub mod compare_adapters;
 pub mod fit;
 pub mod material;
+pub mod prepare;
 pub mod replay;
 pub mod report;
 pub mod run;

@@ -95,16 +95,34 @@ impl EffectSet {
     }
 }
 
+/// The override that switches exactly these effects on, in the order of [`EFFECTS`].
+pub fn exactly(on: &[&str]) -> String {
+    let keys: Vec<&str> = EFFECTS.iter().map(|e| e.key).filter(|k| on.contains(k)).collect();
+    format!("effects={keys:?}")
+}
+
 /// The override that switches the effect `key` where those of `on` run.
 pub fn switched(on: &[&str], key: &str, is: bool) -> String {
-    let keys: Vec<&str> =
-        EFFECTS.iter().map(|e| e.key).filter(|k| if *k == key { is } else { on.contains(k) }).collect();
-    format!("effects={keys:?}")
+    let others = on.iter().copied().filter(|k| *k != key);
+    exactly(&others.chain(is.then_some(key)).collect::<Vec<&str>>())
+}
+
+/// The overrides that are one switch away from where those of `on` run, one per effect.
+pub fn one_switch_away(on: &[&str]) -> impl Iterator<Item = String> {
+    EFFECTS.iter().map(|effect| switched(on, effect.key, !on.contains(&effect.key)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_effect_has_a_switch_from_where_one_is() {
+        let away: Vec<String> = one_switch_away(&["friction", "puncture"]).collect();
+        assert_eq!(away.len(), EFFECTS.len());
+        assert!(away.contains(&r#"effects=["puncture"]"#.to_string()), "{away:?}");
+        assert!(away.contains(&r#"effects=["gravity", "puncture", "friction"]"#.to_string()), "{away:?}");
+    }
 
     #[test]
     fn a_switch_names_all_effects_that_shall_be_on() {

@@ -56,26 +56,30 @@ impl Change {
     /// As [`GpuEngine::new`].
     pub fn engine(&self) -> Result<Box<dyn Engine>> {
         Ok(match &self.device {
-            Some(gpu) => Box::new(GpuEngine::for_purpose(
-                self.model.clone(),
-                gpu.clone(),
-                self.dt,
-                self.purpose.most_steps(self.steps_per_frame),
-                self.purpose.drawn,
-            )?),
+            Some(gpu) => Box::new(self.gpu_engine(gpu)?),
             None => Box::new(CpuEngine::new(self.model.clone(), self.dt)),
         })
     }
-}
 
-impl Change {
-    /// Makes an engine of the changed scene and lets it go after one step: its device keeps the kernels, so that the change
-    /// itself finds them compiled. Drivers compile when a kernel is first used.
+    fn gpu_engine(&self, gpu: &Gpu) -> Result<GpuEngine> {
+        let most_steps = self.purpose.most_steps(self.steps_per_frame);
+        GpuEngine::for_purpose(self.model.clone(), gpu.clone(), self.dt, most_steps, self.purpose.drawn)
+    }
+
+    /// Makes an engine of the changed scene and lets it go after one step: its device keeps the kernels, and its driver may keep
+    /// them on disk, so that the change itself finds them compiled. Drivers compile when a kernel is first used. Without a device
+    /// there is nothing to do.
     ///
     /// # Errors
     /// As [`GpuEngine::new`], and `Error::Device`.
     pub fn prepare(&self) -> Result<()> {
-        let mut engine = self.engine()?;
+        let Some(gpu) = &self.device else { return Ok(()) };
+        let mut engine = self.gpu_engine(gpu)?;
+        if self.purpose.drawn {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            engine.encode_fields(&mut encoder);
+            gpu.queue.submit([encoder.finish()]);
+        }
         let steps = vec![StepInput::at(&self.model, 0.0, self.dt)];
         engine.start_frame(&FramePlan { frame: 0, first_step: 0, steps, centre_line: None })?;
         engine.collect(true)?;

@@ -17,6 +17,7 @@ use super::devices::Devices;
 use super::foresight::Foresight;
 use super::grip::{Grip, Modifiers, Sight};
 use super::hand::{Desk, InputDevice, Key, Recording};
+use super::kernels_on_disk::KernelsOnDisk;
 use super::lost_display::OpenWindow;
 use super::marks;
 use super::panels::{self, Choices, ReferenceCurve, Wishes};
@@ -405,6 +406,10 @@ impl App {
         if self.options.script || self.recorded.is_some() || self.options.frames.is_some() {
             practice.state = State::Running;
         }
+        // Only Mesa is known to keep the kernels of a software adapter on disk. Another process has the shaders of this program.
+        if gpu.is_software() && cfg!(target_os = "linux") && self.options.shaders.is_none() {
+            practice.tuning.kernels = Some(KernelsOnDisk::default());
+        }
         let devices = Devices::open(&self.options, desk.speed)?;
         let now = Instant::now();
         let mut open = Open {
@@ -495,9 +500,9 @@ impl App {
             open.rebind()?;
         }
         // Hardware leaves the processor alone; a software adapter needs it for the tissue.
-        if !open.gpu.is_software() || open.practice.state != State::Running {
-            open.foresight.tend(&open.practice.tuning, &open.practice.simulation);
-        }
+        let at_leisure = !open.gpu.is_software() || open.practice.state != State::Running;
+        let practice = &open.practice;
+        open.foresight.tend(&practice.tuning, &practice.simulation, practice.purpose(), at_leisure);
         open.read_anew(self.options.shaders.as_deref());
         if open.practice.tuning.waits() {
             open.settle()?;

@@ -17,6 +17,7 @@ pub mod foresight;
 pub mod gamepad;
 pub mod grip;
 pub mod hand;
+pub mod kernels_on_disk;
 #[cfg(feature = "link")]
 pub mod link_device;
 pub mod lost_display;

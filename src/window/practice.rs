@@ -293,6 +293,11 @@ impl Practice {
         Ok(Renewed::Buffers)
     }
 
+    /// What its simulation is made for.
+    pub fn purpose(&self) -> Purpose {
+        purpose(self.leader)
+    }
+
     /// Takes the changes that are ready; call it between frames.
     ///
     /// # Errors

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
+use super::kernels_on_disk::KernelsOnDisk;
 use crate::effects::parameter::with_overrides;
 use crate::gpu::Gpu;
 use crate::scene::Scene;
@@ -99,6 +100,8 @@ pub struct Tuning {
     job: Option<Job>,
     /// Why the last wish could not be granted.
     pub refusal: Option<String>,
+    /// Where another process compiles what the driver keeps on disk.
+    pub kernels: Option<KernelsOnDisk>,
     /// How the changes of this window went, the last one at the end.
     pub paces: Vec<Pace>,
 }
@@ -112,6 +115,7 @@ impl Tuning {
             wanted: None,
             job: None,
             refusal: None,
+            kernels: None,
             paces: Vec::new(),
         }
     }
@@ -226,12 +230,18 @@ impl Tuning {
         let (sender, made) = channel();
         let change = Arc::new(change);
         let (shared, gpu) = (change.clone(), gpu.clone());
+        let (kernels, source) = (self.kernels.clone(), wanted.source.clone());
         std::thread::spawn(move || {
             let result = match reach {
                 Reach::Start => {
                     Simulation::for_purpose(scene, Some(gpu), purpose).map(|s| Made::Simulation(Box::new(s)))
                 }
-                _ => shared.engine().map(Made::Engine),
+                _ => {
+                    if let Some(kernels) = kernels {
+                        kernels.wait_for(&source, shared.scene(), purpose);
+                    }
+                    shared.engine().map(Made::Engine)
+                }
             };
             // Nobody waits any more where the window was closed.
             let _ = sender.send(result);

@@ -107,6 +107,36 @@ fn a_run_writes_everything() {
     }
 }
 
+/// What a window asks of a process at its side: a line for all that is ready, each set of effects once per leader.
+#[test]
+fn kernels_are_prepared() {
+    let place = Place::new();
+    place.tiny(&[]);
+    if engines(&place).len() < 2 {
+        place.call(&["prepare", "tiny.toml"]).ended(2).says("no GPU adapter found");
+        return;
+    }
+    let ready = |answer: &Answer| -> Vec<String> {
+        answer.stdout.lines().filter_map(|l| l.strip_prefix("ready: ")).map(str::to_string).collect()
+    };
+    let own = r#"effects=["mass_scaling", "puncture", "friction"]"#.to_string();
+    let switched = r#"effects=["mass_scaling", "gravity", "puncture", "friction"]"#.to_string();
+    let only = place.call(&["prepare", "tiny.toml", "--only", "--script"]).ended(0);
+    assert_eq!(ready(&only), std::slice::from_ref(&own), "{}", only.all());
+    let beside = place.call(&["prepare", "tiny.toml", "--beside", "--hand"]).ended(0);
+    let sets = ready(&beside);
+    assert!(sets.contains(&switched) && !sets.contains(&own), "{}", beside.all());
+    // Every one of them can be asked for.
+    for set in &sets {
+        place.call(&["check", "tiny.toml", "--set", set]).ended(0);
+    }
+    let all = place.call(&["prepare", "tiny.toml"]).ended(0);
+    assert_eq!(ready(&all).len(), 2 * (1 + sets.len()), "{}", all.all());
+    assert!(all.stdout.contains("begin the run anew"), "{}", all.all());
+    place.call(&["prepare", "tiny.toml", "--set", "effects=[\"glue\"]"]).refused().says("glue");
+    assert_eq!(place.files("."), ["tiny.toml"]);
+}
+
 #[test]
 fn standard_error_is_plain_where_it_is_no_terminal() {
     let place = Place::new();
