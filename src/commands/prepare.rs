@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::effects::parameter::with_overrides;
 use crate::effects::{exactly, one_switch_away};
@@ -34,12 +34,9 @@ pub enum Part {
     All,
     /// The scene as it is.
     Scene,
-    /// The switches, beside a window that runs the scene: after [`HEAD_START`] only with processor time that nobody else wants.
+    /// The switches, beside a window that runs the scene: only with processor time that nobody else wants.
     Switches,
 }
-
-/// As long a helper competes with its window: what is on disk already has been loaded by then.
-const HEAD_START: Duration = Duration::from_millis(800);
 
 /// Begin of a line that tells what is ready now; an override that names the effects follows.
 pub const READY: &str = "ready: ";
@@ -50,6 +47,9 @@ pub const READY: &str = "ready: ";
 /// # Errors
 /// Those of [`Scene::load`]; `Error::Device` without an adapter.
 pub fn prepare(options: &PrepareOptions, mut tell: impl FnMut(&str)) -> Result<String> {
+    if options.part == Part::Switches {
+        crate::process::idle();
+    }
     let begin = Instant::now();
     let load = |more: &[String]| Scene::load(&options.scene, &with_overrides(&options.overrides, more));
     let gpu = Gpu::open()?;
@@ -63,9 +63,6 @@ pub fn prepare(options: &PrepareOptions, mut tell: impl FnMut(&str)) -> Result<S
             tell(&format!("{READY}{}", exactly(&on)));
         }
         for wanted in one_switch_away(&on).filter(|_| options.part != Part::Scene) {
-            if options.part == Part::Switches && begin.elapsed() > HEAD_START {
-                crate::process::idle();
-            }
             // A scene that cannot do without an effect, or not with it, is none that a switch leads to.
             let change = load(std::slice::from_ref(&wanted)).and_then(|scene| simulation.plan_change(scene));
             match change {
