@@ -367,7 +367,10 @@ impl Practice {
         if let Some(now) = self.simulation.hand() {
             // Nothing is under way: what ends next has the input.
             self.fresh = hand.fresh_input().map(|since| (since, self.records.len() as u64));
-            let wanted = hand.pose(&now, self.timing.simulated);
+            // The first frame is a single step: the way of a whole frame in it would be a blow that stores energy no work paid for.
+            let first = self.session.poses.is_empty();
+            let duration = if first { self.simulation.end_of(0) } else { self.timing.simulated };
+            let wanted = hand.pose(&now, duration);
             let pose = self.within_reach(&now, wanted);
             self.session.poses.push(pose);
             self.simulation.lead(&pose);
