@@ -3,7 +3,8 @@
 
 use std::path::Path;
 
-use stylet::window::hand::Recording;
+use stylet::scene::motion::HandPose;
+use stylet::window::hand::{Desk, InputDevice, Key, Recording};
 use stylet::window::practice::{Leader, Practice, State};
 use stylet::window::tuning::Source;
 
@@ -11,19 +12,26 @@ use stylet::window::tuning::Source;
 mod common;
 
 fn script() -> Option<Practice> {
+    led_by(Leader::Script)
+}
+
+fn led_by(leader: Leader) -> Option<Practice> {
     let gpu = common::gpu()?;
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/training/hit_target.toml");
     let coarse = ["tissue.cell_size_mm=1.3", "tissue.size_mm=[14, 14, 12]"].map(String::from).to_vec();
     let (source, scene) = Source::read(path, coarse).unwrap_or_else(|e| panic!("{e}"));
-    Some(Practice::new(scene, source, gpu, Leader::Script, None, false).unwrap_or_else(|e| panic!("{e}")))
+    Some(Practice::new(scene, source, gpu, leader, None, false).unwrap_or_else(|e| panic!("{e}")))
 }
 
 fn run(practice: &mut Practice, frames: usize) {
-    let mut nobody = Recording::new(Vec::new());
+    run_by(practice, &mut Recording::new(Vec::new()), frames);
+}
+
+fn run_by(practice: &mut Practice, hand: &mut dyn InputDevice, frames: usize) {
     practice.state = State::Running;
     while practice.records.len() < frames {
-        practice.start(&mut nobody).unwrap_or_else(|e| panic!("{e}"));
-        practice.finish(&mut nobody).unwrap_or_else(|e| panic!("{e}"));
+        practice.start(hand).unwrap_or_else(|e| panic!("{e}"));
+        practice.finish(hand).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(practice.state, State::Running);
     }
 }
@@ -44,6 +52,44 @@ fn a_script_goes_back_and_comes_again() {
     // Before the first mark there is nothing to go back to.
     practice.go_back(-1.0).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(practice.records.len(), 100);
+}
+
+/// Whoever holds the key as the attempt begins, or throws the needle: the first frame is a single step, and no blow.
+#[test]
+fn a_key_held_from_the_start_creates_no_energy() {
+    for thrown in [false, true] {
+        let Some(mut practice) = led_by(Leader::Hand) else { return };
+        let mut desk = Desk::new(2e-3);
+        desk.hold(Key::Advance, true);
+        let mut far = Thrown;
+        let hand: &mut dyn InputDevice = if thrown { &mut far } else { &mut desk };
+        run_by(&mut practice, hand, 12);
+        assert!(practice.records[0].depth < practice.records[1].depth);
+        for record in &practice.records[1..] {
+            let energy = &record.energy;
+            let created = energy.accounted() - energy.external;
+            assert!(energy.external > 0.0, "nothing was touched");
+            assert!(
+                created < 0.25 * energy.external,
+                "thrown {thrown}, frame {}: {created} of {}",
+                record.frame,
+                energy.external
+            );
+        }
+    }
+}
+
+/// A device that asks for the bottom at once.
+struct Thrown;
+
+impl InputDevice for Thrown {
+    fn name(&self) -> &str {
+        "thrown"
+    }
+
+    fn pose(&mut self, now: &HandPose, _duration: f64) -> HandPose {
+        HandPose { depth: 8e-3, ..*now }
+    }
 }
 
 /// A folder without room: the run waits and says why, nothing in memory is lost, and with room again everything is written.

@@ -371,7 +371,7 @@ impl Practice {
             let first = self.session.poses.is_empty();
             let duration = if first { self.simulation.end_of(0) } else { self.timing.simulated };
             let wanted = hand.pose(&now, duration);
-            let pose = self.within_reach(&now, wanted);
+            let pose = self.within_reach(&now, wanted, duration);
             self.session.poses.push(pose);
             self.simulation.lead(&pose);
         }
@@ -385,9 +385,9 @@ impl Practice {
     }
 
     /// What the tissue can follow of what the hand wants.
-    fn within_reach(&mut self, now: &HandPose, wanted: HandPose) -> HandPose {
+    fn within_reach(&mut self, now: &HandPose, wanted: HandPose, duration: f64) -> HandPose {
         let reach = Reach::of(&self.simulation.model, self.speed_limit);
-        let (pose, limited) = reach.within(now, &wanted, self.timing.simulated);
+        let (pose, limited) = reach.within(now, &wanted, duration);
         self.limited_frames += u64::from(limited);
         pose
     }
