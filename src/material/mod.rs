@@ -243,7 +243,8 @@ impl ElasticLaw {
     /// the same as in the kernel. The second term of `straight` is the square of the gradient of I1bar and bounds the
     /// stiffening for every J >= 0.3; `turned` is what the curvatures of a and b have beyond rest. It is an estimate: with
     /// stretches 0.4..2.5 and J 0.8..1.25, kappa and this together reach at least 0.77 of the true modulus at nu 0.45,
-    /// 0.8 at 0.49 (an exponential law; Mooney-Rivlin 0.96), and 0.68 at 0.3 (`tests/material/waves.rs`). Ogden's law has its own form, which is a bound.
+    /// 0.8 at 0.49 (an exponential law; Mooney-Rivlin 0.96), and 0.68 at 0.3 (`tests/material/waves.rs`). Ogden's law has
+    /// its own form, which is a bound.
     pub fn tangent_bound(&self, h: DMat3) -> TangentBound {
         if let Isochoric::Ogden(l) = &self.isochoric {
             return TangentBound { straight: l.tangent_bound(h), turned: 0.0 };
