@@ -27,6 +27,9 @@ pub enum Error {
     /// The simulation left the range in which its numbers mean something.
     #[error("run stopped in frame {frame} (step {step}, t = {time_s:.6} s): {message}")]
     Diverged { frame: u64, step: u64, time_s: f64, message: String },
+    /// The end was asked for, and the frame under way was given up.
+    #[error("ended by {0} within a frame")]
+    Ended(&'static str),
     /// A file could not be written or read.
     #[error("{path}: {source}\n  way out: {}", way_out_of(source))]
     File { path: PathBuf, source: std::io::Error },
@@ -47,10 +50,39 @@ fn way_out_of(source: &std::io::Error) -> &'static str {
     }
 }
 
+/// A text for a message: a word or a text of unreasonable length, which somebody else wrote, is cut.
+pub fn brief(text: &str) -> String {
+    /// Longest word [character]; a path may have more of them.
+    const WORD: usize = 120;
+    const PATH: usize = 4096;
+    /// Longest text [byte].
+    const TEXT: usize = 8192;
+    // Only what is kept is looked at word by word.
+    let (kept, cut) = match text.len() > TEXT {
+        true => (&text[..text.floor_char_boundary(TEXT)], true),
+        false => (text, false),
+    };
+    let mut short = String::with_capacity(kept.len());
+    for piece in kept.split_inclusive(char::is_whitespace) {
+        let most = if piece.contains(std::path::MAIN_SEPARATOR) { PATH } else { WORD };
+        match piece.char_indices().nth(most) {
+            Some((end, _)) => {
+                short += &piece[..piece.floor_char_boundary(end.min(WORD / 2))];
+                short += "... ";
+            }
+            None => short += piece,
+        }
+    }
+    if cut {
+        short += "...";
+    }
+    short
+}
+
 impl Error {
     /// A wrong input with its way out.
     pub fn input(message: impl Into<String>, way_out: impl Into<String>) -> Self {
-        Error::Input { message: message.into(), way_out: way_out.into() }
+        Error::Input { message: brief(&message.into()), way_out: brief(&way_out.into()) }
     }
 
     /// A file error with the path that it concerns.
@@ -62,6 +94,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Scene(_) | Error::Input { .. } | Error::Adapter { .. } => 2,
+            Error::Ended(_) => crate::ending::exit_code(),
             _ => 1,
         }
     }

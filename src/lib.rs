@@ -6,8 +6,12 @@
 //! times over, [`training`] scores what a trainee did, [`haptic`] gives the
 //! forces to a device at 1 kHz. [`untrusted`] lists the readers of files.
 
+#[macro_use]
+pub mod terminal;
+
 pub mod commands;
 pub mod effects;
+pub mod ending;
 pub mod error;
 pub mod gpu;
 pub mod haptic;
@@ -22,6 +26,7 @@ pub mod needle;
 pub mod observables;
 pub mod output;
 pub mod process;
+pub mod reading;
 pub mod render;
 pub mod scene;
 pub mod separation;
@@ -31,6 +36,7 @@ pub mod stability;
 pub mod study;
 pub mod training;
 pub mod untrusted;
+pub mod verdict;
 #[cfg(feature = "window")]
 pub mod window;
 

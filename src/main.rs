@@ -1,13 +1,11 @@
 //! Command line of Stylet.
 
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use stylet::commands::advise::AdviseOptions;
 use stylet::commands::compare_adapters::CompareOptions;
 use stylet::commands::fit::{FitOptions, Volumetric};
@@ -15,11 +13,12 @@ use stylet::commands::prepare::{Part, PrepareOptions};
 use stylet::commands::report::{ReportOptions, ReportOutcome};
 use stylet::commands::study::{StudyOptions, StudyOutcome};
 use stylet::commands::{self, bench::BenchOptions, run::RunOptions};
+use stylet::ending;
 use stylet::error::{Error, Result};
 use stylet::output::checkpoint::RunCheckpoint;
-use stylet::output::folder::CHECKPOINT;
 use stylet::scene::Scene;
 use stylet::solver::simulation::EngineChoice;
+use stylet::{eprintln, println, terminal};
 
 /// Scene of the main job.
 const DEFAULT_SCENE: &str = "scenes/muscle_biopsy.toml";
@@ -42,7 +41,7 @@ enum Command {
     View(ViewArgs),
     /// Compute a recorded session again: the same forces, without a window
     Replay(ReplayArgs),
-    /// Check a scene and tell what it means, without running it
+    /// Check a scene and tell what it means; a trial of its first steps, a second at most, predicts the time of a run
     Check(CheckArgs),
     /// Stretch and shear a homogeneous sample of a material: stresses as a table, JSON, CSV or figure
     Material(Box<commands::material::MaterialArgs>),
@@ -97,9 +96,15 @@ struct RunArgs {
     /// Replace the results that the folder holds
     #[arg(long)]
     force: bool,
-    /// Seconds of wall time between two checkpoints; 0: none
+    /// Seconds of wall time between two checkpoints; 0: only where the run is stopped
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
     checkpoint: f64,
+    /// A doubtful run exits with 3, as one that is stopped
+    #[arg(long)]
+    strict: bool,
+    /// Print by which bounds a run is ok, doubtful or stopped
+    #[arg(long)]
+    explain: bool,
     /// Go on with the run in this folder, which was stopped; scene and overrides are those of the run
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "force", "overrides"])]
     resume: Option<PathBuf>,
@@ -150,7 +155,7 @@ struct ViewArgs {
     #[arg(long)]
     ultrasound: bool,
     /// Simulated time over wall time that is aimed at: less than 1 is slow motion
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    #[arg(long = "speed-factor", alias = "pace", value_name = "FACTOR", default_value_t = 1.0)]
     pace: f64,
     /// Start at once and close after so many pictures
     #[arg(long)]
@@ -340,35 +345,25 @@ struct PrepareArgs {
     beside: bool,
 }
 
-/// Prints to standard output; a closed pipe (`| head`) is no failure.
+/// Prints to standard output.
 fn print(text: &str) {
-    let mut out = std::io::stdout().lock();
-    match writeln!(out, "{text}").and_then(|()| out.flush()) {
-        // Whoever reads has enough, as `head` does.
-        Err(reason) if reason.kind() != std::io::ErrorKind::BrokenPipe => {
-            eprintln!("error: standard output: {reason}\n  way out: write to another disk, or free space on this one");
-            OUTPUT_LOST.store(true, Ordering::Relaxed);
-        }
-        _ => {}
-    }
+    println!("{text}");
 }
 
-/// True once standard output has lost something.
-static OUTPUT_LOST: AtomicBool = AtomicBool::new(false);
+/// Becomes true when a user or a scheduler asks for the end; what is finished by then stays.
+fn until_ended() -> &'static AtomicBool {
+    let asked = ending::watch();
+    ending::begin();
+    asked
+}
 
-/// Becomes true with Ctrl-C; a second Ctrl-C ends the program at once.
-fn until_interrupted() -> Arc<AtomicBool> {
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = interrupted.clone();
-    let handler = move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(commands::run::EXIT_INTERRUPTED.into());
-        }
-    };
-    if let Err(error) = ctrlc::set_handler(handler) {
-        log::warn!("Ctrl-C will end the program at once: {error}");
+/// Exit code of what was done; where a user or a scheduler has ended it, `kept` is said.
+fn ended(kept: &str) -> u8 {
+    if !ending::is_asked() {
+        return 0;
     }
-    interrupted
+    eprintln!("ended by {}: {kept}", ending::reason());
+    ending::exit_code()
 }
 
 fn report(args: ReportArgs) -> Result<u8> {
@@ -381,7 +376,7 @@ fn report(args: ReportArgs) -> Result<u8> {
         overrides: args.overrides,
         force: args.force,
     };
-    match commands::report::report(&options, &until_interrupted())? {
+    match commands::report::report(&options, until_ended())? {
         ReportOutcome::Page { path, failed } => {
             print(&path.display().to_string());
             if failed > 0 {
@@ -390,8 +385,11 @@ fn report(args: ReportArgs) -> Result<u8> {
             Ok(if failed > 0 { commands::run::EXIT_DIVERGED } else { 0 })
         }
         ReportOutcome::Interrupted { done, of } => {
-            eprintln!("interrupted: {done} of {of} runs are finished and stay; the same command goes on from there");
-            Ok(commands::run::EXIT_INTERRUPTED)
+            eprintln!(
+                "ended by {}: {done} of {of} runs are finished and stay; the same command goes on from there",
+                ending::reason()
+            );
+            Ok(ending::exit_code())
         }
     }
 }
@@ -409,7 +407,7 @@ fn study(args: StudyArgs) -> Result<u8> {
             shard: args.shard,
             force: args.force,
         };
-        commands::study::study(&options, &until_interrupted())?
+        commands::study::study(&options, until_ended())?
     } else {
         commands::study::merge(&args.merge, args.out.as_ref(), args.force)?
     };
@@ -432,8 +430,11 @@ fn study(args: StudyArgs) -> Result<u8> {
             Ok(0)
         }
         StudyOutcome::Interrupted { done, of } => {
-            eprintln!("interrupted: {done} of {of} runs are finished and stay; the same command goes on from there");
-            Ok(commands::run::EXIT_INTERRUPTED)
+            eprintln!(
+                "ended by {}: {done} of {of} runs are finished and stay; the same command goes on from there",
+                ending::reason()
+            );
+            Ok(ending::exit_code())
         }
     }
 }
@@ -466,16 +467,21 @@ fn prepare(args: PrepareArgs) -> Result<String> {
 }
 
 fn run(args: &RunArgs, start: Instant) -> Result<u8> {
+    if args.explain {
+        print(stylet::verdict::explain().trim_end());
+        return Ok(0);
+    }
     if !(args.checkpoint >= 0.0 && args.checkpoint.is_finite()) {
         return Err(Error::input(
             format!("--checkpoint {} is no time", args.checkpoint),
             "write the seconds between two checkpoints, e.g. 30, or 0 for none",
         ));
     }
+    let asked = ending::watch();
     let every = (args.checkpoint > 0.0).then_some(args.checkpoint);
     let (scene, options) = match &args.resume {
         Some(folder) => {
-            let checkpoint = RunCheckpoint::read(&folder.join(CHECKPOINT))?;
+            let checkpoint = RunCheckpoint::of_run(folder)?;
             let scene = checkpoint.load_scene()?;
             let engine = match (args.scene.engine, checkpoint.simulation.engine.engine()) {
                 (EngineChoice::Auto, "cpu") => EngineChoice::Cpu,
@@ -505,9 +511,8 @@ fn run(args: &RunArgs, start: Instant) -> Result<u8> {
             (scene, options)
         }
     };
-    let interrupted = until_interrupted();
-    let outcome = commands::run::run(scene, &options, start, &interrupted);
-    let code = commands::run::exit_code(&outcome);
+    let outcome = commands::run::run(scene, &options, start, asked);
+    let code = commands::run::exit_code(&outcome, args.strict);
     match outcome {
         Ok(outcome) => {
             eprintln!("{}", commands::run::describe(&outcome.summary));
@@ -562,17 +567,19 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
         }
         Some(Command::Report(args)) => report(args),
         Some(Command::Stability(args)) => {
-            let (text, code) = commands::stability::stability(&args, &until_interrupted())?;
+            let (text, code) = commands::stability::stability(&args, until_ended())?;
             print(&text);
             Ok(code)
         }
         Some(Command::View(args)) => {
+            ending::watch();
             print(&view(args, start)?);
-            Ok(0)
+            Ok(ended("the window is closed, what it has recorded is kept"))
         }
         Some(Command::Replay(args)) => {
+            until_ended();
             print(&replay(args)?);
-            Ok(0)
+            Ok(ended("the tables go on to the last frame that was computed"))
         }
         Some(Command::Study(args)) => study(args),
         Some(Command::Advise(args)) => {
@@ -691,16 +698,37 @@ fn replay(args: ReplayArgs) -> Result<String> {
         true => "the same bit for bit as recorded".to_string(),
         false => format!("recorded by {}, so within what adapters differ by", done.recorded_by),
     };
+    let doubt = done.doubt.map_or(String::new(), |why| format!("DOUBTFUL: {why}\n"));
     Ok(format!(
-        "{} frames, {:.2} s simulated in {:.2} s by {}: {same}\nlargest force {:.3} N; energy imbalance {:.2} %\n{}",
+        "{doubt}{} frames, {:.2} s simulated in {:.2} s by {}: {same}\nlargest force {:.3} N; energy imbalance {:.2} %\n{}",
         done.frames,
         done.simulated,
         done.wall,
         done.adapter,
         done.largest_force,
-        100.0 * done.imbalance.abs(),
+        100.0 * done.imbalance,
         done.folder.display()
     ))
+}
+
+/// The refusal of a first word that is neither a subcommand nor a file, as `stylet chek` has it: a scene may stand in the place of a
+/// subcommand, so the reader of arguments takes one for the other.
+fn misspelt_subcommand() -> Option<Error> {
+    let word = std::env::args_os().nth(1)?.into_string().ok()?;
+    let names: Vec<String> =
+        Cli::command().get_subcommands().filter(|c| !c.is_hide_set()).map(|c| c.get_name().into()).collect();
+    let is_path = word.starts_with('-') || word.contains(['.', '/', '\\']) || std::path::Path::new(&word).exists();
+    if is_path || names.contains(&word) || word == "help" || Cli::command().find_subcommand(&word).is_some() {
+        return None;
+    }
+    let list = names.join(", ");
+    let way_out = match stylet::scene::closest(&word, names.iter().map(String::as_str)) {
+        Some(near) => {
+            format!("did you mean stylet {near}? There are: {list}; or give the path of a scene file (.toml)")
+        }
+        None => format!("use one of: {list}; or give the path of a scene file (.toml)"),
+    };
+    Some(Error::input(format!("there is no subcommand and no scene file called {word}"), way_out))
 }
 
 fn main() -> ExitCode {
@@ -710,17 +738,24 @@ fn main() -> ExitCode {
         // SAFETY: no other thread exists yet.
         unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     }
+    ending::survive_file_size_limit();
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error,wgpu_hal=off")).init();
-    match dispatch(Cli::parse(), start) {
-        Ok(0) if OUTPUT_LOST.load(Ordering::Relaxed) => ExitCode::from(1),
-        Ok(code) => ExitCode::from(code),
+    if let Some(error) = misspelt_subcommand() {
+        eprintln!("error: {error}");
+        return ExitCode::from(error.exit_code());
+    }
+    let code = match dispatch(Cli::parse(), start) {
+        Ok(0) if terminal::output_is_lost() => 1,
+        Ok(code) => code,
         Err(error) => {
             match &error {
                 // Already rendered, with its own `error:` before every problem.
                 Error::Scene(text) => eprintln!("{}", text.trim_end()),
                 _ => eprintln!("error: {error}"),
             }
-            ExitCode::from(error.exit_code())
+            error.exit_code()
         }
-    }
+    };
+    ending::leave_unfinished_work(code);
+    ExitCode::from(code)
 }

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::{damage, fibres, plasticity, viscoelastic};
 use crate::material::kinematics::{cofactor, double_dot, jacobian_minus_one, norm_squared};
-use crate::material::{ElasticLaw, TangentBound};
+use crate::material::{Continuation, ElasticLaw, TangentBound};
 
 /// Constants of one material with the effects that are on.
 #[derive(Debug, Clone, PartialEq)]
@@ -220,6 +220,16 @@ impl Material {
         };
         bound.straight += self.fibres.map_or(0.0, |fibres| fibres.tangent_bound(h));
         bound
+    }
+
+    /// Where the elastic law or the fibres follow a continuation; `None` where both are what their equations say.
+    pub fn continuation(&self, h: DMat3, state: &PointState) -> Option<Continuation> {
+        let he = match self.plasticity {
+            None => h,
+            Some(_) => plasticity::elastic_gradient(h, &state.plastic),
+        };
+        let capped = self.fibres.is_some_and(|fibres| fibres.is_capped(h)).then_some(Continuation::Exponent);
+        self.law.continuation(he).or(capped)
     }
 
     /// True where a point of this material remembers something.

@@ -17,8 +17,8 @@
 use glam::DMat3;
 
 use crate::effects::viscoelastic;
-use crate::material::Mode;
 use crate::material::kinematics::{double_dot, jacobian_minus_one};
+use crate::material::{Continuation, Mode};
 use crate::material_point::{Material, PointEnergy, PointState, Surroundings};
 use crate::{Error, Result};
 
@@ -269,6 +269,8 @@ pub struct Row {
     pub work: f64,
     pub stored: f64,
     pub dissipated: f64,
+    /// Where the state has left its law.
+    pub continuation: Option<Continuation>,
 }
 
 /// Largest step of the stretch, without and with an effect that has a history.
@@ -391,6 +393,7 @@ impl Test<'_> {
             work: s.work,
             stored: s.energy().stored,
             dissipated: s.dissipated(),
+            continuation: s.material.continuation(h, &s.state),
         });
     }
 }

@@ -4,13 +4,13 @@ use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
-use crate::effects::{EffectSet, cohesive, puncture};
+use crate::effects::{EffectSet, cohesive, indentation, puncture};
 use crate::material_point::Material;
 use crate::mesh::block::SLIT_HALF_WIDTH;
 use crate::mesh::{BlockMesh, Bore, Mesh, TissuePoint};
 use crate::needle::free_path::FreeTip;
 use crate::needle::gap::Profile;
-use crate::needle::slit::{REFERENCE_EDGE, SlitFaces};
+use crate::needle::slit::{NodeFaces, REFERENCE_EDGE};
 use crate::needle::{Kinematics, PlannedPath, lateral_axes};
 use crate::scene::motion::Placement;
 use crate::scene::{Cutting, Face, FaceCondition, NeedleShape, RegionShape, Scene, TissueMaterial, Tool};
@@ -28,9 +28,9 @@ pub struct ContactNode {
     /// others only carry tip springs.
     pub pushed: bool,
     pub surface: ContactSurface,
-    /// On a slit: the faces around the node, at whose points the needle touches.
-    pub faces: Option<SlitFaces>,
-    /// What the node stands for in contact: on a slit a quarter of the areas of those faces [m^2], else its rest volume [m^3].
+    /// On a slit or under an indenter: the faces around the node, at whose points the tool touches.
+    pub faces: Option<NodeFaces>,
+    /// What the node stands for in contact: a quarter of the areas of those faces [m^2], without faces its rest volume [m^3].
     pub share: f64,
 }
 
@@ -53,7 +53,7 @@ impl ContactNode {
 struct SlitNode {
     node: u32,
     side: DVec3,
-    /// Nodes around and faces that are there, as in [`SlitFaces`].
+    /// Nodes around and faces that are there, as in [`NodeFaces`].
     ring: Vec<u32>,
     present: u32,
 }
@@ -224,6 +224,7 @@ pub struct Model {
     /// Time over which the loads grow [s].
     pub load_ramp: f64,
     pub puncture: Option<PuncturePlan>,
+    pub indentation: Option<indentation::Plan>,
     /// Faces that may separate, and copies that are tied.
     pub separation: Separation,
     /// Their law; `None` without the effect.
@@ -272,6 +273,7 @@ impl Model {
             load_ramp,
             kinematics,
             puncture: None,
+            indentation: None,
             separation: Separation::default(),
             cohesion: None,
             contact_nodes: Vec::new(),
@@ -330,7 +332,7 @@ impl Model {
         SPEED_PER_STEP * size / dt
     }
 
-    /// Stiffness of a penalty contact at a node of a separated face or under an indenter, `factor (K + 4/3 mu) l^2 / h` with the
+    /// Stiffness of a penalty contact at a node of a separated face, `factor (K + 4/3 mu) l^2 / h` with the
     /// reference length l = 0.6 mm [N/m]: a finer mesh penetrates less.
     fn contact_stiffness(&self, factor: f64) -> f64 {
         let h = self.scene.tissue.cell_size;
@@ -561,7 +563,7 @@ impl Model {
             let own = index[&slit.node];
             // Neighbours of faces that are not there may be no contact nodes.
             let ring = std::array::from_fn(|p| index.get(&slit.ring[p]).copied().unwrap_or(own));
-            let faces = SlitFaces { ring, present: slit.present };
+            let faces = NodeFaces { ring, present: slit.present };
             let place = |contact: u32| self.mesh.rest_position(self.contact_nodes[contact as usize].node as usize);
             let areas = (0..4).filter(|q| slit.present & (1 << q) != 0).map(|q| {
                 let [first, second, _] = faces.corners(q & 1, q >> 1).map(place);
@@ -592,22 +594,76 @@ impl Model {
     }
 
     fn plan_indentation(&mut self) {
-        let radius = match (self.effects.indentation, &self.scene.tool) {
-            (Some(_), Some(Tool::Sphere { radius } | Tool::FlatPunch { radius, .. })) => *radius,
+        let (radius, params) = match (self.effects.indentation, &self.scene.tool) {
+            (Some(params), Some(Tool::Sphere { radius } | Tool::FlatPunch { radius, .. })) => (*radius, params),
             _ => return,
         };
         let Some(mesh) = self.mesh.as_block() else { return };
+        let h = self.scene.tissue.cell_size;
+        let modulus = self.scene.material.law.p_wave_modulus();
+        self.indentation = Some(indentation::Plan::new(&params, modulus, self.scaled_density(), h));
         let entry = self.scene.motion.entry;
-        let top = mesh.nodes()[2] - 1;
-        self.contact_nodes = (0..mesh.node_count())
-            .filter(|&n| mesh.node_coordinates(n)[2] == top)
-            .filter_map(|node| {
-                let lateral = mesh.rest_position(node) - entry;
-                let r0 = lateral.truncate().length();
-                let carrier = ContactNode::carrier(node, r0, 0.0, mesh.node_volume(node));
-                (r0 < 1.5 * radius).then_some(ContactNode { pushed: true, ..carrier })
+        // Tissue is drawn in from the sides as the tool goes down.
+        let reach = 1.5 * radius + 0.5 * self.scene.motion.deepest().max(0.0) + h;
+        let [nx, ny, nz] = mesh.nodes();
+        let near = |i: usize, j: usize| {
+            let lateral = mesh.rest_position(mesh.node_index(i, j, nz - 1)) - entry;
+            Some(lateral.truncate().length()).filter(|r0| *r0 < reach)
+        };
+        let mut nodes = Vec::new();
+        let mut index = HashMap::new();
+        for (i, j) in (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j))) {
+            if let Some(r0) = near(i, j) {
+                index.insert((i, j), nodes.len() as u32);
+                nodes.push((i, j, r0));
+            }
+        }
+        self.contact_nodes = nodes
+            .iter()
+            .map(|&(i, j, r0)| {
+                let own = index[&(i, j)];
+                let at = |p: usize, q: usize| index.get(&((i + p).checked_sub(1)?, (j + q).checked_sub(1)?)).copied();
+                let places = (0..9).filter(|p| *p != 4).map(|p| at(p % 3, p / 3).unwrap_or(own));
+                let mut faces = NodeFaces { ring: [own; 8], present: 0 };
+                faces.ring.iter_mut().zip(places).for_each(|(ring, place)| *ring = place);
+                let width = |lines: &[f64], n: usize, side: usize| lines[n + side] - lines[n + side - 1];
+                let mut area = 0.0;
+                for (p, q) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    if [at(2 * p, 1), at(1, 2 * q), at(2 * p, 2 * q)].iter().all(Option::is_some) {
+                        faces.present |= 1 << (p + 2 * q);
+                        area += 0.25 * width(&mesh.lines[0], i, p) * width(&mesh.lines[1], j, q);
+                    }
+                }
+                let node = mesh.node_index(i, j, nz - 1);
+                ContactNode { pushed: true, faces: Some(faces), ..ContactNode::carrier(node, r0, 0.0, area) }
             })
             .collect();
+    }
+
+    /// Largest part of the tip springs that one node can carry: where the anchors are in the first cells of the path.
+    pub fn largest_spring_share(&self) -> f64 {
+        let (Some(plan), Some(mesh)) = (&self.puncture, self.mesh.as_block()) else { return 0.0 };
+        let anchors = match plan.anchors.is_empty() {
+            true => tip_anchors(&plan.path, &plan.needle, false),
+            false => plan.anchors.clone(),
+        };
+        let h = self.scene.tissue.cell_size;
+        let mut largest: f64 = 0.0;
+        for part in 0..8 {
+            let mut shares: HashMap<usize, f64> = HashMap::new();
+            for anchor in &anchors {
+                let x = anchor.surface + plan.path.direction * (h * f64::from(part) / 4.0);
+                let ([i, j, k], at) = mesh.locate(x);
+                let weight = |corner: usize, a: usize| if corner >> a & 1 == 1 { at[a] } else { 1.0 - at[a] };
+                for corner in 0..8 {
+                    let node = mesh.node_index(i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2));
+                    let share: f64 = (0..3).map(|a| weight(corner, a)).product();
+                    *shares.entry(node).or_default() += share / anchors.len() as f64;
+                }
+            }
+            largest = shares.values().fold(largest, |a, b| a.max(*b));
+        }
+        largest
     }
 
     /// The tip before the run, where the path is free.
@@ -621,15 +677,6 @@ impl Model {
                 ..FreeTip::default()
             },
             None => FreeTip::default(),
-        }
-    }
-
-    /// Contact stiffness of the tool [N/m].
-    pub fn tool_contact_stiffness(&self) -> f64 {
-        match (&self.puncture, self.effects.indentation) {
-            (Some(plan), _) => plan.contact_stiffness,
-            (None, Some(p)) => self.contact_stiffness(p.stiffness_factor),
-            _ => 0.0,
         }
     }
 

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::output::checkpoint::fingerprint;
 use crate::output::whole_file;
+use crate::reading;
 use crate::scene::Scene;
 use crate::scene::motion::HandPose;
 use crate::solver::engine::EngineInfo;
@@ -114,11 +115,7 @@ impl Session {
     /// # Errors
     /// `Error::Input` for what is no session, is too large, or holds numbers that no hand can mean.
     pub fn read(path: &Path) -> Result<Self> {
-        let size = std::fs::metadata(path).map_err(|e| wrong(path, e.to_string()))?.len();
-        if size > LARGEST_FILE {
-            return Err(wrong(path, format!("{size} bytes, more than the {LARGEST_FILE} of the longest session")));
-        }
-        let bytes = std::fs::read(path).map_err(|e| wrong(path, e.to_string()))?;
+        let bytes = reading::bytes(path, LARGEST_FILE).map_err(|e| wrong(path, e.to_string()))?;
         Self::from_bytes(path, &bytes)
     }
 
@@ -155,12 +152,12 @@ impl Session {
                 && pose.direction.z < 0.0
         };
         if let Some(frame) = session.poses.iter().position(|pose| !sane(pose)) {
-            return Err(wrong(path, format!("the pose of frame {frame} is none of a needle over the tissue")));
+            return Err(wrong(path, format!("the pose of frame {frame} is not that of a needle over the tissue")));
         }
         let frames = session.poses.len() as u64;
         let orderly = session.changes.is_sorted_by_key(|change| change.frame);
         if !orderly || session.changes.last().is_some_and(|change| change.frame > frames) {
-            return Err(wrong(path, format!("its changes are no moments of {frames} frames in order")));
+            return Err(wrong(path, format!("its changes are not in the order of its {frames} frames")));
         }
         Ok(session)
     }

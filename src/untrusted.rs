@@ -44,8 +44,8 @@ pub const READERS: &[Reader] = &[
     Reader { name: "overrides", read: overrides, memory: (GRID_LINES, 1024) },
     Reader { name: "materials", read: materials, memory: (FEW, 256) },
     Reader { name: "gmsh", read: gmsh, memory: (FEW, 128) },
-    Reader { name: "vtk", read: vtk, memory: (FEW, 128) },
-    // Arrays may be compressed; what they unpack to must agree with the counts of the file.
+    // Arrays of XML may be compressed; what they unpack to must agree with the counts of the file. A .vtk file may hold XML, too.
+    Reader { name: "vtk", read: vtk, memory: (FEW, UNPACKED) },
     Reader { name: "vtu", read: vtu, memory: (FEW, UNPACKED) },
     Reader { name: "abaqus", read: abaqus, memory: (FEW, 128) },
     Reader { name: "checkpoint", read: checkpoint, memory: (PROMISED, UNPACKED) },

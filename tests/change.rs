@@ -169,12 +169,9 @@ fn effects_are_switched_in_the_middle() {
 fn what_reaches_too_far_is_told() {
     let Some(mut simulation) = led(scene(&[]), false) else { return };
     advance(&mut simulation, 3);
-    for text in [
-        "tissue.cell_size_mm=0.9",
-        "motion.entry_mm=[1, 0]",
-        r#"effects=["friction", "mass_scaling"]"#,
-        "needle.gauge=\"18G\"",
-    ] {
+    for text in
+        ["tissue.cell_size_mm=0.9", "motion.entry_mm=[1, 0]", r#"effects=["mass_scaling"]"#, "needle.gauge=\"18G\""]
+    {
         let change = simulation.plan_change(scene(&[text])).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(change.reach, Reach::Start, "{text}");
         assert!(!simulation.change(scene(&[text])).unwrap_or_else(|e| panic!("{e}")), "{text}");

@@ -11,8 +11,10 @@ use stylet::material::{Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean}
 use stylet::model::Model;
 use stylet::scene::{FaceDrive, Scene, TissueMaterial};
 use stylet::solver::cpu::CpuEngine;
-use stylet::solver::engine::{Engine, FrameSums};
-use stylet::solver::stable_dt::{largest_frequency, power_iteration, stiffness_bounds, wave_speed_bound};
+use stylet::solver::engine::{Engine, FrameSums, StepInput};
+use stylet::solver::stable_dt::{
+    largest_frequency, largest_frequency_of, power_iteration, stiffness_bounds, wave_speed_bound,
+};
 
 use common::*;
 
@@ -331,6 +333,9 @@ fn a_twisted_cube_is_the_same_on_both_engines() {
             .sum();
         println!("{name}: torque {torque:.6e} N m, work {work:.6e} J, elastic {:.6e} J", sums.elastic);
         assert!(torque > 0.0 && work > 0.0, "{name}");
+        // The forces of the last step belong to the displacements before it.
+        close(&format!("{name}, moment of the top over the sum of its nodes"), sums.face_moments[5], torque, 2e-3);
+        close(&format!("{name}, moment of the bottom over that of the top"), -sums.face_moments[4], torque, 5e-2);
         answers.push((state.displacement, torque, work));
     }
     if let [cpu, gpu] = &answers[..] {
@@ -455,4 +460,90 @@ fn the_stiffness_bound_follows_the_deformation() {
             }
         }
     }
+}
+
+/// Largest frequency over its bound of everything that acts on the nodes in a step at `time` with the tissue at rest and the tip at the
+/// material coordinate `coordinate`: with the masses of the step where they are raised, and over that of the stable step where they are not.
+fn frequency_over_bound(name: &str, model: &Arc<Model>, time: f64, coordinate: f64) -> f64 {
+    let dt = wave_speed_bound(model);
+    let mut engine = CpuEngine::new(model.clone(), dt);
+    let mut state = engine.read_state().unwrap();
+    state.tip_coordinate = coordinate;
+    engine.write_state(&state).unwrap();
+    let input = StepInput::at(model, time, dt);
+    let (_, bounds) = engine.forces_and_bounds(&input);
+    let mut mass = model.node_mass.clone();
+    for tie in &model.separation.ties {
+        let sum = tie.iter().map(|n| mass[*n as usize]).sum();
+        tie.iter().for_each(|n| mass[*n as usize] = sum);
+    }
+    let base = state.displacement.clone();
+    let omega = largest_frequency_of(model, &base, &mass, &mut |u| {
+        state.displacement = u.to_vec();
+        engine.write_state(&state).unwrap();
+        engine.forces_and_bounds(&input).0
+    });
+    // What the engine finds in the state, and what the step has room for from the start.
+    let found = bounds.iter().zip(&mass).map(|(k, m)| k / m).fold(0.0, f64::max).sqrt();
+    let planned = 2.0 / dt;
+    let ratio = match model.effects.mass_scaling {
+        Some(_) => omega / found,
+        None => omega / planned,
+    };
+    println!("{name}: omega {omega:.4e}, bound of the state {found:.4e}, of the step {planned:.4e}: {ratio:.3}");
+    ratio
+}
+
+/// Everything that is stiff counts in the bound: indenters (bonded, too), the wall of a needle, tip springs, slit and bore, faces that may
+/// part; with raised masses and without.
+#[test]
+fn the_bound_knows_contact_springs_and_faces() {
+    let indenter = |tool: &str| {
+        format!(
+            "effects = [\"indentation\"MASS]\n[tissue]\nsize_mm = [6.0, 6.0, 4.0]\ncell_size_mm = 0.5\n[material]\n\
+             preset = \"lv2022-refit\"\n{tool}\n[[motion.phase]]\nkind = \"insert\"\nspeed_mm_s = 10.0\ndepth_mm = 0.3\n"
+        )
+    };
+    let needle = |effects: &str, rest: &str| {
+        format!(
+            "effects = [\"puncture\"{effects}MASS]\n[tissue]\nsize_mm = [12.0, 12.0, 9.0]\ncell_size_mm = 0.8\n[material]\n\
+             preset = \"muscle-60kpa\"\n[needle]\ngauge = \"16G\"\n{rest}\n[[motion.phase]]\nkind = \"insert\"\n\
+             speed_mm_s = 10.0\ndepth_mm = 4.0\n[puncture]\npuncture_force_n = 0.4\ncutting_force_n = 0.2\n"
+        )
+    };
+    let cone = "tip_half_angle_deg = 18.0";
+    let hollow = "bore_diameter_mm = 1.2\ntip_length_mm = 1.0";
+    let cohesive = "\n[cohesive]\nstrength_kpa = 20.0\nenergy_j_m2 = 60.0\n";
+    let cases = [
+        ("sphere", indenter("[sphere]\nradius_mm = 1.0"), 0.0, true),
+        ("flat punch", indenter("[flat_punch]\nradius_mm = 1.0\nbonded = false"), 0.0, true),
+        ("bonded punch", indenter("[flat_punch]\nradius_mm = 1.0\nbonded = true"), 0.0, true),
+        ("needle", needle("", cone), 3e-3, true),
+        ("needle before the puncture", needle("", cone), 0.0, true),
+        ("slit", needle(", \"cohesive\"", cone) + cohesive, 3e-3, false),
+        ("hollow needle", needle(", \"cohesive\"", hollow) + cohesive, 3e-3, false),
+    ];
+    let mut tightest: f64 = 0.0;
+    for (name, text, coordinate, unraised) in cases {
+        for mass in [", \"mass_scaling\"", ""] {
+            if mass.is_empty() && !unraised {
+                continue;
+            }
+            let mut text = text.replace("MASS", mass);
+            if !mass.is_empty() {
+                text += "[solver]\nmass_scaling = 1.0\n";
+            }
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("scene.toml");
+            std::fs::write(&path, text).unwrap();
+            let scene = Scene::load(&path, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let model = model(scene);
+            let time = if coordinate > 0.0 { 0.33 } else { 0.02 };
+            let ratio = frequency_over_bound(&format!("{name}{mass}"), &model, time, coordinate);
+            // Masses are raised at 0.9 of the bound; a run takes at most 0.9 of the step.
+            assert!(ratio < 1.0 / 0.9, "{name}{mass}: {ratio}");
+            tightest = tightest.max(ratio);
+        }
+    }
+    assert!(tightest > 0.5, "the bound is far from what it bounds: {tightest}");
 }

@@ -315,6 +315,59 @@ fn a_begun_message_must_be_ended() {
     assert_eq!(idle.next_time(), 0.5);
 }
 
+/// Four clients that send as fast as they can are read no faster than is needed, and a fifth one is served meanwhile.
+#[test]
+fn a_flood_is_not_read_as_fast_as_it_comes() {
+    let server = server(options());
+    let mut quiet = Peer::known(&server);
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let body = message("IMAGE", &vec![7; LARGEST_BODY as usize]);
+    let small = message("X", b"").repeat(1000);
+    let (begin, mut states) = (Instant::now(), 0);
+    let sent: Vec<usize> = std::thread::scope(|scope| {
+        let flood = |bytes: &'static [u8]| {
+            let peer = Peer::known(&server);
+            peer.0.set_write_timeout(Some(Duration::from_millis(100))).unwrap();
+            let stop = &stop;
+            scope.spawn(move || {
+                let mut sent = 0;
+                while !stop.load(std::sync::atomic::Ordering::Relaxed) {
+                    for piece in bytes.chunks(4096) {
+                        // Messages are cut nowhere: a piece that does not go is tried again.
+                        let mut rest = piece;
+                        while !rest.is_empty() && !stop.load(std::sync::atomic::Ordering::Relaxed) {
+                            match (&peer.0).write(rest) {
+                                Ok(count) => (sent, rest) = (sent + count, &rest[count..]),
+                                Err(error) => assert!(
+                                    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut),
+                                    "the flood is ended: {error}"
+                                ),
+                            }
+                        }
+                    }
+                }
+                sent
+            })
+        };
+        let (body, small): (&'static [u8], &'static [u8]) = (body.leak(), small.leak());
+        let floods = [flood(body), flood(body), flood(small), flood(small)];
+        while begin.elapsed() < Duration::from_secs(3) {
+            states += 1;
+            server.publish(&state(f64::from(states)));
+            assert_eq!(quiet.next_time(), f64::from(states));
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        floods.map(|flood| flood.join().unwrap()).to_vec()
+    });
+    assert!(states > 50, "{states} states in 3 s");
+    // 2 MiB a second and 1 MiB at once, and what waits in the buffers of the system.
+    for (sent, most) in sent.iter().zip([24 << 20, 24 << 20, 16 << 20, 16 << 20]) {
+        assert!(*sent < most, "{sent:?} bytes of {most} in 3 s");
+    }
+    assert_eq!(server.counters().closed, 0);
+}
+
 #[test]
 fn the_ninth_client_is_turned_away() {
     let server = server(options());

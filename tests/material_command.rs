@@ -149,3 +149,28 @@ fn a_scene_gives_its_material_and_its_effects() {
     let text = stdout("--scene scenes/muscle_biopsy.toml --points 2 --mode planar");
     assert!(text.contains("material") && text.contains("effects"));
 }
+
+#[test]
+fn a_sample_that_is_squeezed_pushes_back_and_continued_rows_are_marked() {
+    let constants = "--c10-kpa 2.3 --c01-kpa 1 --bulk-modulus-kpa 22 --mode equibiaxial";
+    // The law solved by hand: F = diag(l, l, b), P33 = 0.
+    for (stretch, expected) in [(0.7, -11448.0), (0.6, -12667.0), (0.5, -9535.0)] {
+        let last = rows(&format!("{constants} --to {stretch} --points 2 --no-unload")).pop().unwrap();
+        let found = last["nominal_stress_pa"].as_f64().unwrap();
+        assert!((found / expected - 1.0).abs() < 1e-3, "stretch {stretch}: {found} Pa");
+        assert!(last["continuation"].is_null(), "{last}");
+    }
+    for row in rows(&format!("{constants} --to 0.2 --points 9 --no-unload")).iter().skip(1) {
+        let stress = row["nominal_stress_pa"].as_f64().unwrap();
+        assert!(stress < 0.0, "{row}");
+        assert_eq!(row["continuation"] == "volume", row["stretch"].as_f64().unwrap() < 0.45, "{row}");
+    }
+    let text = stdout(&format!("{constants} --to 0.2 --points 9"));
+    let marked = text.lines().filter(|line| line.get(9..10) == Some("*")).count();
+    assert!(marked >= 2 && text.contains("* so flat for its size that the law is continued"), "{text}");
+    let csv = stdout(&format!("{constants} --to 0.2 --points 3 --csv"));
+    assert!(csv.lines().next().unwrap().ends_with(",continuation") && csv.contains(",volume\n"), "{csv}");
+    assert!(!stdout("--c10-kpa 2.3 --c01-kpa 1 --bulk-modulus-kpa 500 --mode uniaxial").contains('*'));
+    let capped = stdout("--law demiray --mu-kpa 5 --b 9 --poisson-ratio 0.49 --mode shear --to 2");
+    assert!(capped.contains("* exponent beyond 10"), "{capped}");
+}

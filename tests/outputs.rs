@@ -14,7 +14,7 @@ use stylet::output::folder::{
     ENERGY_TABLE, FORCE_CHART, FORCE_PARTS_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY,
 };
 use stylet::output::sample::{Motion as FaceMotion, SAMPLE_COLUMNS};
-use stylet::output::tables::{ENERGY_COLUMNS, force_columns};
+use stylet::output::tables::{energy_columns, force_columns};
 use stylet::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Status, Summary, Tables, write_force_chart,
     write_parts_chart, write_sample_chart,
@@ -24,6 +24,7 @@ use stylet::scene::{
     Face, FaceCondition, FaceDrive, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Target, Tissue,
     TissueMaterial, Tool,
 };
+use stylet::verdict::{Doubt, Quantity, Verdict};
 use stylet::{Error, Result};
 
 /// Shaft radius of a 16 G needle [m].
@@ -323,7 +324,7 @@ fn tables_grow_row_by_row_and_survive_without_being_closed() {
         assert!(text.ends_with('\n'));
     }
     std::mem::forget(tables);
-    for (name, columns) in [(FORCE_TABLE, &force_columns()[..]), (ENERGY_TABLE, &ENERGY_COLUMNS[..])] {
+    for (name, columns) in [(FORCE_TABLE, &force_columns()[..]), (ENERGY_TABLE, &energy_columns()[..])] {
         let mut reader = csv::Reader::from_path(folder.file(name)).unwrap();
         assert_eq!(reader.headers().unwrap(), columns);
         let rows: Vec<Vec<f64>> =
@@ -362,7 +363,18 @@ fn a_summary_is_written_whole_and_read_back() {
         status: Status::Interrupted,
         ..Default::default()
     };
-    let records = records();
+    let mut records = records();
+    let doubt = Doubt {
+        quantity: Quantity::EnergyImbalance,
+        value: 0.04,
+        bound: 0.02,
+        frame: 3,
+        time_s: 0.05,
+        place: Some("node 7".into()),
+    };
+    let last = records.last_mut().unwrap();
+    last.verdict = Verdict { doubts: vec![doubt.clone()], worst_imbalance: 0.04 };
+    last.energy.advance_cap = 2e-5;
     summary.take_frames(&records);
     let near = |value: Option<f64>, expected: f64, tolerance: f64| {
         let value = value.unwrap();
@@ -373,10 +385,9 @@ fn a_summary_is_written_whole_and_read_back() {
     near(summary.slope_after_puncture_n_per_m, 65.0, 1e-6);
     near(summary.linear_fit_r2, 1.0, 1e-9);
     near(summary.force_at_max_depth_n, 0.25 + 65.0 * 11.9e-3, 1e-2);
-    // Over the largest external work of the whole run, not of the frames up to then.
-    let residual = records.iter().map(|r| (r.energy.external - r.energy.accounted()).abs()).fold(0.0, f64::max);
-    let scale = records.iter().map(|r| r.energy.external_max).fold(0.0, f64::max);
-    assert_eq!(summary.energy_imbalance, residual / scale);
+    // The verdict is that of the last frame; a summary judges nothing itself.
+    assert_eq!((summary.energy_imbalance, &summary.doubts), (0.04, &vec![doubt]));
+    assert_eq!(summary.advance_cap_j, 2e-5);
     assert!((summary.hourglass_to_internal - 2.0 / 82.0).abs() < 1e-12);
     summary.write(&path).unwrap();
     assert_eq!(Summary::read(&path).unwrap(), summary);
@@ -656,7 +667,7 @@ fn a_sample_is_written_per_driven_face() {
     let row = reader.records().nth(45).unwrap().unwrap();
     assert_eq!(
         row.iter().collect::<Vec<_>>(),
-        ["1.5", "z_max", "0", "0", "0.006", "0", "0", "0", "40", "1.375", "100000", ""]
+        ["1.5", "z_max", "0", "0", "0.006", "0", "0", "0", "40", "1.375", "100000", "", "0"]
     );
 
     let mut summary = Summary::default();
@@ -686,6 +697,12 @@ fn signs_of_a_sample_are_those_of_the_outward_normal() {
     assert_eq!(motion, FaceMotion::Tangential);
     assert!((sheared.shear - 0.25).abs() < 1e-12 && (sheared.shear_stress.unwrap() - 1e4).abs() < 1e-6);
     assert!((sheared.nominal_stress.unwrap() - 5e3).abs() < 1e-6 && sheared.stretch == 1.0);
+    // Moved by 2 mm along x, held back by 5 N along y: the axis goes with the face, and the force through it turns nothing.
+    let faces = DrivenFace::of_scene(&driven(Face::ZMax, [2.0, 0.0, 0.0], 1.0), &mesh);
+    let mut record = FrameRecord { time: 1.0, ..Default::default() };
+    record.reactions[Face::ZMax as usize] = DVec3::new(0.0, -5.0, 0.0);
+    record.face_moments[Face::ZMax as usize] = -0.01 + 0.003;
+    assert!((faces[0].point(&record).moment - 0.003).abs() < 1e-15);
     // Both ends driven apart: the stretch counts what lies between them.
     let mut both = driven(Face::ZMax, [0.0, 0.0, 4.0], 1.0);
     both[Face::ZMin as usize] = driven(Face::ZMin, [0.0, 0.0, -4.0], 1.0)[Face::ZMin as usize].clone();
@@ -707,6 +724,44 @@ fn a_tetrahedral_face_has_a_stretch_and_no_stress() {
     let mut summary = Summary::default();
     summary.take_sample(&faces, &records);
     assert_eq!((summary.face.as_deref(), summary.peak_nominal_stress_pa), (Some("z_max"), None));
+}
+
+/// A body away from the plane y = 0, in two pieces with a gap between them at its middle: the cut goes through tissue, the first
+/// target's where there is one.
+#[test]
+fn the_cut_goes_where_the_mesh_is() {
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    let piece = |y: f64| corners.map(|x| x * 1e-2 + DVec3::Y * y);
+    let positions: Vec<DVec3> = piece(2e-3).into_iter().chain(piece(42e-3)).collect();
+    let tets = stylet::mesh::TetMesh { positions, tets: vec![[0, 1, 2, 3], [4, 5, 6, 7]], ..Default::default() };
+    let mesh = Mesh::Tets(std::sync::Arc::new(tets));
+    let mut scene = scene(None, DVec3::NEG_Z);
+    let snapshot = FieldSnapshot {
+        displacement: vec![DVec3::ZERO; 8],
+        von_mises: vec![1e3; 2],
+        jacobian: vec![1.0; 2],
+        ..Default::default()
+    };
+    let cut = render::slice::Plane::of_scene(&scene, &mesh, &snapshot);
+    let shown = render::slice::cut(&mesh, &snapshot, &cut, scene.tissue.cell_size);
+    assert!(!shown.triangles.is_empty(), "the cut at {} meets nothing", cut.origin);
+    // The picture of a cut that meets nothing, here of a body that has flown away, says so with more strokes.
+    let strokes = |snapshot: &FieldSnapshot| {
+        let ink = |v: &&stylet::render::picture::Vertex| v.field_weight == 0.0;
+        Picture::compose(&scene, &mesh, snapshot).vertices.iter().filter(ink).count()
+    };
+    let flown = FieldSnapshot { displacement: vec![DVec3::Y * 50e-3; 8], ..snapshot.clone() };
+    assert!(strokes(&flown) > strokes(&snapshot), "an empty picture says nothing");
+    let plane = |scene: &Scene| render::slice::Plane::of_scene(scene, &mesh, &snapshot).origin.y;
+    let first = plane(&scene);
+    assert!((2e-3..12e-3).contains(&first) || (42e-3..52e-3).contains(&first), "{first}");
+    for (at, [low, high]) in [(43e-3, [42e-3, 52e-3]), (5e-3, [2e-3, 12e-3])] {
+        scene.targets = vec![stylet::scene::Target { name: "t".into(), position: DVec3::Y * at, radius: 1e-3 }];
+        assert!((low..high).contains(&plane(&scene)), "{at}");
+    }
+    // A mesh that the usual plane meets is cut there.
+    scene.motion.entry.y = 4e-3;
+    assert_eq!(plane(&scene), 4e-3);
 }
 
 #[test]

@@ -80,6 +80,9 @@ fn one_page_holds_everything_and_finished_runs_are_reused() {
     assert_eq!(pictures, 6);
     assert!(text.contains("12 mm: not reached by this run"));
     assert!(text.contains("A quick look on coarse cells") && text.contains("motion.phase.0.depth_mm=5"));
+    // No comparison with the paper, so no verdict, good or bad.
+    assert!(text.contains("not judged") && text.contains("Not judged: these are not the scenes as they are"));
+    assert!(!text.contains("of the measured</span>") && !text.contains("of the measured force."));
     // The text of a picture may hold these letters by chance.
     let without_pictures: String =
         text.split("data:image/png;base64,").map(|part| &part[part.find('"').unwrap_or(0)..]).collect();

@@ -161,7 +161,16 @@ fn wrong_material() {
 #[test]
 fn wrong_keys_kinds_and_text() {
     assert_refused(&[("cell_size_mm", "cellsize_mm")], "cellsize_mm", &["did you mean `cell_size_mm`?"]);
-    assert_refused(&[("cell_size_mm = 0.6", "cell_size_mm = \"fine\"")], "cell_size_mm", &["invalid type"]);
+    assert_refused(
+        &[("cell_size_mm = 0.6", "cell_size_mm = \"fine\"")],
+        "cell_size_mm",
+        &["the text \"fine\" stands where a number is expected"],
+    );
+    assert_refused(
+        &[("preset = \"across-fibre\"", "preset = 3")],
+        "preset = 3",
+        &["the number 3 stands where a text in quotes is expected"],
+    );
     assert_refused(&[("cell_size_mm = 0.6", "")], "[tissue]", &["no `cell_size_mm`", "mesh = \"part.msh\""]);
     assert_refused(&[("cell_size_mm = 0.6", "cell_size_mm = ")], "cell_size_mm", &["not TOML"]);
     assert_refused(&[("[20.0, 20.0, 16.0]", "[20.0, 20.0]")], "size_mm", &["invalid length"]);
@@ -278,7 +287,11 @@ fn a_tool_without_phases_and_phases_without_a_tool() {
 
 #[test]
 fn wrong_tools_and_parameters() {
-    assert_refused(&[("gauge = \"16G\"", "gauge = \"16\"")], "gauge", &["did you mean \"16G\"?"]);
+    for written in ["\"16\"", "16"] {
+        let change = format!("gauge = {written}");
+        assert_refused(&[("gauge = \"16G\"", &change)], "gauge", &["ends in G", "did you mean \"16G\"?", "14G, 15G"]);
+    }
+    assert_refused(&[("gauge = \"16G\"", "gauge = 99")], "gauge", &["no needle gauge called \"99\"", "14G, 15G"]);
     assert_refused(&[("gauge = \"16G\"", "outer_diameter_mm = 0")], "outer_diameter_mm", &["from 0.05"]);
     assert_refused(&[("tip_half_angle_deg = 18.0", "")], "[needle]", &["tip_half_angle_deg = 18"]);
     assert_refused(&[("\"steel-304\"", "\"steel\"")], "material = \"steel\"", &["steel-304"]);
@@ -386,7 +399,7 @@ fn absurd_numbers_of_steps_and_frames() {
 #[test]
 fn a_device_is_no_library() {
     let message = refusal(&main_scene(), &["material.library=\"/dev/zero\""]);
-    assert!(message.contains("/dev/zero is a device or a pipe"), "{message}");
+    assert!(message.contains("the material library /dev/zero: it is a pipe or a device"), "{message}");
 }
 
 #[test]
@@ -450,12 +463,115 @@ fn harmless_contradictions_become_notices() {
     };
     assert!(notices(&["effects=[\"puncture\",\"mass_scaling\"]"]).contains("[friction] has no effect"));
     assert!(notices(&["effects=[\"puncture\",\"friction\"]"]).contains("solver.mass_scaling"));
-    assert!(notices(&["effects=[\"mass_scaling\"]"]).contains("The needle has no effect"));
+    assert!(notices(&["effects=[\"mass_scaling\"]"]).contains("The needle does not touch the tissue"));
     assert!(notices(&["material={c10_kpa=2.3,c01_kpa=1,d_per_mpa=4,poisson_ratio=0.45}"]).contains("nu 0.4934"));
     assert!(
         notices(&["material={c10_kpa=2,c01_kpa=-1,poisson_ratio=0.45,allow_limited=true}"]).contains("below 1.414")
     );
     assert!(notices(&["outputs.pictures_at_depth_mm=[20]"]).contains("never reaches"));
+}
+
+/// A number out of range has no law that could be called unstable.
+#[test]
+fn a_poissons_ratio_out_of_range_is_the_only_problem() {
+    let message = refusal(&main_scene(), &["material={preset=\"across-fibre\",poisson_ratio=0.5}"]);
+    assert!(message.contains("must be below 0.5") || message.contains("incompressible"), "{message}");
+    assert!(!message.contains("shear modulus") && message.matches("error:").count() == 1, "{message}");
+    for written in
+        ["c10_kpa=2,c01_kpa=1,poisson_ratio=0.7", "law=\"yeoh\",c10_kpa=2,c20_kpa=1,c30_kpa=0,bulk_modulus_kpa=-1"]
+    {
+        let message = refusal(&main_scene(), &[&format!("material={{{written}}}")]);
+        assert!(!message.contains("REFUSED") && message.matches("error:").count() == 1, "{message}");
+    }
+}
+
+/// What rubs must touch.
+#[test]
+fn friction_without_contact_is_refused() {
+    assert_refused(
+        &[("effects = [\"puncture\", \"friction\", \"mass_scaling\"]", "effects = [\"friction\"]")],
+        "effects =",
+        &["effect `friction` needs `puncture`", "add \"puncture\""],
+    );
+    let indenter = repository().join("scenes/effects/indentation.toml");
+    let message = refusal(&indenter, &["effects=[\"friction\"]"]);
+    assert!(message.contains("needs `indentation`") && message.contains("add \"indentation\""), "{message}");
+    // A needle that touches nothing says so, with the way out.
+    let scene = Scene::load(&main_scene(), &["effects=[]".into()]).unwrap();
+    assert!(scene.notices.iter().any(|n| n.contains("add \"puncture\"")), "{:?}", scene.notices);
+}
+
+/// Faces that would fail before they begin to: refused with the numbers, and what is offered is accepted.
+#[test]
+fn cohesion_fails_after_it_begins_to() {
+    let scene = |overrides: &[&str]| {
+        let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
+        Scene::load(&repository().join("scenes/slit.toml"), &overrides)
+    };
+    let soft = ["material={preset=\"demiray-muscle\"}", "cohesive.energy_j_m2=10", "cohesive.strength_kpa=200"];
+    let soft_with = |more: &str| {
+        let overrides: Vec<String> = soft.iter().chain([&more]).map(|s| s.to_string()).collect();
+        Scene::load(&repository().join("scenes/slit.toml"), &overrides)
+    };
+    let message = scene(&soft).unwrap_err().to_string();
+    for text in
+        ["REFUSED cohesion", "strength 200 kPa", "energy 10 J/m^2", "way out: write under [cohesive] energy_j_m2"]
+    {
+        assert!(message.contains(text), "no `{text}` in\n{message}");
+    }
+    // Every number of the way out leads out, and one a little beside it does not.
+    let offered = |key: &str| -> f64 {
+        let rest = &message[message.rfind(key).unwrap() + key.len()..];
+        let words = rest.split([' ', ',', '\n']).filter_map(|word| word.parse::<f64>().ok());
+        words.into_iter().next().unwrap()
+    };
+    for (key, worse) in [("energy_j_m2", 0.98), ("strength_kpa", 1.02), ("penalty_factor", 0.98)] {
+        let value = offered(key);
+        soft_with(&format!("cohesive.{key}={value}")).unwrap_or_else(|e| panic!("{key} {value}: {e}"));
+        assert!(soft_with(&format!("cohesive.{key}={}", value * worse)).is_err(), "{key} {}", value * worse);
+    }
+    // The mixture in between counts, and so do mesh, material and penalty: all that a slider can change.
+    let message = scene(&["cohesive.shear_energy_j_m2=2"]).unwrap_err().to_string();
+    assert!(message.contains("in shear") && message.contains("shear_energy_j_m2"), "{message}");
+    for more in [
+        "cohesive.penalty_factor=5",
+        "cohesive.penalty_pa_m=1e8",
+        "cohesive.strength_kpa=400",
+        "cohesive.energy_j_m2=5",
+    ] {
+        assert!(scene(&[more]).unwrap_err().to_string().contains("REFUSED cohesion"), "{more}");
+    }
+    // Without the effect the table says nothing.
+    assert!(scene(&["cohesive.energy_j_m2=1", "effects=[\"puncture\", \"mass_scaling\"]"]).is_ok());
+}
+
+/// A misspelt word is not only refused by the program: the schema knows the words, from the same tables.
+#[test]
+fn the_schema_knows_the_words() {
+    let schema = Scene::schema();
+    let list = |pointer: &str| -> Vec<String> {
+        let found = schema.pointer(pointer).unwrap_or_else(|| panic!("no {pointer}")).as_array().unwrap();
+        found.iter().map(|word| word.as_str().unwrap().to_string()).collect()
+    };
+    let effects = list("/properties/effects/items/enum");
+    assert_eq!(effects, stylet::effects::EFFECTS.map(|e| e.key));
+    let gauges = list("/$defs/NeedleTable/properties/gauge/enum");
+    assert!(gauges.contains(&"16G".to_string()) && gauges.len() == presets::needles().len());
+    let known = list("/$defs/MaterialTable/then/properties/preset/enum");
+    assert!(known.contains(&"across-fibre".to_string()) && known.len() == presets::tissues().len());
+    // A library of one's own has other names.
+    assert_eq!(schema.pointer("/$defs/MaterialTable/if/not/required/0").unwrap(), "library");
+    assert_eq!(list("/$defs/TissueTable/properties/unit/enum"), ["m", "cm", "mm", "um", "inch"]);
+    assert_eq!(list("/$defs/CohesivePlaneTable/properties/axis/enum"), ["x", "y", "z"]);
+    let text = schema.to_string();
+    for word in ["steel-304", "mooney_rivlin", "insert"] {
+        assert!(text.contains(&format!("\"{word}\"")), "{word}");
+    }
+    // What a text may be left out stays optional.
+    for table in ["NeedleTable", "TissueTable"] {
+        assert!(schema.pointer(&format!("/$defs/{table}/required")).is_none(), "{table}");
+    }
+    assert!(schema.pointer("/$defs/NeedleTable/properties/gauge/description").is_some());
 }
 
 #[test]
@@ -527,6 +643,126 @@ fn assert_block_refused(effects: &str, text: &str, marker: &str, expected: &[&st
     assert!(message.contains(&format!("scene.toml:{line}:")), "no scene.toml:{line} in\n{message}");
     for expected in expected {
         assert!(message.contains(expected), "no `{expected}` in\n{message}");
+    }
+}
+
+/// A list of a fixed length is never cut: whatever the table, and however it is written.
+#[test]
+fn lists_that_are_too_long() {
+    assert_refused(
+        &[("[20.0, 20.0, 16.0]", "[20.0, 20.0, 16.0, 4.0]")],
+        "size_mm",
+        &["`tissue.size_mm` has 4 entries, 3 are wanted"],
+    );
+    let region =
+        |shape: &str| format!("{MATERIAL}[[region]]\nname = \"a\"\n{shape}\nmaterial = {{ preset = \"fat\" }}\n");
+    for (text, path) in [
+        (region("layer_mm = [0, 2, 4]"), "region.0.layer_mm"),
+        (region("box_mm = { low = [0, 0, -4], high = [2, 2, -1, 7] }"), "region.0.box_mm.high"),
+        (region("sphere_mm = { centre = [0, 0, -4, 1], radius = 1 }"), "region.0.sphere_mm.centre"),
+        (format!("{MATERIAL}[[target]]\nposition_mm = [0, 0, -3, 1]\n"), "target.0.position_mm"),
+        (format!("{MATERIAL}[gravity]\nacceleration_m_s2 = [0, 0, -9, 81]\n"), "gravity.acceleration_m_s2"),
+        (
+            format!(
+                "{MATERIAL}[boundaries]\nz_max = {{ fixed = [\"z\"], displacement_mm = [0, 0, 1, 2], duration_s = 1 }}\n"
+            ),
+            "boundaries.z_max.displacement_mm",
+        ),
+        (
+            format!("{MATERIAL}[motion]\nentry_mm = [0, 0, 0]\n[[motion.phase]]\nkind = \"hold\"\nduration_s = 1\n"),
+            "motion.entry_mm",
+        ),
+    ] {
+        let key = path.rsplit('.').next().unwrap();
+        assert_block_refused("", &text, key, &[&format!("`{path}` has "), "are wanted", "too long"]);
+    }
+}
+
+/// Lists are counted before anything is made of them.
+#[test]
+fn lists_without_end_are_refused_at_once() {
+    let targets = "[[target]]\nposition_mm = [0, 0, -3]\n".repeat(60_000);
+    let planes = "[[cohesive.plane]]\naxis = \"z\"\nat_mm = -3\n".repeat(60_000);
+    let phases = "[[motion.phase]]\nkind = \"hold\"\nduration_s = 1\n".repeat(60_000);
+    let regions = "[[region]]\nname = \"a\"\n".repeat(60_000);
+    let goals = "[[task.goal]]\nkind = \"hit\"\n".repeat(60_000);
+    let wrong = "[[target]]\nposition = 1\n".repeat(4_000);
+    for (text, expected) in [
+        (targets, "60000 entries"),
+        (planes, "60000 entries"),
+        (phases, "60000 entries"),
+        (regions, "60000 entries"),
+        (goals, "60000 entries"),
+        (wrong, "unknown field `position`"),
+        (format!("[outputs]\npictures_at_s = [{}]\n", "0.1, ".repeat(200_000)), "200000 entries"),
+        ("[[target]]\nposition_mm = [nan, 9, 9]\n".repeat(4_000), "more problems"),
+    ] {
+        let begin = std::time::Instant::now();
+        let message = load_block("", &format!("{MATERIAL}{text}")).unwrap_err();
+        let took = begin.elapsed().as_secs_f64();
+        assert!(message.contains(expected), "no `{expected}` in\n{message:.2000}");
+        assert!(took < 4.0, "{expected}: {took} s");
+        assert!(message.len() < 20_000, "{} bytes of message", message.len());
+    }
+    let effects = "\"a\", ".repeat(60_000);
+    assert!(load_block(&effects, MATERIAL).unwrap_err().contains("60000 entries"));
+}
+
+/// What somebody wrote is shown, not repeated: a key, a value or a line of a megabyte stays out of the message.
+#[test]
+fn messages_stay_short() {
+    let long = "a".repeat(1 << 20);
+    for text in [
+        format!("{MATERIAL}{long} = 1\n"),
+        format!("{MATERIAL}\"{}\" = 1\n", "a b ".repeat(1 << 18)),
+        format!("[material]\npreset = \"{long}\"\n"),
+        format!("[material]\npreset = \"across-fibre\" # {long}\nlaw = \"none\"\n"),
+        format!("[material]\npreset = 1 # {long}\n"),
+        format!("{MATERIAL}[outputs]\npictures_at_s = [{}-1]\n", "1, ".repeat(4000)),
+        format!("{MATERIAL}{}x = 1\n", "[".repeat(1 << 16)),
+        format!("{MATERIAL}[outputs{}]\n", ".a".repeat(1 << 16)),
+        format!("{MATERIAL}[outputs{}]\n", ".a".repeat(60)),
+    ] {
+        let message = load_block("", &text).unwrap_err();
+        assert!(message.len() < 20_000, "{} bytes of message:\n{message:.3000}", message.len());
+        assert!(message.contains("scene.toml:"), "{message}");
+    }
+    // The place in a long line is the one of the file.
+    let held = "\"x\", ".repeat(500);
+    let text = format!("{MATERIAL}[boundaries]\nz_max = {{ fixed = [{held}], radius = 1 }}\n");
+    let message = load_block("", &text).unwrap_err();
+    assert!(message.contains("radius = 1") && message.contains("..."), "{message}");
+    let place = message.split("scene.toml:").nth(1).unwrap();
+    let column: usize = place.split([':', '\n']).nth(1).unwrap().parse().unwrap();
+    assert!((2520..2560).contains(&column), "{message}");
+}
+
+#[test]
+fn an_effect_is_listed_once() {
+    assert_block_refused(
+        "\"gravity\", \"gravity\"",
+        MATERIAL,
+        "effects = [\"gravity\"",
+        &["effect `gravity` is listed twice"],
+    );
+}
+
+/// Planes that share a grid line would part nothing or leave cells that decide the time step.
+#[test]
+fn planes_need_grid_lines_of_their_own() {
+    let planes = |at: &[&str]| {
+        let planes: String = at.iter().map(|at| format!("[[cohesive.plane]]\naxis = \"z\"\nat_mm = {at}\n")).collect();
+        format!("{MATERIAL}[cohesive]\nenergy_j_m2 = 60\n{planes}")
+    };
+    load_block("\"cohesive\"", &planes(&["-3", "-5", "-7.5"])).unwrap_or_else(|m| panic!("{m}"));
+    for (at, expected) in [
+        (["-5", "-5.0001"], "too close for cells of 2 mm"),
+        (["-5", "-5.3"], "too close for cells of 2 mm"),
+        (["-5", "-5.0"], "is there already"),
+        (["-5", "-9.95"], "too close for cells of 2 mm"),
+    ] {
+        let message = load_block("\"cohesive\"", &planes(&at)).unwrap_err();
+        assert!(message.contains(expected) && message.contains("at_mm") && message.contains("way out: "), "{message}");
     }
 }
 

@@ -8,6 +8,7 @@ use assert_cmd::cargo::CommandCargoExt;
 use serde_json::Value;
 use stylet::gpu::Gpu;
 use stylet::solver::simulation::EngineChoice;
+use stylet::stability::random::{self, RandomOptions, RandomScene};
 use stylet::stability::{CASES, EngineReport, Options, Suite, run};
 
 fn options(without_cure: bool) -> Options {
@@ -144,5 +145,111 @@ fn wrong_calls_are_refused() {
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {error}");
         assert!(expected.iter().all(|e| error.contains(e)), "{args:?}: {error}");
+    }
+}
+
+/// Random scenes of this seed, made in a folder of their own.
+fn random_scenes(seed: u64, indices: std::ops::Range<u64>) -> (tempfile::TempDir, Vec<RandomScene>) {
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = indices.map(|index| RandomScene::make(seed, index, folder.path()).unwrap()).collect();
+    (folder, scenes)
+}
+
+#[test]
+fn a_seed_gives_the_same_random_scenes() {
+    let ((_a, first), (_b, second)) = (random_scenes(11, 0..25), random_scenes(11, 0..25));
+    for (a, b) in first.iter().zip(&second) {
+        assert_eq!(a.text, b.text);
+        assert_eq!((&a.mesh, a.mistake), (&b.mesh, b.mistake));
+    }
+    // One alone is the same as in its row, and another seed has others.
+    assert_eq!(random_scenes(11, 17..18).1[0].text, first[17].text);
+    let body = |scene: &RandomScene| scene.text.lines().skip(1).collect::<Vec<_>>().join("\n");
+    let other = random_scenes(12, 0..25).1;
+    assert!(first.iter().zip(&other).all(|(a, b)| body(a) != body(b)));
+}
+
+/// 200 seeds, one scene of each: read, or refused with a way out; a mistake is refused for what it is. All effects, laws, tools and kinds of
+/// phase come up.
+#[test]
+fn random_scenes_are_read_or_refused_with_a_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut read, mut text, mut mistakes) = (0, String::new(), 0);
+    for seed in 0..200 {
+        let scene = RandomScene::make(seed, seed % 7, folder.path()).unwrap();
+        match scene.scene(folder.path()) {
+            Ok(_) => {
+                assert_eq!(scene.mistake, None, "seed {seed}: nobody saw the mistake\n{}", scene.text);
+                read += 1;
+            }
+            Err(error) => {
+                let told = error.to_string();
+                assert_eq!(error.exit_code(), 2);
+                assert!(told.contains("way out: "), "seed {seed}: {told}");
+                if let Some(expected) = scene.mistake {
+                    assert!(told.contains(expected), "seed {seed}: `{expected}` is missing in\n{told}");
+                    mistakes += 1;
+                }
+            }
+        }
+        text += &scene.text;
+    }
+    assert!(read >= 160 && mistakes >= 3, "{read} of 200 were read, {mistakes} mistakes refused");
+    let wanted = stylet::effects::EFFECTS.iter().map(|effect| format!("\"{}\"", effect.key));
+    let laws = ["neo_hookean", "mooney_rivlin", "yeoh", "ogden", "demiray"].map(|law| format!("law = \"{law}\""));
+    let words = [
+        "bevel_angle_deg",
+        "bore_diameter_mm",
+        "[sphere]",
+        "[flat_punch]",
+        "mesh = ",
+        "traction_kpa",
+        "rotation_deg",
+        "layer_mm",
+        "sphere_mm",
+        "cylinder_mm",
+        "membrane",
+        "[[cohesive.plane]]",
+        "\"withdraw\"",
+        "\"hold\"",
+        "\"move\"",
+        "\"turn\"",
+        "\"reposition\"",
+        "path = \"free\"",
+        "[motion.vibration]",
+        "time_step_us",
+        "mass_scaling = \"auto\"",
+        "axis_offset_cells",
+        "[[target]]",
+        "preset = ",
+        "poisson_ratio",
+        "bulk_modulus_kpa",
+        "d_per_mpa",
+        "youngs_modulus_kpa",
+    ];
+    for word in wanted.chain(laws).chain(words.map(String::from)) {
+        assert!(text.contains(&word), "no scene of 200 has {word}");
+    }
+}
+
+#[test]
+fn a_few_random_scenes_end_as_they_may() {
+    let mut engines = vec![EngineChoice::Cpu];
+    if has_gpu() {
+        engines.insert(0, EngineChoice::Gpu);
+    }
+    let keep = tempfile::tempdir().unwrap();
+    let options = RandomOptions { count: 6, seed: 3, only: Vec::new(), engines, keep: Some(keep.path().to_path_buf()) };
+    let mut lines = Vec::new();
+    let report = random::run(&options, &mut |_| (), &mut |scene| lines.push(scene.line()), &AtomicBool::new(false));
+    let report = report.unwrap();
+    println!("{}\n{}", lines.join("\n"), report.table());
+    assert_eq!(report.scenes.len(), 6);
+    assert_eq!(report.problems(), [""; 0]);
+    // What ended other than ok lies there with its head, and is the same scene.
+    for scene in report.scenes.iter().filter(|scene| !scene.is_plain()) {
+        let path = keep.path().join(format!("random_3_{}.toml", scene.index));
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with(&format!("# random scene, seed 3, index {}; reasonable: ", scene.index)), "{text}");
     }
 }

@@ -20,7 +20,8 @@ struct FreeTip {
     // Dissipated by the tip law in this frame [J]; stored in the tip springs now [J].
     dissipation: f32,
     spring_energy: f32,
-    _pad: f32,
+    // Dissipated in this frame beyond the threshold, while the cap on the advance holds the force above it [J].
+    cap_dissipation: f32,
 }
 
 // A cell of the box that the tip may open.

@@ -1,16 +1,16 @@
 // Indentation: shape of the tool and penalty contact. Equations: src/effects/indentation.rs.
 struct IndentationParams {
-    // Radius of the sphere or punch [m], normal stiffness [N/m], fraction of critical damping.
+    // Radius of the sphere or punch [m], contact stiffness kappa [Pa/m], damping over stiffness tau [s].
     radius: f32,
-    contact_stiffness: f32,
-    contact_damping: f32,
+    face_stiffness: f32,
+    face_damping: f32,
     // 1: flat punch, 0: sphere.
     flat: u32,
     // 1: a touched node sticks to the tool for good.
     bonded: u32,
     _pad0: u32,
-    _pad1: u32,
-    _pad2: u32,
+    // Where the axis of the tool meets the top face at rest [m].
+    entry: vec2<f32>,
 }
 
 // Ahead of other effects' parameters: a software adapter (lavapipe of Mesa 22.3) crashes where a branch depends on a stage's fourth

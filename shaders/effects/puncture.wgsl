@@ -87,8 +87,9 @@ struct TipState {
     bond_slid: f32,
     // Mean distance of the tip plane beyond the anchors [m].
     gap: f32,
+    // Dissipated in this frame beyond the threshold, while the cap on the advance holds the force above it [J].
+    cap_dissipation: f32,
     _pad0: f32,
-    _pad1: f32,
 }
 
 // Cell that the path passes: part of its stiffness that is left then, s0 range of the part that opens [m].
@@ -118,6 +119,11 @@ const LARGEST_ADVANCE: f32 = 22e-6;
 // How far the tip may advance in a step in which the needle travels `travel` [m]; `first`: it is still at the surface.
 fn advance_limit(first: bool, travel: f32) -> f32 {
     return min(max(select(LARGEST_ADVANCE, FIRST_ADVANCE, first), 1.25 * travel), 4.0 * travel);
+}
+
+// Part of the tip force that is above the threshold.
+fn share_beyond(force: f32, threshold: f32) -> f32 {
+    return select(0.0, 1.0 - threshold / force, force > threshold);
 }
 
 #ifdef BORE

@@ -127,6 +127,11 @@ fn remember(index: u32, m: Memory) {
     contact_records[index].path = vec4<f32>(m.passed, m.rest_radius, 0.0, 0.0);
 }
 
+// Held by the springs of contact node `index` at its last step [J].
+fn held_by(index: u32) -> f32 {
+    return contact_records[index].energies.w;
+}
+
 // Books one step of contact node `index`: tip, normal and tangential force, lever about the tip, and what else there is.
 fn book_contact(
     index: u32,

@@ -1,14 +1,11 @@
 // Kinematics that all laws share; formulas in src/material/kinematics.rs.
 
-// J below which the isochoric factors continue as their second-order Taylor polynomials.
+// J below which isochoric factors and measures continue.
 const J_CONTINUATION: f32 = 0.3;
-// Values, first and second derivatives of J^(-2/3) and J^(-4/3) at 0.3.
+// Value, first and second derivative of J^(-2/3) at 0.3.
 const A0: f32 = 2.2314431;
 const A1: f32 = -4.9587624;
 const A2: f32 = 27.548680;
-const B0: f32 = 4.9793386;
-const B1: f32 = -22.130394;
-const B2: f32 = 172.12529;
 
 // J^(-1/3) for J >= 0.3: first guess from the exponent bits (3 % off), three Newton steps. The last one corrects, so that
 // J = 1 gives exactly 1.
@@ -22,7 +19,8 @@ fn inverse_cube_root(J: f32) -> f32 {
 }
 
 struct IsochoricFactors {
-    // a = J^(-2/3), b = J^(-4/3), and -3/2 da/dJ, -3/4 db/dJ: at J = 1 all four are exactly 1.
+    // a = J^(-2/3), b = J^(-4/3), and -3/2 da/dJ, -3/4 db/dJ: at J = 1 all four are exactly 1. Below J = 0.3 a continues as
+    // its second-order Taylor polynomial; all others but its slope stay those of 0.3.
     a: f32,
     a_fall: f32,
     b: f32,
@@ -42,12 +40,83 @@ fn isochoric_factors(J: f32) -> IsochoricFactors {
     var f: IsochoricFactors;
     f.a = select(r2, A0 + d * (A1 + 0.5 * d * A2), below);
     f.a_fall = select(r2 * r3, -1.5 * (A1 + d * A2), below);
-    f.b = select(r4, B0 + d * (B1 + 0.5 * d * B2), below);
-    f.b_fall = select(r4 * r3, -0.75 * (B1 + d * B2), below);
-    // r is that of J = 0.3 below, as are the second derivatives.
+    f.b = r4;
+    f.b_fall = r4 * r3;
     f.a_curvature = 1.1111111 * (r4 * r4);
     f.b_curvature = 3.1111111 * (r4 * r4 * r2);
     return f;
+}
+
+// An isochoric measure M and its derivatives; never below 3.
+struct Measure {
+    value: f32,
+    by_s: f32,
+    by_j: f32,
+    by_jj: f32,
+}
+
+// x^p for x >= low, its second-order Taylor polynomial at `low` below: value, first and second derivative.
+fn continued_power(x: f32, p: f32, low: f32) -> vec3<f32> {
+    let at = max(x, low);
+    // Exact at 1, so that tissue at rest stays there.
+    let value = select(exp2(p * log2(at)), 1.0, at == 1.0);
+    let slope = p * value / at;
+    let curvature = (p - 1.0) * slope / at;
+    let d = min(x - low, 0.0);
+    return vec3<f32>(value + d * (slope + 0.5 * d * curvature), slope + d * curvature, curvature);
+}
+
+// Continuation of M = J^-m S for J < 0.3, m = 2/3 or, `of_areas`, 4/3; the equations are at `isochoric_measure`. All powers are
+// roots: a software adapter has no others without a call.
+fn continued_measure(S: f32, J: f32, of_areas: bool) -> Measure {
+    const GAIN: f32 = 0.06;
+    const FLOOR: f32 = 0.002;
+    let m = select(0.6666667, 1.3333334, of_areas);
+    // v^(8/3), the fourth power of lengths or the second of areas; beyond 2^40 the scale is 1.
+    let third = clamp(S * 0.33333333, 0.0, 1e6);
+    let square = third * third;
+    let volume = select(square * square, square, of_areas);
+    let floored = volume + FLOOR;
+    let root = sqrt(1.0 + GAIN / floored);
+    let fourth = sqrt(root);
+    let k3 = fourth * sqrt(fourth);
+    let k3m = select(fourth, root, of_areas);
+    // d ln k^3 / d ln v.
+    let fall = -GAIN * (volume / floored) / (floored + GAIN);
+    // a(q) and its derivatives.
+    let q = k3 * J;
+    let at = max(q, J_CONTINUATION);
+    let c = inverse_cube_root(at);
+    let value = select(c * c, c * c * c * c, of_areas);
+    let slope_at = -m * value / at;
+    let curvature = -(m + 1.0) * slope_at / at;
+    let d = min(q - J_CONTINUATION, 0.0);
+    let a = vec3<f32>(value + d * (slope_at + 0.5 * d * curvature), slope_at + d * curvature, curvature);
+    // g and its slope: 3/b with b at 0.3 r.
+    let start = select(A0, A0 * A0, of_areas);
+    let scaled = k3m * S;
+    let least = 3.0 / start;
+    let x = clamp(scaled / least, 1e-12, 1.0);
+    let below_one = x - 1.0;
+    let side = sqrt(x);
+    let r = select(
+        vec2<f32>(x * side, 1.5 * side),
+        vec2<f32>(1.0 + 0.75 * below_one * (1.0 - 0.125 * below_one), 0.75 * (1.0 - 0.25 * below_one)),
+        of_areas,
+    );
+    let e = J_CONTINUATION * (r.x - 1.0);
+    let start_slope = -m * start / J_CONTINUATION;
+    let start_curvature = -(m + 1.0) * start_slope / J_CONTINUATION;
+    let b = vec2<f32>(start + e * (start_slope + 0.5 * e * start_curvature), start_slope + e * start_curvature);
+    let below = scaled < least;
+    let g = select(scaled, 3.0 / b.x, below);
+    let slope = select(1.0, -3.0 * b.y / (b.x * b.x) * J_CONTINUATION * r.y / least, below);
+    var out: Measure;
+    out.value = a.x * g;
+    out.by_s = a.y * k3 * J * (fall / (m * max(S, 1e-12))) * g + a.x * slope * k3m * (1.0 + fall);
+    out.by_j = a.y * k3 * g;
+    out.by_jj = a.z * k3 * k3 * g;
+    return out;
 }
 
 // J - 1 = tr H + (tr^2 H - tr H^2)/2 + det H, without cancellation.

@@ -1,13 +1,11 @@
 // Contact of the needle at the points of the faces of a slit. Equations: src/needle/slit.rs.
 #import shared/displacement
 #import shared/contact_node
+#import shared/face_points
 #import effects/puncture
 #ifdef FLEXIBLE_NEEDLE
 #import effects/flexible_needle
 #endif
-
-// Points of a face along each of its edges.
-const FACE_POINTS: u32 = 3u;
 
 // What the points of all faces around a node do to the node.
 struct SlitForce {
@@ -26,17 +24,6 @@ struct SlitForce {
     bound: f32,
 }
 
-// Contact node `place` (row by row, 4 is the node itself) of the 3 x 3 block around a node.
-fn slit_neighbour(contact: Contact, place: u32) -> u32 {
-    let at = select(place, place - 1u, place > 4u);
-    return select(contact.ring_low[at & 3u], contact.ring_high[at & 3u], at > 3u);
-}
-
-fn lever_of(contact: u32) -> vec3<f32> {
-    return contact_nodes[contact].rest.xyz - step_input.tip.xyz
-        + vec3<f32>(node_displacement[contact_nodes[contact].numbers.x].xyz) * DISPLACEMENT_UNIT;
-}
-
 fn slit_force(index: u32) -> SlitForce {
     var sum: SlitForce;
     let contact = contact_at(index);
@@ -46,9 +33,9 @@ fn slit_force(index: u32) -> SlitForce {
     for (var face = 0u; face < 4u; face++) {
         let i = face & 1u;
         let j = face >> 1u;
-        let first = slit_neighbour(contact, 2u * i + 3u);
-        let second = slit_neighbour(contact, 6u * j + 1u);
-        let far = slit_neighbour(contact, 2u * i + 6u * j);
+        let first = face_neighbour(contact, 2u * i + 3u);
+        let second = face_neighbour(contact, 6u * j + 1u);
+        let far = face_neighbour(contact, 2u * i + 6u * j);
         let levers = array<vec3<f32>, 3>(lever_of(first), lever_of(second), lever_of(far));
         let rest_axial = vec4<f32>(
             contact.rest_axial,
@@ -65,9 +52,7 @@ fn slit_force(index: u32) -> SlitForce {
         );
         let k = puncture.face_stiffness * length(cross(edges[0], edges[1])) / f32(FACE_POINTS * FACE_POINTS);
         for (var point = select(FACE_POINTS * FACE_POINTS, 0u, near); point < FACE_POINTS * FACE_POINTS; point++) {
-            let t = (f32(point % FACE_POINTS) + 0.5) / f32(FACE_POINTS);
-            let u = (f32(point / FACE_POINTS) + 0.5) / f32(FACE_POINTS);
-            let w = vec4<f32>((1.0 - t) * (1.0 - u), t * (1.0 - u), (1.0 - t) * u, t * u);
+            let w = face_weights(point);
             let lever = own * w.x + levers[0] * w.y + levers[1] * w.z + levers[2] * w.w;
             let s = dot(s, w);
             var from_axis = lever;

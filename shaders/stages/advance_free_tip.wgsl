@@ -17,6 +17,9 @@ var<workgroup> columns_y: array<vec3<f32>, ANCHOR_COUNT>;
 var<workgroup> columns_z: array<vec3<f32>, ANCHOR_COUNT>;
 var<workgroup> old_sway: vec3<f32>;
 var<workgroup> moved: f32;
+// Threshold [N] in a step in which the cap on the advance holds the force above it, else NO_CAP.
+var<workgroup> capped: f32;
+const NO_CAP: f32 = 1e30;
 
 struct GridPlace {
     cell: vec3<u32>,
@@ -177,6 +180,7 @@ fn move_tip() {
     let cap = advance_limit(at_surface, travel);
     let slip_cap = 4.0 * travel + SLIP_CAP;
     let advance = clamp((force - threshold) / (puncture.tip_stiffness * stretch), 0.0, cap);
+    capped = select(NO_CAP, threshold, advance == cap);
     let retreat = clamp((-SLACK - gap) / stretch, 0.0, slip_cap);
     let size = length(sway);
     let held = min(threshold, force) / puncture.tip_stiffness;
@@ -215,6 +219,7 @@ fn advance_free_tip(@builtin(local_invocation_index) lane: u32) {
     if (lane == 0u) {
         free_tip.advance = 0.0;
         moved = 0.0;
+        capped = NO_CAP;
         if (free_tip.inside == 0.0) {
             look_for_surface();
         }
@@ -246,17 +251,21 @@ fn advance_free_tip(@builtin(local_invocation_index) lane: u32) {
         let t = step_input.direction.xyz;
         var stored = 0.0;
         var lost = 0.0;
+        var force = 0.0;
         var sway = vec3<f32>(0.0);
         for (var i = 0u; i < ANCHOR_COUNT; i++) {
             stored += gaps[i];
             lost += columns_x[i].x;
+            force += tip_anchor_loads[i].force;
             sway += sways[i] * (inside / f32(ANCHOR_COUNT));
         }
         sway -= t * dot(sway, t);
         stored += 0.5 * puncture.tip_stiffness * dot(sway, sway);
-        lost += puncture.tip_stiffness * dot(sway, old_sway - sway);
+        let beyond = lost * share_beyond(force, capped);
+        lost += puncture.tip_stiffness * dot(sway, old_sway - sway) - beyond;
         free_tip.sway = vec4<f32>(sway * spring, 0.0);
         free_tip.spring_energy = stored;
         free_tip.dissipation += select(0.0, lost, moved == 1.0);
+        free_tip.cap_dissipation += select(0.0, beyond, moved == 1.0);
     }
 }

@@ -91,6 +91,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
     let law = adhesion;
 #endif
     workgroupBarrier();
+    var capped = false;
     if (lane == 0u) {
         var gap = 0.0;
         var stretch = 0.0;
@@ -106,6 +107,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
             let cap = advance_limit(before == 0.0, speed * params.dt);
             let lambda = clamp(stretch / f32(ANCHOR_COUNT), 0.2, 3.0);
             advance = min(excess / (puncture.tip_stiffness * lambda), cap);
+            capped = advance == cap;
         }
         coordinate = before + advance;
         bond_force = 0.0;
@@ -155,7 +157,10 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         tip_state.coordinate = after;
         tip_state.spring_energy = stored;
         tip_state.gap = distance / f32(ANCHOR_COUNT);
-        tip_state.dissipation += select(0.0, lost, after > before);
+        let lost_now = select(0.0, lost, after > before);
+        let beyond = lost_now * select(0.0, share_beyond(force, threshold), capped);
+        tip_state.dissipation += lost_now - beyond;
+        tip_state.cap_dissipation += beyond;
         tip_state.membrane_impulse += force * membrane_share(after) * params.dt;
     }
 }

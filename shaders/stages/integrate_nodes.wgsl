@@ -5,6 +5,7 @@
 #import shared/thread_index
 #import shared/displacement
 #import shared/gathered_force
+#import shared/node_cures
 #ifdef STEP_INPUT
 #import shared/step_input
 #endif
@@ -32,8 +33,6 @@
 @group(2) @binding(0) var<storage, read_write> node_displacement: array<vec4<i32>>;
 // v at the half step [m/s]; w: energy that mass damping took in this frame [J].
 @group(2) @binding(1) var<storage, read_write> node_velocity: array<vec4<f32>>;
-// Nodes whose speed was clamped in this frame, summed over the steps.
-@group(2) @binding(3) var<storage, read_write> clamped_nodes: atomic<u32>;
 
 @compute @workgroup_size(64)
 fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -84,9 +83,10 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
     let square = dot(next, next);
     let fast = square > params.speed_limit * params.speed_limit;
+    var stopped = vec3<f32>(0.0);
     for (var once = select(1u, 0u, fast); once == 0u; once++) {
-        next *= params.speed_limit * inverseSqrt(square);
-        atomicAdd(&clamped_nodes, 1u);
+        stopped = next * (1.0 - params.speed_limit * inverseSqrt(square));
+        next -= stopped;
     }
     var prescribed = vec3<f32>(0.0);
 #ifdef DRIVEN_FACES
@@ -113,6 +113,23 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #ifdef TIED
     taken *= share;
 #endif
+    let ratio = sum.w * params.dt * params.dt / (4.0 * mass);
+    for (var once = select(1u, 0u, mass > scaled_mass || fast || ratio > WATCHED_STEP_RATIO); once == 0u; once++) {
+        var cures = node_cures[node];
+        // The kinetic energy is told with the mass at rest: what the rest of the mass gained in this step is gone.
+        var raised = 0.5 * (mass - scaled_mass) * (dot(next, next) - dot(old.xyz, old.xyz));
+        // Work of the force that holds the node back.
+        var clamped = mass * (1.0 + half) * dot(stopped, mid);
+#ifdef TIED
+        raised *= share;
+        clamped *= share;
+#endif
+        cures.raised_energy += raised;
+        cures.clamped_energy += clamped;
+        cures.clamped_steps += select(0.0, 1.0, fast);
+        cures.step_ratio = max(cures.step_ratio, select(0.0, ratio, ratio > WATCHED_STEP_RATIO));
+        node_cures[node] = cures;
+    }
     let damped = old.w + taken;
     node_velocity[node] = vec4<f32>(next, damped);
     let way = next * (params.dt * UNITS_PER_METRE);

@@ -47,7 +47,8 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
         contact_records[index].impulse = vec4<f32>(0.0);
         contact_records[index].angular_impulse = vec4<f32>(0.0);
         contact_records[index].parts = vec4<f32>(0.0);
-        contact_records[index].energies = vec4<f32>(0.0);
+        // What the springs hold is no sum over steps.
+        contact_records[index].energies = vec4<f32>(0.0, 0.0, 0.0, record.energies.w);
     }
     contact_totals[lane] = total;
 #ifdef FREE_PATH
@@ -63,8 +64,10 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
         result.coordinate = free_tip.coordinate;
         result.dissipation = free_tip.dissipation;
         result.spring_energy = free_tip.spring_energy;
+        result.cap_dissipation = free_tip.cap_dissipation;
         tip_result = result;
         free_tip.dissipation = 0.0;
+        free_tip.cap_dissipation = 0.0;
         for (var other = 0u; other < 64u; other++) {
             tip_result.softening += softened[other];
         }
@@ -74,6 +77,7 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
     if (lane == 0u) {
         tip_result = tip_state;
         tip_state.dissipation = 0.0;
+        tip_state.cap_dissipation = 0.0;
         tip_state.membrane_impulse = 0.0;
         tip_state.bond_impulse = 0.0;
         tip_state.bond_dissipation = 0.0;

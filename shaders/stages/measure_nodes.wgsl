@@ -3,6 +3,7 @@
 #import shared/thread_index
 #import shared/displacement
 #import shared/node_sums
+#import shared/node_cures
 #ifdef NODE_WORK
 #import shared/node_work
 #endif
@@ -10,7 +11,6 @@
 @group(1) @binding(1) var<storage, read> node_mass: array<f32>;
 @group(2) @binding(0) var<storage, read_write> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read_write> node_velocity: array<vec4<f32>>;
-@group(2) @binding(3) var<storage, read_write> clamped_nodes: atomic<u32>;
 
 // True where a float has the exponent of Inf or NaN.
 fn not_finite(v: vec3<f32>) -> bool {
@@ -30,12 +30,19 @@ fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         let mass = node_mass[node];
         sums.kinetic += 0.5 * mass * dot(v.xyz, v.xyz);
         sums.damping += v.w;
-        let moment = vec3<f32>(u.xyz) * (DISPLACEMENT_UNIT * mass);
+        // Half a step ago, as the work of every other load is booked with the mean of the old and the new velocity.
+        let moment = (vec3<f32>(u.xyz) * DISPLACEMENT_UNIT - v.xyz * (0.5 * params.dt)) * mass;
         sums.moment_x += moment.x;
         sums.moment_y += moment.y;
         sums.moment_z += moment.z;
         sums.max_speed = max(sums.max_speed, length(v.xyz));
         sums.raised_mass += u32(u.w);
+        let cures = node_cures[node];
+        sums.raised_energy += cures.raised_energy;
+        sums.clamped_energy += cures.clamped_energy;
+        sums.clamped_nodes += u32(cures.clamped_steps);
+        sums.step_ratio = max(sums.step_ratio, cures.step_ratio);
+        node_cures[node] = NodeCures();
         // +-30 mm of the +-31 mm that the fixed point holds.
         let far = any(abs(u.xyz) > vec3<i32>(2061584302));
         sums.out_of_range += select(0u, 1u, far || not_finite(v.xyz));
@@ -45,9 +52,6 @@ fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
 #endif
         node_velocity[node] = vec4<f32>(v.xyz, 0.0);
         node_displacement[node] = vec4<i32>(u.xyz, 0);
-    }
-    if (thread == 0u) {
-        sums.clamped_nodes = atomicExchange(&clamped_nodes, 0u);
     }
     node_sums[thread] = sums;
 }

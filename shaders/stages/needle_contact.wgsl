@@ -268,6 +268,8 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         left.rest_radius = contact_records[index].path.y;
 #endif
         remember(index, left);
-        contact_records[index].energies = vec4<f32>(contact_records[index].energies.xyz, 0.0);
+        // What its springs held goes with the contact.
+        let booked = contact_records[index].energies;
+        contact_records[index].energies = vec4<f32>(booked.x, booked.y, booked.z + booked.w, 0.0);
     }
 }

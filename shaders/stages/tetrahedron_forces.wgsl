@@ -14,11 +14,9 @@
 // [N/m], zero without mass scaling.
 @group(2) @binding(2) var<storage, read_write> corner_force: array<vec4<f32>>;
 
-// Bounds of the stiffness that a cell adds to its corners [N/m], which mass scaling asks for:
-// V (K |cof B_i| sum|cof B_j| + tangent |B_i| sum|B_j|).
+// Bounds of the stiffness that a cell adds to its corners [N/m]:
+// V ((K + turned tangent) |cof B_i| sum|cof B_j| + tangent |B_i| sum|B_j|).
 fn stiffness_bounds(tet: Tetrahedron, point: PointAnswer) -> vec4<f32> {
-    var bound = vec4<f32>(0.0);
-#ifdef MASS_SCALING
     let gb = tet.gradient_b_and_volume.xyz;
     let gc = tet.gradient_c_and_edge.xyz;
     let gd = tet.gradient_d_and_material.xyz;
@@ -29,12 +27,10 @@ fn stiffness_bounds(tet: Tetrahedron, point: PointAnswer) -> vec4<f32> {
     let ca = cb + cc + cd;
     let turned = sqrt(vec4<f32>(dot(ca, ca), dot(cb, cb), dot(cc, cc), dot(cd, cd)));
     let straight = sqrt(vec4<f32>(dot(ga, ga), dot(gb, gb), dot(gc, gc), dot(gd, gd)));
-    let bulk_modulus = materials[material_number(tet)].bulk_modulus;
+    let turned_modulus = materials[material_number(tet)].bulk_modulus + point.turned_tangent;
     let one = vec4<f32>(1.0);
-    bound = (turned * (bulk_modulus * dot(turned, one)) + straight * (point.tangent * dot(straight, one)))
+    return (turned * (turned_modulus * dot(turned, one)) + straight * (point.tangent * dot(straight, one)))
         * tet.gradient_b_and_volume.w;
-#endif
-    return bound;
 }
 
 @compute @workgroup_size(64)

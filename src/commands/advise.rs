@@ -42,6 +42,8 @@ struct Proposal {
     factor: f64,
     /// Of the force curve, from the study.
     error: Option<f64>,
+    /// The mesh is that of the study's reference: the error holds no part of it.
+    same_mesh: bool,
 }
 
 /// Measures this machine for about a second and proposes settings.
@@ -140,9 +142,15 @@ pub fn advise(options: &AdviseOptions) -> Result<String> {
             );
             line(
                 "error",
-                p.error.map_or("not known without a study".into(), |e| {
-                    format!("{} % of the force over depth", digits(100.0 * e))
-                }),
+                match p.error {
+                    None => "not known without a study".into(),
+                    Some(e) if p.same_mesh => format!(
+                        "{} % of the force over depth by mass scaling and step; that of the mesh is not known, it is the \
+                         reference's own",
+                        digits(100.0 * e)
+                    ),
+                    Some(e) => format!("{} % of the force over depth", digits(100.0 * e)),
+                },
             );
             line(
                 "run it",
@@ -186,7 +194,12 @@ fn of_study(
         sizes.push(size);
     }
     let fastest = candidates.iter().map(|c| c.real_time_factor / SHARE).fold(0.0, f64::max);
-    match best_in_real_time(&candidates) {
+    // Of the reference's own mesh no error is known; it is proposed where nothing else is fast enough.
+    let unjudged = || {
+        let fast = candidates.iter().filter(|c| c.same_mesh && c.real_time_factor >= 1.0 && c.error.is_finite());
+        fast.min_by(|a, b| a.error.total_cmp(&b.error))
+    };
+    match best_in_real_time(&candidates).or_else(unjudged) {
         Some(best) => {
             let place = candidates.iter().position(|c| c == best).unwrap_or(0);
             Ok(Proposal {
@@ -194,6 +207,7 @@ fn of_study(
                 size: sizes[place],
                 factor: best.real_time_factor / SHARE,
                 error: Some(best.error),
+                same_mesh: best.same_mesh,
             })
         }
         None => Err(format!(
@@ -224,7 +238,7 @@ fn by_rule(subject: &Subject, cost: &UnitCost, rate: f64) -> std::result::Result
         let factor = predicted_factor(size, &settings, cost, rate);
         fastest = fastest.max(factor);
         if factor * SHARE >= 1.0 {
-            return Ok(Proposal { settings, size, factor, error: None });
+            return Ok(Proposal { settings, size, factor, error: None, same_mesh: false });
         }
     }
     Err(format!(

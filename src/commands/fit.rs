@@ -17,6 +17,7 @@ use crate::material::fit::{Fit, LawFit, Point, best_stable, fit_all, nominal_str
 use crate::material::{ElasticLaw, Isochoric, Verdict, describe_verdict};
 use crate::output::fit_chart::fit_chart;
 use crate::output::whole_file;
+use crate::reading;
 use crate::scene::presets::bulk_modulus_from_poisson;
 
 /// Names of the files in the folder `--out`.
@@ -25,6 +26,8 @@ pub const TABLE: &str = "fit.csv";
 
 /// Fewest points away from rest: Yeoh's law has three constants.
 const FEWEST_POINTS: usize = 3;
+/// Most points of all files: what a fit takes grows with them.
+const MOST_POINTS: usize = 10_000;
 /// Stretches outside are mistakes of column or unit, not of measurement.
 const POSSIBLE_STRETCH: (f64, f64) = (0.1, 20.0);
 
@@ -156,12 +159,13 @@ fn check_options(options: &FitOptions) -> Result<()> {
 pub fn read_curves(files: &[PathBuf]) -> Result<Curves> {
     let mut curves = Curves::default();
     for path in files {
-        let bytes = fs::read(path).map_err(|reason| {
-            Error::input(
-                format!("{}: cannot be read: {reason}", path.display()),
-                "check the name; a curve is a CSV file, see `stylet fit --help`",
-            )
-        })?;
+        let bytes = reading::bytes(path, reading::most::CURVE)
+            .map_err(|unread| unread.of(path, "check the name; a curve is a CSV file, see `stylet fit --help`"))?;
+        if reading::is_built_in(path) {
+            curves
+                .notes
+                .push(format!("there is no file {} here: the one built into the program is used", path.display()));
+        }
         read_bytes(path, bytes, &mut curves)?;
     }
     enough(curves, files)
@@ -261,6 +265,12 @@ fn read_table(path: &Path, text: &str, curves: &mut Curves) -> Result<()> {
         match &columns {
             None => columns = Some(read_header(&place, &record, &mut curves.notes)?),
             Some(columns) if record.iter().all(str::is_empty) && columns.names.len() > 1 => {}
+            Some(_) if curves.points.len() + rows.len() == MOST_POINTS => {
+                return Err(place.error(
+                    format!("more than {MOST_POINTS} rows, which a fit does not need"),
+                    "keep every tenth or hundredth row: a hundred points along a curve tell its law as well",
+                ));
+            }
             Some(columns) => rows.push(read_row(&place, &record, columns, separator != b',')?),
         }
     }

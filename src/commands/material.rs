@@ -12,7 +12,8 @@ use crate::effects::{damage, fibres, plasticity, viscoelastic};
 use crate::error::{Error, Result};
 use crate::material::Mode;
 use crate::material::{
-    Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict, four_digits,
+    Continuation, Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict,
+    four_digits,
 };
 use crate::material_point::Material;
 use crate::material_test::{self, Leg, Protocol, Row};
@@ -207,6 +208,15 @@ pub fn material(args: &MaterialArgs) -> Result<String> {
             cell_length: args.cell_mm * MM,
         };
         curves.push((mode, material_test::run(&subject.material, mode, &protocol)?));
+    }
+    // The table marks these rows.
+    let continued = curves.iter().flat_map(|(_, rows)| rows).filter_map(|row| row.continuation).next();
+    if let (true, Some(continuation)) = (args.json || args.csv, continued) {
+        eprintln!(
+            "note: rows with an entry in `continuation`, e.g. {}: {}",
+            continuation.key(),
+            continuation.describe()
+        );
     }
     // The table has the verdict in its head.
     if (args.json || args.csv) && verdict != Verdict::Stable {
@@ -594,6 +604,8 @@ struct Record {
     work_j_m3: f64,
     stored_j_m3: f64,
     dissipated_j_m3: f64,
+    /// `volume`, `exponent`, `stretch` where the law is continued, else null.
+    continuation: Option<&'static str>,
 }
 
 fn record(mode: Mode, row: &Row) -> Record {
@@ -614,6 +626,7 @@ fn record(mode: Mode, row: &Row) -> Record {
         work_j_m3: row.work,
         stored_j_m3: row.stored,
         dissipated_j_m3: row.dissipated,
+        continuation: row.continuation.map(Continuation::key),
     }
 }
 
@@ -621,7 +634,7 @@ fn record(mode: Mode, row: &Row) -> Record {
 fn csv(curves: &[(Mode, Vec<Row>)]) -> String {
     let mut text = String::from(
         "mode,stretch,shear,nominal_stress_pa,cauchy_stress_pa,cycle,leg,time_s,lateral_stretch_2,lateral_stretch_3,\
-         j,plastic_strain,damage,work_j_m3,stored_j_m3,dissipated_j_m3\n",
+         j,plastic_strain,damage,work_j_m3,stored_j_m3,dissipated_j_m3,continuation\n",
     );
     let cell = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
     for (mode, rows) in curves {
@@ -629,7 +642,7 @@ fn csv(curves: &[(Mode, Vec<Row>)]) -> String {
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
-                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 r.mode,
                 cell(r.stretch),
                 cell(r.shear),
@@ -645,7 +658,8 @@ fn csv(curves: &[(Mode, Vec<Row>)]) -> String {
                 r.damage,
                 r.work_j_m3,
                 r.stored_j_m3,
-                r.dissipated_j_m3
+                r.dissipated_j_m3,
+                r.continuation.unwrap_or_default()
             );
         }
     }
@@ -767,6 +781,8 @@ fn columns(material: &Material, mode: Mode) -> Vec<Column> {
 
 /// Width of the first column.
 const LEG_WIDTH: usize = 11;
+/// Place of the mark of a continued law in it.
+const MARK_AT: usize = 9;
 
 fn table(text: &mut String, material: &Material, mode: Mode, rows: &[Row], fine: &[Row]) {
     let columns = columns(material, mode);
@@ -782,7 +798,8 @@ fn table(text: &mut String, material: &Material, mode: Mode, rows: &[Row], fine:
     for row in rows.iter().filter(|row| !repeats(row)) {
         let leg = if last == Some((row.cycle, row.leg)) { "" } else { row.leg.key() };
         last = Some((row.cycle, row.leg));
-        let _ = write!(text, "{leg:<LEG_WIDTH$}");
+        let mark = if row.continuation.is_some() { "*" } else { "" };
+        let _ = write!(text, "{:<LEG_WIDTH$}", format!("{leg:<MARK_AT$}{mark}"));
         for c in &columns {
             // Rounding noise must not print as -0.000.
             let value = (c.value)(row);
@@ -793,6 +810,13 @@ fn table(text: &mut String, material: &Material, mode: Mode, rows: &[Row], fine:
     }
     if rows.iter().any(repeats) {
         *text += "unloading  the same: no effect with a memory is on\n";
+    }
+    let mut named = Vec::new();
+    for continuation in rows.iter().filter_map(|row| row.continuation) {
+        if !named.contains(&continuation) {
+            named.push(continuation);
+            let _ = writeln!(text, "* {}", continuation.describe());
+        }
     }
     if let Some((control, stress)) = material_test::peak(fine) {
         let quantity = if mode == Mode::Shear { "shear" } else { "stretch" };

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::Result;
+use crate::ending;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::{DrivenFace, OutputFolder, Tables};
@@ -26,9 +27,11 @@ pub struct ReplayOptions {
 pub struct ReplayOutcome {
     pub folder: PathBuf,
     pub frames: u64,
-    /// Largest axial force [N], and energy that is missing over the largest external work.
+    /// Largest axial force [N], and the largest energy imbalance, see [`crate::verdict`].
     pub largest_force: f64,
     pub imbalance: f64,
+    /// Why the run is doubtful, see [`crate::verdict`].
+    pub doubt: Option<String>,
     /// Simulated and wall time of the frames [s].
     pub simulated: f64,
     pub wall: f64,
@@ -61,6 +64,7 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
         frames: 0,
         largest_force: 0.0,
         imbalance: 0.0,
+        doubt: None,
         simulated: 0.0,
         wall: 0.0,
         same_place: session.version == env!("CARGO_PKG_VERSION")
@@ -70,18 +74,30 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
         adapter: place(env!("CARGO_PKG_VERSION"), &info.adapter),
     };
     for (frame, pose) in (0..).zip(&session.poses) {
+        if ending::is_asked() {
+            break;
+        }
         session.change(&mut simulation, frame)?;
         simulation.lead(pose);
-        let Some(record) = simulation.next_frame()? else { break };
+        let record = match simulation.next_frame() {
+            Ok(Some(record)) => record,
+            Ok(None) | Err(Error::Ended(_)) => break,
+            Err(error) => return Err(error),
+        };
         tables.append(&record)?;
         records.push(record.clone());
         outcome.frames += 1;
         outcome.simulated = record.time;
         outcome.largest_force = outcome.largest_force.max(record.force.axial);
-        outcome.imbalance = record.energy.imbalance();
+        outcome.imbalance = record.verdict.worst_imbalance;
+        outcome.doubt = record.verdict.sentence();
     }
     outcome.wall = begin.elapsed().as_secs_f64();
     session.write(&folder.file(SESSION))?;
+    // Half a session has no score.
+    if ending::is_asked() {
+        return Ok(outcome);
+    }
     let sample = |record: &FrameRecord| {
         let pose = simulation.tool_pose(record.time)?;
         Some(Sample { time: record.time, tip: pose.tip, direction: pose.direction })

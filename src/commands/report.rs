@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::output::report::CaseResults;
 use crate::output::report::lv2022::{CASES, Case, Report, SCENES};
 use crate::output::{Status, whole_file};
+use crate::reading;
 use crate::scene::Scene;
 use crate::solver::simulation::EngineChoice;
 
@@ -142,13 +143,14 @@ fn plan(options: &ReportOptions) -> Result<Vec<Planned>> {
         let path = folder.join(format!("{}.toml", case.name));
         let quick = if options.quick { case.quick } else { Some(&[][..]) };
         let Some(quick) = quick else { continue };
-        let text = match std::fs::read_to_string(&path) {
+        let text = match reading::text(&path, reading::most::SCENE) {
             Ok(text) => text,
-            Err(reason) if reason.kind() == std::io::ErrorKind::NotFound && case.optional => continue,
+            Err(reason) if reason.is_missing() && case.optional => continue,
             Err(reason) => {
                 return Err(Error::input(
                     format!("cannot read the scene {}: {reason}", path.display()),
-                    "call the program in the folder of the repository, or name the folder of the scenes with --scenes",
+                    reason
+                        .way_out("name the folder of the scenes with --scenes; without it the built-in ones are taken"),
                 ));
             }
         };
@@ -178,9 +180,9 @@ impl Ledger {
 fn open_ledger(out: &Path, options: &ReportOptions, planned: &[Planned]) -> Result<Ledger> {
     let new = Ledger { report: options.name.clone(), ..Default::default() };
     let path = out.join(LEDGER);
-    let found = match std::fs::read_to_string(&path) {
+    let found = match reading::text(&path, reading::most::OWN) {
         Ok(text) => serde_json::from_str::<Ledger>(&text).ok().filter(|ledger| ledger.report == options.name),
-        Err(reason) if reason.kind() == std::io::ErrorKind::NotFound => {
+        Err(unread) if unread.is_missing() => {
             // Without a ledger the folder is new, unless there are results.
             planned.iter().all(|plan| !out.join(plan.case.name).exists()).then(|| new.clone())
         }

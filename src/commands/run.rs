@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use crate::ending;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
@@ -15,11 +16,13 @@ use crate::output::{
     TargetFigures, folder, write_force_chart, write_parts_chart, write_sample_chart,
 };
 use crate::process;
+use crate::reading;
 use crate::render;
 use crate::scene::{OnTrouble, Scene};
 use crate::solver::checkpoint::Checkpoint;
 use crate::solver::engine::EngineInfo;
 use crate::solver::simulation::{EngineChoice, Simulation};
+use crate::solver::trial::Trial;
 
 /// What the command line adds to the scene.
 #[derive(Debug, Clone, Default)]
@@ -57,6 +60,9 @@ const IMAGE_FRAMES: u64 = 10;
 /// Images that are kept, and frames before a failure from which on one is taken: the guard waits for a few frames.
 const IMAGES: usize = 3;
 const BEFORE_FAILURE: u64 = 5;
+
+/// Most frames over which a shorter step is tried.
+const MOST_TRIED_FRAMES: u64 = 20;
 
 /// How often a run may halve its time step.
 const MOST_HALVINGS: u32 = 4;
@@ -116,6 +122,8 @@ struct Run<'a> {
     clock: Clock,
     /// The simulation a little ago, oldest first.
     images: VecDeque<Checkpoint>,
+    /// The one before the run became doubtful.
+    before_doubt: Option<Checkpoint>,
     halvings: u32,
 }
 
@@ -139,10 +147,6 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     let (mut due, mut written, mut ending) = (None, Instant::now(), false);
     loop {
         if interrupted.load(Ordering::Relaxed) && !ending {
-            if options.checkpoint_every.is_none() {
-                status = Status::Interrupted;
-                break;
-            }
             ending = true;
             due = Some(run.simulation.stop_soon());
         }
@@ -153,6 +157,11 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         let frame = match run.advance(&progress) {
             Ok(Some(frame)) => frame,
             Ok(None) => break,
+            // The frame under way takes long: the run is kept up to the newest image.
+            Err(Error::Ended(_)) => {
+                (failure, status) = (run.keep_newest_image().err(), Status::Interrupted);
+                break;
+            }
             Err(error) => match run.recover(error) {
                 Ok(()) => {
                     (due, told) = (None, 0);
@@ -189,12 +198,28 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     let folder = run.output.path().to_path_buf();
     let interrupted = status == Status::Interrupted;
     let checkpoint = run.output.file(folder::CHECKPOINT);
+    let (reached, of) = (run.records.last().map_or(0.0, |r| r.time), run.simulation.duration());
+    // Results come first where there is little room: a checkpoint takes what they leave.
+    let full = matches!(failure, Some(Error::File { .. })) && !checkpoint.exists();
+    let newest = run.images.back().filter(|_| full).cloned().map(|image| run.checkpoint(image));
     let (summary, missing) = run.finish(status, first_step_ms);
+    if let Some(newest) = newest
+        && let Err(error) = newest.write(&checkpoint)
+    {
+        log::info!("no checkpoint: {error}");
+    }
     // What stopped the run comes first, then what of its results could not be written.
     let mut errors = failure.into_iter().chain(missing);
     let first = errors.next();
     for error in errors {
         eprintln!("warning: {error}");
+    }
+    if interrupted {
+        eprintln!(
+            "stopped by {} at {reached:.3} s of {of:.3} s: results and a checkpoint are in {}",
+            ending::reason(),
+            folder.display()
+        );
     }
     if (interrupted || matches!(first, Some(Error::File { .. }))) && checkpoint.exists() {
         eprintln!("go on with: stylet run --resume {}", folder.display());
@@ -213,6 +238,8 @@ impl<'a> Run<'a> {
     fn new(scene: Scene, options: &'a RunOptions) -> Result<Self> {
         let mut simulation = Simulation::new(scene, options.engine)?;
         let scene = simulation.model.scene.clone();
+        // From here on there is something to keep.
+        ending::begin();
         let resumed = options.resume.as_deref().zip(options.out.as_deref());
         let output = match resumed {
             Some((checkpoint, out)) => {
@@ -234,6 +261,7 @@ impl<'a> Run<'a> {
             records: records.to_vec(),
             cells_in_needle: None,
             images: VecDeque::new(),
+            before_doubt: None,
             halvings: 0,
             options,
             scene,
@@ -282,6 +310,9 @@ impl<'a> Run<'a> {
         self.tables.append(&record)?;
         progress.update(&record, record.time / self.clock.here().max(1e-9));
         let frame = record.frame;
+        if !record.verdict.is_ok() && self.before_doubt.is_none() {
+            self.before_doubt = self.images.front().cloned();
+        }
         self.records.push(record);
         for moment in self.moments.iter().filter(|m| m.frame == frame) {
             let record = &self.records[self.records.len() - 1];
@@ -298,6 +329,9 @@ impl<'a> Run<'a> {
     }
 
     fn keep_image(&mut self) -> Result<()> {
+        if self.images.back().is_some_and(|newest| newest.frames == self.records.len() as u64) {
+            return Ok(());
+        }
         let simulation = &mut self.simulation;
         let image = self.clock.aside(|| simulation.checkpoint())?;
         if self.images.len() == IMAGES {
@@ -311,7 +345,7 @@ impl<'a> Run<'a> {
     fn checkpoint(&self, simulation: Checkpoint) -> RunCheckpoint {
         RunCheckpoint {
             version: env!("CARGO_PKG_VERSION").into(),
-            scene: std::path::absolute(&self.scene.path).unwrap_or_else(|_| self.scene.path.clone()),
+            scene: reading::from_everywhere(&self.scene.path),
             overrides: self.options.overrides.clone(),
             fingerprint: fingerprint(&self.scene),
             adapter: self.info.adapter.clone(),
@@ -325,9 +359,16 @@ impl<'a> Run<'a> {
     }
 
     fn write_checkpoint(&mut self) -> Result<()> {
-        let image = self.simulation.checkpoint()?;
+        self.keep_image()?;
+        let Some(image) = self.images.back().cloned() else { return Ok(()) };
         let (checkpoint, path) = (self.checkpoint(image), self.output.file(folder::CHECKPOINT));
         self.clock.aside(|| checkpoint.write(&path))
+    }
+
+    /// Writes the newest image as checkpoint.
+    fn keep_newest_image(&self) -> Result<()> {
+        let Some(image) = self.images.back().cloned() else { return Ok(()) };
+        self.checkpoint(image).write(&self.output.file(folder::CHECKPOINT))
     }
 
     /// After the device is lost: writes the newest image as checkpoint, and tells how to go on from there.
@@ -353,7 +394,11 @@ impl<'a> Run<'a> {
         let (frame, text) = (*frame, error.to_string());
         let early = self.images.iter().rposition(|image| image.frames + BEFORE_FAILURE <= frame).unwrap_or(0);
         let Some(image) = self.images.get(early).cloned() else { return Err(error) };
+        // A cure needs a state from before the trouble began, which may be long before it stops the run.
+        let sound = self.before_doubt.clone().filter(|early| early.frames <= image.frames).unwrap_or(image.clone());
         if self.scene.solver.on_trouble == OnTrouble::HalveStep && self.halvings < MOST_HALVINGS {
+            let image = sound;
+            self.before_doubt = None;
             self.halvings += 1;
             let mut next = self.simulation.halved(&image)?;
             next.notices.push(format!(
@@ -381,6 +426,14 @@ impl<'a> Run<'a> {
                 return Err(error);
             }
         };
+        let advice = self.tried_on_trouble(&sound, frame);
+        let error = match error {
+            Error::Diverged { frame, step, time_s, message } => {
+                Error::Diverged { frame, step, time_s, message: format!("{message}\n  tried: {advice}") }
+            }
+            other => other,
+        };
+        let text = error.to_string();
         let (checkpoint, model) = (self.checkpoint(image), self.simulation.model.clone());
         match write_forensics(&self.output, &model, &finding, &text, &checkpoint, self.device.as_ref()) {
             Ok((folder, missing)) if missing.is_empty() => {
@@ -395,9 +448,31 @@ impl<'a> Run<'a> {
         Err(error)
     }
 
+    /// What a shorter step does about a doubt: it is tried from the image before the doubt began. `None` where nothing can be tried.
+    fn tried_on_doubt(&mut self) -> Option<String> {
+        let image = self.before_doubt.take()?;
+        let doubt = self.simulation.verdict().doubts.first()?.clone();
+        // As far as the doubt had grown to most of what it is, some frames at least.
+        let last = (doubt.frame + MOST_TRIED_FRAMES / 2).min(self.records.len() as u64 - 1);
+        let tried = self.clock.aside(|| self.simulation.try_cures(&image, last));
+        Some(tried_in_words(tried))
+    }
+
+    /// The same for a run that is stopped in frame `frame`.
+    fn tried_on_trouble(&mut self, image: &Checkpoint, frame: u64) -> String {
+        let last = (frame + BEFORE_FAILURE).min(self.simulation.frame_count() - 1);
+        let tried = self.clock.aside(|| self.simulation.try_cures(image, last));
+        tried_in_words(tried)
+    }
+
     /// Writes charts and summary; returns what could not be written. The checkpoint of a run that has ended well is removed once
     /// all is written.
-    fn finish(self, status: Status, first_step_ms: Option<f64>) -> (Summary, Vec<Error>) {
+    fn finish(mut self, status: Status, first_step_ms: Option<f64>) -> (Summary, Vec<Error>) {
+        let status = match (status, self.simulation.verdict().sentence()) {
+            (Status::Ok, Some(why)) => Status::Doubtful(why),
+            (status, _) => status,
+        };
+        let advice = matches!(status, Status::Doubtful(_)).then(|| self.tried_on_doubt()).flatten();
         let (wall, cpu) = (self.clock.wall(), self.clock.cpu());
         let mesh = &self.simulation.model.mesh;
         let steps = self.records.last().map_or(0, |r| r.step);
@@ -449,28 +524,17 @@ impl<'a> Run<'a> {
         let mut missing: Vec<Error> = written.into_iter().filter_map(Result::err).collect();
         let checkpoint = output.file(folder::CHECKPOINT);
         // A replay of a failure may be wanted again.
-        let done = summary.status == Status::Ok && missing.is_empty() && !output.path().ends_with(FORENSICS);
+        let done = matches!(summary.status, Status::Ok | Status::Doubtful(_))
+            && missing.is_empty()
+            && !output.path().ends_with(FORENSICS);
         if done
             && checkpoint.exists()
             && let Err(source) = std::fs::remove_file(&checkpoint)
         {
             missing.push(Error::file(&checkpoint, source));
         }
-        if summary.energy_imbalance > 0.02 && summary.raised_mass_share > 0.01 {
-            eprintln!(
-                "note: {:.1} % of the energy are missing or too much, and {:.1} % of all node steps had their mass raised: the step \
-                 is too long for the squeezed cells; way out: solver.safety = {}",
-                100.0 * summary.energy_imbalance,
-                100.0 * summary.raised_mass_share,
-                0.5 * scene.solver.safety
-            );
-        }
-        if summary.raised_mass_share > 0.2 {
-            eprintln!(
-                "note: {:.0} % of all node steps had their mass raised to keep the step stable: inertia is not what \
-                 mass_scaling says; lower solver.time_step_us or raise solver.mass_scaling",
-                100.0 * summary.raised_mass_share
-            );
+        if let Some(advice) = advice {
+            eprintln!("note: {advice}");
         }
         if summary.return_failures > 0 {
             eprintln!(
@@ -480,8 +544,41 @@ impl<'a> Run<'a> {
                 folder::ENERGY_TABLE
             );
         }
+        if ending::is_overdue() {
+            // A driver finishes the frame that was given up before it lets go; nobody waits for that.
+            std::mem::forget(self.simulation);
+        }
         (summary, missing)
     }
+}
+
+/// What came of the cures that were tried; one is named as a way out only where it was one.
+fn tried_in_words(tried: Result<Trial>) -> String {
+    let trial = match tried {
+        Ok(trial) => trial,
+        Err(error) => return format!("nothing, the run could not be repeated ({error})"),
+    };
+    let without = trial
+        .without
+        .map_or("where the run is stopped without it".into(), |x| format!("instead of {:.2} %", 100.0 * x));
+    if let Some((cure, with)) = trial.best() {
+        return format!(
+            "{} from shortly before goes on to frame {} and gains {:.2} % imbalance, {without}; way out: {}",
+            cure.name,
+            trial.last,
+            100.0 * with,
+            cure.line
+        );
+    }
+    let tried: Vec<String> = trial
+        .with
+        .iter()
+        .map(|(cure, end)| match end {
+            Ok(with) => format!("{}: {:.2} % imbalance gained, {without}", cure.name, 100.0 * with),
+            Err(_) => format!("{}: stopped as well", cure.name),
+        })
+        .collect();
+    format!("{}; none of them is a way out", tried.join(", "))
 }
 
 fn difference(after: Option<f64>, before: Option<f64>) -> Option<f64> {
@@ -533,7 +630,11 @@ fn write_moment(
 pub fn describe(summary: &Summary) -> String {
     let newton = |v: Option<f64>| v.map_or("-".into(), |v| format!("{v:.3} N"));
     let mm = |v: Option<f64>| v.map_or("-".into(), |v| format!("{:.2} mm", v * 1e3));
-    let mut text = format!(
+    let mut text = String::new();
+    if let Status::Doubtful(why) = &summary.status {
+        text += &format!("DOUBTFUL: {why}\n");
+    }
+    text += &format!(
         "{} cells, {} steps of {:.1} us (mass scaling {}), {:.2} s simulated in {:.2} s: real-time factor {:.2}\n",
         summary.cells,
         summary.steps,
@@ -599,14 +700,14 @@ pub fn describe(summary: &Summary) -> String {
     }
     if let Some(count) = summary.cells_in_needle {
         text += &format!(
-            "needle: {count} cells of tissue within its wall at most, over the moments of pictures and fields\n"
+            "needle: {count} cells of tissue within its wall at most, over the times of pictures and fields\n"
         );
     }
     if let Some(area) = summary.torn_area_m2 {
         text += &format!("torn: {:.1} mm2 of the faces that may part\n", area * 1e6);
     }
     text += &format!(
-        "energy: imbalance {:.2} % of the external work, kinetic/internal {:.3} %, hourglass/internal {:.1} % (largest \
+        "energy: imbalance {:.2} % of the work so far at most, kinetic/internal {:.3} %, hourglass/internal {:.1} % (largest \
          {:.1} %); {} clamped nodes, {} inverted cells",
         100.0 * summary.energy_imbalance,
         100.0 * summary.kinetic_to_internal,
@@ -618,16 +719,14 @@ pub fn describe(summary: &Summary) -> String {
     text
 }
 
-/// Exit code of an interrupted run, as shells have it for Ctrl-C.
-pub const EXIT_INTERRUPTED: u8 = 130;
-
 /// Exit code of a run that left the range in which its numbers mean something.
 pub const EXIT_DIVERGED: u8 = 3;
 
-/// Exit code of a finished run.
-pub fn exit_code(outcome: &Result<RunOutcome>) -> u8 {
+/// Exit code of a finished run; `strict`: a doubtful one has the code of one that was stopped.
+pub fn exit_code(outcome: &Result<RunOutcome>, strict: bool) -> u8 {
     match outcome {
-        Ok(o) if o.summary.status == Status::Interrupted => EXIT_INTERRUPTED,
+        Ok(o) if strict && matches!(o.summary.status, Status::Doubtful(_)) => EXIT_DIVERGED,
+        Ok(o) if o.summary.status == Status::Interrupted => ending::exit_code(),
         Ok(_) => 0,
         Err(Error::Diverged { .. }) => EXIT_DIVERGED,
         Err(error) => error.exit_code(),

@@ -7,10 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::run::{EXIT_DIVERGED, EXIT_INTERRUPTED};
+use super::run::EXIT_DIVERGED;
 use crate::error::{Error, Result};
 use crate::output::whole_file;
 use crate::solver::simulation::EngineChoice;
+use crate::stability::random::{self, RandomOptions, SceneReport};
 use crate::stability::{self, Options, Suite};
 
 /// Table and JSON in the folder of `--out`.
@@ -43,6 +44,15 @@ pub struct StabilityArgs {
     /// Folder of the scenes [default: scenes]
     #[arg(long, value_name = "DIR")]
     scenes: Option<PathBuf>,
+    /// Run N random scenes instead of the hard cases; --only takes their indices
+    #[arg(long, value_name = "N", conflicts_with_all = ["short", "without_cure", "list", "scenes"])]
+    random: Option<u64>,
+    /// Seed of the random scenes [default: a fresh one, which is printed]
+    #[arg(long, value_name = "S", requires = "random")]
+    seed: Option<u64>,
+    /// Folder for the random scenes that end other than ok
+    #[arg(long, value_name = "FOLDER", requires = "random")]
+    keep: Option<PathBuf>,
 }
 
 /// One engine, or one after the other.
@@ -50,6 +60,15 @@ pub struct StabilityArgs {
 pub enum Engines {
     One(EngineChoice),
     Both,
+}
+
+impl Engines {
+    fn choices(self) -> Vec<EngineChoice> {
+        match self {
+            Engines::One(engine) => vec![engine],
+            Engines::Both => vec![EngineChoice::Gpu, EngineChoice::Cpu],
+        }
+    }
 }
 
 impl FromStr for Engines {
@@ -71,6 +90,9 @@ impl FromStr for Engines {
 /// # Errors
 /// Wrong names and folders come before anything is run; `Error::Adapter` where the engine is not to be had.
 pub fn stability(args: &StabilityArgs, interrupted: &AtomicBool) -> Result<(String, u8)> {
+    if let Some(count) = args.random {
+        return random_scenes(args, count, interrupted);
+    }
     if args.list {
         return Ok((stability::list(), 0));
     }
@@ -81,18 +103,8 @@ pub fn stability(args: &StabilityArgs, interrupted: &AtomicBool) -> Result<(Stri
         scenes: args.scenes.clone(),
     };
     let cases = stability::chosen(&options)?;
-    if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder).map_err(|reason| {
-            Error::input(
-                format!("cannot write to {}: {reason}", folder.display()),
-                "give a folder that you may write to with --out",
-            )
-        })?;
-    }
-    let engines = match args.engine {
-        Engines::One(engine) => vec![engine],
-        Engines::Both => vec![EngineChoice::Gpu, EngineChoice::Cpu],
-    };
+    make_folder(args)?;
+    let engines = args.engine.choices();
     // Hidden where standard error is no terminal.
     let bar = ProgressBar::new((cases.len() * engines.len()) as u64);
     let style = ProgressStyle::with_template("{bar:10} {pos}/{len} {wide_msg}");
@@ -119,11 +131,57 @@ pub fn stability(args: &StabilityArgs, interrupted: &AtomicBool) -> Result<(Stri
         write(&suite, folder)?;
     }
     let code = match interrupted.load(Ordering::Relaxed) {
-        true => EXIT_INTERRUPTED,
+        true => crate::ending::exit_code(),
         false if suite.as_expected => 0,
         false => EXIT_DIVERGED,
     };
     Ok((if args.json { suite.json() } else { suite.table() }, code))
+}
+
+/// Random scenes: a line for each as it ends, then the rates. The exit code is 3 where one ended as none may.
+fn random_scenes(args: &StabilityArgs, count: u64, interrupted: &AtomicBool) -> Result<(String, u8)> {
+    let index = |text: &String| {
+        text.parse().map_err(|_| {
+            Error::input(format!("`{text}` is no index of a random scene"), "write --only 17, a number from 0 on")
+        })
+    };
+    let options = RandomOptions {
+        count,
+        seed: args.seed.unwrap_or_else(random::fresh_seed),
+        only: args.only.iter().map(index).collect::<Result<_>>()?,
+        engines: args.engine.choices(),
+        keep: args.keep.clone(),
+    };
+    make_folder(args)?;
+    eprintln!("seed {}", options.seed);
+    let mut before = |index: u64| log::debug!("random scene {index}");
+    let mut after = |scene: &SceneReport| eprintln!("{}", scene.line());
+    let report = random::run(&options, &mut before, &mut after, interrupted)?;
+    let text = match args.json {
+        true => serde_json::to_string_pretty(&report).expect("numbers and texts can be written as JSON"),
+        false => report.table(),
+    };
+    if let Some(folder) = &args.out {
+        let name = if args.json { JSON } else { TABLE };
+        whole_file::write(&folder.join(name), (text.clone() + "\n").as_bytes())?;
+    }
+    let code = match report.interrupted {
+        true => crate::ending::exit_code(),
+        false if report.problems().is_empty() => 0,
+        false => EXIT_DIVERGED,
+    };
+    Ok((text, code))
+}
+
+/// The folder of --out, before anything is run.
+fn make_folder(args: &StabilityArgs) -> Result<()> {
+    let Some(folder) = &args.out else { return Ok(()) };
+    std::fs::create_dir_all(folder).map_err(|reason| {
+        Error::input(
+            format!("cannot write to {}: {reason}", folder.display()),
+            "give a folder that you may write to with --out",
+        )
+    })
 }
 
 fn write(suite: &Suite, folder: &Path) -> Result<()> {

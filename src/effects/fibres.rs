@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 
 use super::Effect;
 use super::parameter::{Parameter, Value};
-use crate::material::demiray::capped_exponential;
+use crate::material::demiray::{LARGEST_EXPONENT, capped_exponential};
 use crate::material::kinematics::{cofactor, isochoric_factor, jacobian_minus_one};
 
 pub const EFFECT: Effect = Effect {
@@ -72,6 +72,11 @@ impl Params {
         let square = stretched.length_squared();
         let (a, da) = isochoric_factor(1.0 + jacobian_minus_one(h), -2.0 / 3.0);
         ((a * square - 1.0).max(0.0), a, da, square)
+    }
+
+    /// True where the exponential is continued as a polynomial.
+    pub fn is_capped(&self, h: DMat3) -> bool {
+        self.k2 * self.strain(h).0.powi(2) > LARGEST_EXPONENT
     }
 
     /// W_f for H = F - I [J/m^3].

@@ -1,4 +1,7 @@
 //! Gravity: weight of the tissue, `f = m_true g` per node; mass scaling does not change it.
+//!
+//! Its work is that of every load, `f.(v- + v+)/2 dt` per step, in which leapfrog turns work into kinetic energy exactly; the GPU
+//! engine takes it as the change of `g . sum of m (u - v dt/2)`, the same sum without a term per step.
 
 use glam::DVec3;
 

@@ -101,10 +101,25 @@ pub fn exactly(on: &[&str]) -> String {
     format!("effects={keys:?}")
 }
 
-/// The override that switches the effect `key` where those of `on` run.
+/// Effects that do nothing without one of the others beside them; a scene with such an effect alone is refused.
+const NEEDS: [(&str, &[&str]); 4] = [
+    ("damage", &["plasticity"]),
+    ("adhesion", &["puncture"]),
+    ("flexible_needle", &["puncture"]),
+    ("friction", &["puncture", "indentation"]),
+];
+
+/// The override that switches the effect `key` where those of `on` run. Switched off, it takes along what does nothing without it.
 pub fn switched(on: &[&str], key: &str, is: bool) -> String {
-    let others = on.iter().copied().filter(|k| *k != key);
-    exactly(&others.chain(is.then_some(key)).collect::<Vec<&str>>())
+    let mut left: Vec<&str> = on.iter().copied().filter(|k| *k != key).chain(is.then_some(key)).collect();
+    if !is {
+        for (dependent, needs) in NEEDS.iter().filter(|(_, needs)| needs.contains(&key)) {
+            if !needs.iter().any(|need| left.contains(need)) {
+                left.retain(|k| k != dependent);
+            }
+        }
+    }
+    exactly(&left)
 }
 
 /// The overrides that are one switch away from where those of `on` run, one per effect.
@@ -131,5 +146,18 @@ mod tests {
             r#"effects=["gravity", "puncture", "friction"]"#
         );
         assert_eq!(switched(&["friction", "puncture"], "friction", false), r#"effects=["puncture"]"#);
+    }
+
+    #[test]
+    fn what_does_nothing_alone_goes_with_what_it_needs() {
+        let all = ["friction", "puncture", "adhesion", "gravity", "flexible_needle"];
+        assert_eq!(switched(&all, "puncture", false), r#"effects=["gravity"]"#);
+        assert_eq!(
+            switched(&["friction", "puncture", "indentation"], "puncture", false),
+            r#"effects=["indentation", "friction"]"#
+        );
+        assert_eq!(switched(&["damage", "plasticity"], "plasticity", false), "effects=[]");
+        // What nobody can use yet is asked for as it is, and refused with its way out.
+        assert_eq!(switched(&[], "damage", true), r#"effects=["damage"]"#);
     }
 }

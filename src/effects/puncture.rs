@@ -50,6 +50,12 @@ pub fn advance_limit(first: bool, travel: f64) -> f64 {
     least.max(1.25 * travel).min(4.0 * travel)
 }
 
+/// Part of the tip force that is above the threshold, where the cap on the advance holds it there: that part of what the tip
+/// dissipates is no property of the tissue and has a name of its own in the account.
+pub fn share_beyond(force: f64, threshold: f64) -> f64 {
+    if force > threshold { 1.0 - threshold / force } else { 0.0 }
+}
+
 pub const EFFECT: Effect = Effect {
     key: "puncture",
     define: "PUNCTURE",

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
 use crate::error::{Error, Result};
+use crate::reading;
 
 /// Every shader file by its path under `shaders/`, without extension.
 pub const SOURCES: &[(&str, &str)] = &[
@@ -55,6 +56,8 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("shared/node_load", include_str!("../../shaders/shared/node_load.wgsl")),
     ("shared/node_place", include_str!("../../shaders/shared/node_place.wgsl")),
     ("shared/node_sums", include_str!("../../shaders/shared/node_sums.wgsl")),
+    ("shared/face_points", include_str!("../../shaders/shared/face_points.wgsl")),
+    ("shared/node_cures", include_str!("../../shaders/shared/node_cures.wgsl")),
     ("shared/node_work", include_str!("../../shaders/shared/node_work.wgsl")),
     ("shared/params", include_str!("../../shaders/shared/params.wgsl")),
     ("shared/point_energy", include_str!("../../shaders/shared/point_energy.wgsl")),
@@ -139,8 +142,9 @@ static EDITED: RwLock<Vec<(&'static str, String)>> = RwLock::new(Vec::new());
 /// # Errors
 /// `Error::Input` for a folder that holds none of them.
 pub fn read_sources(folder: &Path) -> Result<()> {
-    let read =
-        |name: &'static str| Some((name, std::fs::read_to_string(folder.join(name).with_extension("wgsl")).ok()?));
+    let read = |name: &'static str| {
+        Some((name, reading::text(&folder.join(name).with_extension("wgsl"), reading::most::SCENE).ok()?))
+    };
     let found: Vec<(&'static str, String)> = SOURCES.iter().filter_map(|(name, _)| read(name)).collect();
     if found.is_empty() {
         return Err(Error::input(

@@ -37,6 +37,9 @@ pub const DISPLACEMENT_UNIT: f64 = 1.0 / (1u64 << 36) as f64;
 /// Frames whose results may be under way.
 const RING: usize = 3;
 
+/// Most steps of one submission: some seconds of a slow software adapter.
+const SUBMITTED_STEPS: usize = 1024;
+
 /// How long the mapping of a finished submission may take.
 const MAPPING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
 
@@ -193,7 +196,7 @@ pub struct GpuEngine {
     /// Buffers that a checkpoint holds.
     kept: Vec<&'static str>,
     max_steps: usize,
-    /// Sum of mass without scaling times displacement at the end of the last frame [kg m], and what gravity has done since t = 0 [J].
+    /// [`moment`] of the nodes at the end of the last frame [kg m], and what gravity has done since t = 0 [J].
     moment: DVec3,
     gravity_work: f64,
 }
@@ -367,14 +370,19 @@ impl GpuEngine {
         polled.map(|_| ()).map_err(|e| Error::Device(e.to_string()))
     }
 
+    /// Waits for a submission. Without a limit of time: where several threads share a device, one that ran out while another thread
+    /// collects the last submission makes wgpu 30 panic. [`SUBMITTED_STEPS`] bounds how long it takes.
+    fn wait_for(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
+        self.wait(wgpu::PollType::Wait { submission_index: Some(submission.clone()), timeout: None })
+    }
+
     fn collect_oldest(&mut self, wait: bool) -> Result<bool> {
         let Some(front) = self.in_flight.front() else { return Ok(false) };
-        let poll = if wait {
-            wgpu::PollType::Wait { submission_index: Some(front.submission.clone()), timeout: None }
+        if wait {
+            self.wait_for(&front.submission)?;
         } else {
-            wgpu::PollType::Poll
-        };
-        self.wait(poll)?;
+            self.wait(wgpu::PollType::Poll)?;
+        }
         if wait {
             await_mapping(&self.gpu, &front.mapped)?;
         }
@@ -404,7 +412,7 @@ impl GpuEngine {
             min_corner_j: f64::INFINITY,
             ..Default::default()
         };
-        let mut moment = DVec3::ZERO;
+        let mut weighted = DVec3::ZERO;
         let mut corners = Vec::new();
         for range in &self.results {
             let bytes = &view[range.offset as usize..(range.offset + range.size) as usize];
@@ -433,10 +441,13 @@ impl GpuEngine {
                         sums.kinetic += f64::from(s.kinetic);
                         sums.damping_dissipation += f64::from(s.damping);
                         sums.load_work += f64::from(s.work);
-                        moment += DVec3::new(s.moment_x.into(), s.moment_y.into(), s.moment_z.into());
+                        weighted += DVec3::new(s.moment_x.into(), s.moment_y.into(), s.moment_z.into());
                         sums.max_speed = sums.max_speed.max(f64::from(s.max_speed));
                         sums.raised_mass += s.raised_mass;
                         sums.clamped_nodes += s.clamped_nodes;
+                        sums.raised_mass_energy += f64::from(s.raised_energy);
+                        sums.speed_limit_energy += f64::from(s.clamped_energy);
+                        sums.step_ratio = sums.step_ratio.max(f64::from(s.step_ratio));
                         sums.not_finite |= s.out_of_range > 0;
                     }
                 }
@@ -444,6 +455,7 @@ impl GpuEngine {
                     for (index, s) in read_all::<[f32; 4]>(bytes).enumerate() {
                         let force = DVec3::new(s[0].into(), s[1].into(), s[2].into());
                         sums.reactions[index / FACE_PARTS] += force;
+                        sums.face_moments[index / FACE_PARTS] += f64::from(s[3]);
                     }
                 }
                 "node_displacement" => corners.extend(read_all(bytes).map(displacement)),
@@ -480,6 +492,7 @@ impl GpuEngine {
                     for s in read_all::<TipState>(bytes) {
                         sums.tip_coordinate = f64::from(s.coordinate);
                         sums.tip_dissipation = f64::from(s.dissipation);
+                        sums.cap_dissipation = f64::from(s.cap_dissipation);
                         sums.softening_dissipation = f64::from(s.softening);
                         sums.contact_energy += f64::from(s.spring_energy);
                         sums.membrane_impulse = f64::from(s.membrane_impulse);
@@ -494,7 +507,7 @@ impl GpuEngine {
         let around = corners.chunks_exact(8).map(|c| std::array::from_fn(|n| c[n]));
         sums.targets = self.model.targets.iter().zip(around).map(|(target, u)| target.interpolated(u)).collect();
         if let Some(gravity) = self.model.effects.gravity {
-            self.moment = moment / self.model.mass_scaling();
+            self.moment = weighted / self.model.mass_scaling();
             let total = self.moment.dot(gravity.acceleration);
             sums.load_work += total - self.gravity_work;
             self.gravity_work = total;
@@ -536,6 +549,18 @@ impl GpuEngine {
             .collect())
     }
 
+    /// Steps of the frame as one compute pass.
+    fn encode_steps(&self, encoder: &mut wgpu::CommandEncoder, steps: std::ops::Range<usize>) -> Result<()> {
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        for step in steps {
+            if crate::ending::is_overdue() {
+                return Err(Error::Ended(crate::ending::reason()));
+            }
+            self.encode_step(&mut pass, step);
+        }
+        Ok(())
+    }
+
     fn encode_step(&self, pass: &mut wgpu::ComputePass<'_>, step: usize) {
         let offset = (step * size_of::<StepInput>()) as u32;
         for kernel in self.kernels.iter().filter(|k| !k.stage.once_per_frame() && !k.stage.draws()) {
@@ -573,6 +598,13 @@ fn read_all<T: bytemuck::Pod>(bytes: &[u8]) -> impl Iterator<Item = T> + '_ {
 /// A displacement in fixed point [m].
 fn displacement(u: [i32; 4]) -> DVec3 {
     DVec3::new(u[0].into(), u[1].into(), u[2].into()) * DISPLACEMENT_UNIT
+}
+
+/// Sum of mass without scaling times displacement half a step ago, where the velocity `v` of (u, v) is known [kg m]: the work of a
+/// uniform field is its change, with the mean of the old and the new velocity of each step as for every other load.
+fn moment(nodes: impl Iterator<Item = (DVec3, DVec3)>, model: &Model, dt: f64) -> DVec3 {
+    let sum: DVec3 = nodes.zip(&model.node_mass).map(|((u, v), m)| (u - v * (0.5 * dt)) * *m).sum();
+    sum / model.mass_scaling()
 }
 
 /// Threads of the measuring stages: enough to fill a device, few enough that the sums are a short read-back.
@@ -637,7 +669,7 @@ const BUFFERS: [&str; 56] = [
     "node_displacement",
     "node_velocity",
     "corner_force",
-    "clamped_nodes",
+    "node_cures",
     "node_work",
     "cell_sums",
     "node_sums",
@@ -785,7 +817,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
         "node_dilatation" => zeros(nodes, 4),
         "drawn_cells" => zeros(cells + 1, 16),
         "drawn_nodes" => zeros(nodes, 16),
-        "clamped_nodes" => zeros(1, 4),
+        "node_cures" => zeros(nodes, size_of::<NodeCures>()),
         "node_work" => zeros(nodes, 4),
         "cell_sums" => zeros(measure_threads.into(), size_of::<CellSums>()),
         "node_sums" => zeros(measure_threads.into(), size_of::<NodeSums>()),
@@ -1126,7 +1158,6 @@ fn free_cells(model: &Model, samples: &[u64]) -> Vec<FreeCell> {
 }
 
 fn indentation_params(model: &Model) -> IndentationParams {
-    let p = model.effects.indentation.unwrap_or_default();
     let (radius, flat, bonded) = match model.scene.tool {
         Some(Tool::Sphere { radius }) => (radius, false, false),
         Some(Tool::FlatPunch { radius, bonded }) => (radius, true, bonded),
@@ -1134,10 +1165,11 @@ fn indentation_params(model: &Model) -> IndentationParams {
     };
     IndentationParams {
         radius: radius as f32,
-        contact_stiffness: model.tool_contact_stiffness() as f32,
-        contact_damping: p.contact_damping as f32,
+        face_stiffness: model.indentation.map_or(0.0, |p| p.face_stiffness) as f32,
+        face_damping: model.indentation.map_or(0.0, |p| p.face_damping) as f32,
         flat: flat.into(),
         bonded: bonded.into(),
+        entry: [model.scene.motion.entry.x as f32, model.scene.motion.entry.y as f32],
         ..Zeroable::zeroed()
     }
 }
@@ -1339,11 +1371,17 @@ impl Engine for GpuEngine {
             buffer.write(&self.gpu.queue, bytemuck::bytes_of(&centre_line(line)));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        // Nothing ends what has been submitted: the steps of a very long frame are submitted in several parts.
+        let whole = plan.steps.len().saturating_sub(1) / SUBMITTED_STEPS * SUBMITTED_STEPS;
+        for part in (0..whole).step_by(SUBMITTED_STEPS) {
+            self.encode_steps(&mut encoder, part..part + SUBMITTED_STEPS)?;
+            let next = self.gpu.device.create_command_encoder(&Default::default());
+            let submission = self.gpu.queue.submit([std::mem::replace(&mut encoder, next).finish()]);
+            self.wait_for(&submission)?;
+        }
+        self.encode_steps(&mut encoder, whole..plan.steps.len())?;
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            for step in 0..plan.steps.len() {
-                self.encode_step(&mut pass, step);
-            }
             let last = (plan.steps.len().saturating_sub(1) * size_of::<StepInput>()) as u32;
             for kernel in self.kernels.iter().filter(|k| k.stage.averages() || k.stage.once_per_frame()) {
                 kernel.encode(&mut pass, last);
@@ -1484,6 +1522,7 @@ impl Engine for GpuEngine {
                                 on_shaft: on_shaft != 0.0,
                                 rest_radius: rest_radius.into(),
                                 passed: passed != 0.0,
+                                stored: m.energies[3].into(),
                             }
                         })
                         .collect();
@@ -1551,6 +1590,7 @@ impl Engine for GpuEngine {
                 ContactRecord {
                     stick: vec4(c.stick),
                     touch: [c.overlap as f32, c.axial_on as f32, one(c.touching), one(c.on_shaft)],
+                    energies: [0.0, 0.0, 0.0, c.stored as f32],
                     path: [one(c.passed), c.rest_radius as f32, 0.0, 0.0],
                     ..Zeroable::zeroed()
                 }
@@ -1583,8 +1623,8 @@ impl Engine for GpuEngine {
             .collect();
         write("point_history", bytemuck::cast_slice(&history));
         if let Some(gravity) = self.model.effects.gravity {
-            let moment: DVec3 = state.displacement.iter().zip(&self.model.node_mass).map(|(u, m)| *u * *m).sum();
-            self.moment = moment / self.model.mass_scaling();
+            let motion = state.displacement.iter().zip(&state.velocity);
+            self.moment = moment(motion.map(|(u, v)| (*u, *v)), &self.model, self.dt);
             self.gravity_work = self.moment.dot(gravity.acceleration);
         }
         Ok(())
@@ -1611,10 +1651,10 @@ impl Engine for GpuEngine {
             self.buffers[name.as_str()].write(&self.gpu.queue, bytes);
         }
         self.gravity_work = *gravity_work;
-        if let Some((_, bytes)) = buffers.iter().find(|(name, _)| name == "node_displacement") {
-            let weighted = |(u, m): ([i32; 4], &f64)| displacement(u) * *m;
-            let moment: DVec3 = read_all(bytes).zip(&self.model.node_mass).map(weighted).sum();
-            self.moment = moment / self.model.mass_scaling();
+        let bytes_of = |wanted: &str| buffers.iter().find(|(name, _)| name == wanted).map(|(_, bytes)| bytes);
+        if let (Some(u), Some(v)) = (bytes_of("node_displacement"), bytes_of("node_velocity")) {
+            let velocities = read_all::<[f32; 4]>(v).map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into()));
+            self.moment = moment(read_all(u).map(displacement).zip(velocities), &self.model, self.dt);
         }
         Ok(())
     }

@@ -202,8 +202,8 @@ shared_structs! {
         bond_stretch: f32,
         bond_slid: f32,
         gap: f32,
+        cap_dissipation: f32,
         _pad0: f32,
-        _pad1: f32,
     }
     /// shaders/effects/adhesion.wgsl
     struct AdhesionParams {
@@ -281,7 +281,7 @@ shared_structs! {
         material: u32,
         dissipation: f32,
         spring_energy: f32,
-        _pad: f32,
+        cap_dissipation: f32,
     }
     /// shaders/effects/free_path.wgsl
     struct FreeCell {
@@ -315,13 +315,12 @@ shared_structs! {
     /// shaders/effects/indentation.wgsl
     struct IndentationParams {
         radius: f32,
-        contact_stiffness: f32,
-        contact_damping: f32,
+        face_stiffness: f32,
+        face_damping: f32,
         flat: u32,
         bonded: u32,
         _pad0: u32,
-        _pad1: u32,
-        _pad2: u32,
+        entry: [f32; 2],
     }
     /// shaders/shared/contact_node.wgsl
     struct ContactNode {
@@ -381,7 +380,18 @@ shared_structs! {
         raised_mass: u32,
         out_of_range: u32,
         clamped_nodes: u32,
+        raised_energy: f32,
+        clamped_energy: f32,
+        step_ratio: f32,
         _pad0: u32,
         _pad1: u32,
+        _pad2: u32,
+    }
+    /// shaders/shared/node_cures.wgsl
+    struct NodeCures {
+        raised_energy: f32,
+        clamped_energy: f32,
+        clamped_steps: f32,
+        step_ratio: f32,
     }
 }

@@ -23,6 +23,16 @@ pub const ANSWERS: usize = 16;
 /// minutes old.
 const SEND_BUFFER: usize = 16 << 10;
 
+/// What a client may send [byte/s], and at once [byte]; a message counts as its bytes and [`MESSAGE`] more. A hand that leads at
+/// 1 kHz sends a tenth of it. Whoever sends more is read more slowly and has to wait: reading and checking what nobody needs would
+/// take the processor from the tissue.
+const RATE: f64 = (2 << 20) as f64;
+const AT_ONCE: f64 = (1 << 20) as f64;
+const MESSAGE: usize = 512;
+
+/// Longest pause without a look whether the connection is ended.
+const PAUSE: Duration = Duration::from_millis(50);
+
 /// The messages of one state.
 pub(super) struct Frame {
     /// Per kind of [`Kind::ALL`].
@@ -106,6 +116,10 @@ impl Client {
             outgoing.answers.push_back(message);
             self.changed.notify_one();
         }
+    }
+
+    fn is_closed(&self) -> bool {
+        self.outgoing().closed
     }
 
     /// Ends the connection, and with it both threads; false where it was ended before.
@@ -202,8 +216,10 @@ pub(super) fn serve(shared: &Shared, client: &Arc<Client>) {
 fn receive(shared: &Shared, client: &Arc<Client>) -> crate::Result<()> {
     let wanted = |meaning| matches!(meaning, Meaning::Data(Kind::Transform) | Meaning::Request(..));
     let (mut told_denied, mut told_wrong) = (false, false);
+    let mut allowance = Allowance::default();
     loop {
-        let mut source = Timed { stream: &client.stream, time: shared.options.message_timeout, end: None };
+        let time = shared.options.message_timeout;
+        let mut source = Timed { client, allowance: &mut allowance, time, end: None };
         let Some(Received { header, content }) = read::message(&mut source, wanted, true)? else { return Ok(()) };
         match content {
             Some(Content::Request(verb, kind)) => request(shared, client, verb, kind),
@@ -259,9 +275,33 @@ fn request(shared: &Shared, client: &Client, verb: Verb, kind: Kind) {
     }
 }
 
-/// A stream that waits for a message as long as it takes, and then for the rest of it no longer than `time`.
+/// What a client may still send at once [byte]; it grows with time.
+struct Allowance {
+    bytes: f64,
+    at: Instant,
+}
+
+impl Default for Allowance {
+    fn default() -> Self {
+        Allowance { bytes: AT_ONCE, at: Instant::now() }
+    }
+}
+
+impl Allowance {
+    /// Takes bytes that came; how long to wait before more are read.
+    fn take(&mut self, count: usize) -> Duration {
+        let now = Instant::now();
+        self.bytes = (self.bytes + RATE * now.duration_since(self.at).as_secs_f64()).min(AT_ONCE) - count as f64;
+        self.at = now;
+        Duration::from_secs_f64((-self.bytes / RATE).max(0.0))
+    }
+}
+
+/// A stream that waits for a message as long as it takes, and then for the rest of it no longer than `time`; what the server makes a
+/// client wait does not count.
 struct Timed<'a> {
-    stream: &'a TcpStream,
+    client: &'a Client,
+    allowance: &'a mut Allowance,
     time: Duration,
     /// When the whole message must be there; `None` before its first byte.
     end: Option<Instant>,
@@ -273,9 +313,17 @@ impl Read for Timed<'_> {
         if left == Some(Duration::ZERO) {
             return Err(io::ErrorKind::TimedOut.into());
         }
-        self.stream.set_read_timeout(left)?;
-        let count = self.stream.read(bytes)?;
-        self.end.get_or_insert_with(|| Instant::now() + self.time);
+        self.client.stream.set_read_timeout(left)?;
+        let count = (&self.client.stream).read(bytes)?;
+        let begins = self.end.is_none();
+        let end = self.end.get_or_insert_with(|| Instant::now() + self.time);
+        let mut wait = self.allowance.take(if begins { count + MESSAGE } else { count });
+        *end += wait;
+        while !wait.is_zero() && !self.client.is_closed() {
+            let pause = wait.min(PAUSE);
+            thread::sleep(pause);
+            wait -= pause;
+        }
         Ok(count)
     }
 }

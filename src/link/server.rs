@@ -24,6 +24,9 @@ pub const STACK: usize = 256 << 10;
 /// Longest time until a new client is noticed.
 const LOOK: Duration = Duration::from_millis(20);
 
+/// Pause after a client was taken or turned away.
+const BETWEEN: Duration = Duration::from_millis(2);
+
 /// Pause after a failure to take a client, such as too many open files.
 const PAUSE: Duration = Duration::from_secs(1);
 
@@ -249,7 +252,11 @@ fn take_clients(shared: &Arc<Shared>, listener: TcpListener) {
     let mut threads: Vec<JoinHandle<()>> = Vec::new();
     while !shared.stop.load(Ordering::Acquire) {
         match listener.accept() {
-            Ok((stream, address)) => threads.extend(take(shared, stream, address)),
+            Ok((stream, address)) => {
+                threads.extend(take(shared, stream, address));
+                // Somebody who comes and goes without end takes no more of the processor than this.
+                thread::park_timeout(BETWEEN);
+            }
             Err(error) if error.kind() == ErrorKind::WouldBlock => thread::park_timeout(LOOK),
             Err(error) => {
                 log::warn!("OpenIGTLink: a client could not be taken: {error}");

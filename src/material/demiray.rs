@@ -36,6 +36,11 @@ impl Demiray {
         self.mu
     }
 
+    /// True where the exponential is continued, for `e = I1bar - 3`.
+    pub fn is_capped(&self, e: f64) -> bool {
+        self.b * e > LARGEST_EXPONENT
+    }
+
     pub fn energy(&self, e: f64) -> f64 {
         0.5 * self.mu / self.b * capped_exponential(self.b * e).0
     }

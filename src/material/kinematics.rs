@@ -1,8 +1,8 @@
-//! Kinematics that all laws share: J without cancellation, cofactor, isochoric factors that survive inversion.
+//! Kinematics that all laws share: J without cancellation, cofactor, isochoric measures that survive inversion.
 
 use glam::DMat3;
 
-/// J below which the isochoric factors continue as polynomials.
+/// J below which isochoric factors and measures continue.
 pub const J_CONTINUATION: f64 = 0.3;
 
 /// `J^p` above `J_CONTINUATION`, its second-order Taylor polynomial below: value, first derivative.
@@ -23,6 +23,88 @@ pub fn isochoric_factor(j: f64, p: f64) -> (f64, f64) {
 /// Second derivative of `isochoric_factor`.
 pub fn isochoric_factor_curvature(j: f64, p: f64) -> f64 {
     p * (p - 1.0) * j.max(J_CONTINUATION).powf(p - 2.0)
+}
+
+/// Scale `k^3 = u^(3/8)`, `u = 1 + SCALE_GAIN / (v^(8/3) + SCALE_FLOOR)`, of a cell below `J_CONTINUATION` from the volume
+/// `v = (S/3)^(1/m)` that its lengths (or areas) would have in a cube: 1.02 at v = 1; a small cell is measured at v near
+/// 0.35; the floor ends that near a stretch of 0.45, so that stiffness stays finite where F vanishes. The power of v is
+/// the 8th of lengths and the 4th of areas: smooth for every F.
+const SCALE_GAIN: f64 = 0.06;
+const SCALE_FLOOR: f64 = 0.002;
+
+/// An isochoric measure with its derivatives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measure {
+    /// M, at least 3.
+    pub value: f64,
+    /// dM/dS at constant J.
+    pub by_s: f64,
+    /// dM/dJ and d2M/dJ2 at constant S. The first is negative for every J up to 1: what is squeezed flat pushes back.
+    pub by_j: f64,
+    pub by_jj: f64,
+}
+
+/// v^(8/3) and u.
+fn scale(s: f64, m: f64) -> (f64, f64) {
+    let volume = (s / 3.0).powf(8.0 / (3.0 * m));
+    (volume, 1.0 + SCALE_GAIN / (volume + SCALE_FLOOR))
+}
+
+/// True where `isochoric_measure` is no longer `J^-m S`: q below 0.3.
+pub fn is_measure_continued(s: f64, j: f64, m: f64) -> bool {
+    j < J_CONTINUATION && j * scale(s, m).1.powf(0.375) < J_CONTINUATION
+}
+
+/// The measure `M = J^-m S` of a sum S of stretches of degree 3m that is never below `3 |J|^m` (arithmetic and geometric
+/// mean): `I1bar` for m = 2/3, `I2bar` for m = 4/3. Below J = 0.3 it continues, twice differentiable, finite for every F and
+/// never below 3, the value of pure changes of volume:
+/// ```text
+/// M = a(q) g(k^3m S),  q = k^3 J,  k^3 = (1 + 0.06/(v^(8/3) + 0.002))^(3/8),  v = (S/3)^(1/m)
+/// a(q) = q^-m for q >= 0.3, its second-order Taylor polynomial below
+/// g(s) = s  for s >= s0 = 3 0.3^m,  3/a(0.3 r(s/s0)) below
+/// r(x) = x^(1/m), for m > 1 its second-order Taylor polynomial at 1, which is larger
+/// ```
+/// The first line measures the shape at another size, which changes nothing where q >= 0.3: what is squeezed from all
+/// sides obeys the law itself far below J = 0.3, and only what is flat or inside out for its size leaves it. The third
+/// holds M >= 3, since a falls with q and `0.3 r >= q`.
+pub fn isochoric_measure(s: f64, j: f64, m: f64) -> Measure {
+    debug_assert!(m > 0.0, "degree {m}");
+    if j >= J_CONTINUATION {
+        let a = j.powf(-m);
+        let slope = -m * a / j;
+        return Measure { value: a * s, by_s: a, by_j: slope * s, by_jj: (-m - 1.0) * slope / j * s };
+    }
+    let (volume, u) = scale(s, m);
+    let k3 = u.powf(0.375);
+    let k3m = u.powf(0.375 * m);
+    // d ln k^3 / d ln v, between -1 and 0; what is huge has the scale 1.
+    let floored = volume + SCALE_FLOOR;
+    let fall = -SCALE_GAIN * (volume / floored).min(1.0) / (floored + SCALE_GAIN);
+    let (a, da) = isochoric_factor(k3 * j, -m);
+    let dda = isochoric_factor_curvature(k3 * j, -m);
+    let least = 3.0 * J_CONTINUATION.powf(m);
+    let scaled = k3m * s;
+    let (g, dg) = if scaled >= least {
+        (scaled, 1.0)
+    } else {
+        let (x, p) = (scaled / least, 1.0 / m);
+        let d = x - 1.0;
+        let (r, dr) = if m <= 1.0 {
+            (x.powf(p), p * x.powf(p - 1.0))
+        } else {
+            (1.0 + p * d * (1.0 + 0.5 * (p - 1.0) * d), p * (1.0 + (p - 1.0) * d))
+        };
+        let (b, db) = isochoric_factor(J_CONTINUATION * r, -m);
+        (3.0 / b, -3.0 * db / (b * b) * J_CONTINUATION * dr / least)
+    };
+    // fall/S -> 0 with S.
+    let fall_by_s = fall / (m * s.max(f64::MIN_POSITIVE));
+    Measure {
+        value: a * g,
+        by_s: da * k3 * j * fall_by_s * g + a * dg * k3m * (1.0 + fall),
+        by_j: da * k3 * g,
+        by_jj: dda * k3 * k3 * g,
+    }
 }
 
 /// `J - 1` from the displacement gradient H without cancellation: tr H + (tr^2 H - tr H^2)/2 + det H.

@@ -3,11 +3,17 @@
 //! Every law is an isochoric energy and a volumetric penalty,
 //! ```text
 //! W = W_iso + kappa/2 (J - 1)^2,   P = P_iso + kappa (J - 1) cof F                     [J/m^3], [Pa]
-//! P_iso = 2 w1 a F + 2 w2 b (I1 F - F C) + (w1 a' I1 + w2 b' I2) cof F
+//! P_iso = 2 w1 a F + 2 w2 b (I1 F - F C) + (w1 dI1bar/dJ + w2 dI2bar/dJ) cof F
 //! ```
-//! with `w1 = dW_iso/dI1bar`, `w2 = dW_iso/dI2bar`, `I1bar = a I1`, `I2bar = b I2`, `a = J^(-2/3)`, `b = J^(-4/3)` for
-//! J >= 0.3 and their second-order Taylor polynomials below, so that W is twice differentiable and finite for every F,
-//! inverted ones included. Ogden's law alone needs the principal stretches; its form is in `ogden`.
+//! with `w1 = dW_iso/dI1bar`, `w2 = dW_iso/dI2bar`, `a = dI1bar/dI1`, `b = dI2bar/dI2`. For J >= 0.3 `I1bar = J^(-2/3) I1` and
+//! `I2bar = J^(-4/3) I2`; below they continue as `kinematics::isochoric_measure`. Ogden's law alone needs the principal
+//! stretches; its form is in `ogden`.
+//!
+//! What the continuation holds, for every law and all constants that are stable for every deformation: W is twice
+//! differentiable and finite for every F, inverted ones included; W >= 0, and W_iso >= 0 with its least value at a pure
+//! change of volume; a pure squeeze (F = s R) meets a pressure for every s < 1, for Ogden's law with |alpha| < 2 down to
+//! s = 0.1; a squeeze along one direction meets a pressure on its faces where J goes to 0. A sheet that is flat but not
+//! small pulls its edges inwards: no finite energy can do without that. Constants with a limited range keep W >= 0 within it.
 //! Source: the split of Flory 1961; penalty as in [Lv2022] Eq. 1, kappa = 2/D; continuation: this project.
 
 pub mod demiray;
@@ -27,10 +33,16 @@ pub use ogden::Ogden;
 pub use yeoh::Yeoh;
 
 use glam::{DMat3, DVec3};
-use kinematics::{cofactor, double_dot, invariants, isochoric_factor, isochoric_factor_curvature, jacobian_minus_one};
+use kinematics::{
+    J_CONTINUATION, cofactor, double_dot, invariants, is_measure_continued, isochoric_measure, jacobian_minus_one,
+};
 
 /// Largest stretch that a numerical verdict looks at.
 pub const LARGEST_STRETCH: f64 = 6.0;
+
+/// Degrees m of `J^-m I1` and `J^-m I2`.
+const FIRST: f64 = 2.0 / 3.0;
+const SECOND: f64 = 4.0 / 3.0;
 
 /// Derivatives of W_iso by `I1bar` and `I2bar` [Pa]: `w1`, `w2`, and `w11 = d^2 W/dI1bar^2`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -122,6 +134,37 @@ impl Isochoric {
     }
 }
 
+/// The side on which a state has left its law and follows the continuation that keeps every state finite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Continuation {
+    /// Squeezed flat, or inside out: J below 0.3, for its size too.
+    Volume,
+    /// The exponent of an exponential law is beyond 10.
+    Exponent,
+    /// A stretch below 0.1, or an area below 0.01, of an Ogden law with |alpha| < 2.
+    Stretch,
+}
+
+impl Continuation {
+    /// The word in tables and files.
+    pub fn key(self) -> &'static str {
+        match self {
+            Continuation::Volume => "volume",
+            Continuation::Exponent => "exponent",
+            Continuation::Stretch => "stretch",
+        }
+    }
+
+    /// One line on it.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Continuation::Volume => "so flat for its size that the law is continued (below J = 0.3)",
+            Continuation::Exponent => "exponent beyond 10: the exponential is continued as a polynomial",
+            Continuation::Stretch => "a stretch so small that the power is continued as a polynomial",
+        }
+    }
+}
+
 /// What the isochoric law adds to the modulus that a wave finds, `straight |N|^2 + turned |cof F N|^2` for its direction N
 /// at rest; kappa stands beside `turned`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -189,8 +232,8 @@ impl ElasticLaw {
         let f = DMat3::IDENTITY + h;
         let j = 1.0 + jacobian_minus_one(h);
         let (i1, i2) = invariants(f);
-        let i1 = isochoric_factor(j, -2.0 / 3.0).0 * i1 - 3.0;
-        let i2 = isochoric_factor(j, -4.0 / 3.0).0 * i2 - 3.0;
+        let i1 = isochoric_measure(i1, j, FIRST).value - 3.0;
+        let i2 = isochoric_measure(i2, j, SECOND).value - 3.0;
         match &self.isochoric {
             Isochoric::NeoHookean(l) => l.energy(i1),
             Isochoric::MooneyRivlin(l) => l.energy(i1, i2),
@@ -207,12 +250,33 @@ impl ElasticLaw {
         }
         let f = DMat3::IDENTITY + h;
         let j = 1.0 + jacobian_minus_one(h);
-        let (a, da) = isochoric_factor(j, -2.0 / 3.0);
-        let (b, db) = isochoric_factor(j, -4.0 / 3.0);
         let (i1, i2) = invariants(f);
-        let s = self.isochoric.slopes(a * i1 - 3.0).unwrap_or_default();
+        let (first, second) = (isochoric_measure(i1, j, FIRST), isochoric_measure(i2, j, SECOND));
+        let s = self.isochoric.slopes(first.value - 3.0).unwrap_or_default();
         let c = f.transpose() * f;
-        f * (2.0 * s.w1 * a) + (f * i1 - f * c) * (2.0 * s.w2 * b) + cofactor(f) * (s.w1 * da * i1 + s.w2 * db * i2)
+        f * (2.0 * s.w1 * first.by_s)
+            + (f * i1 - f * c) * (2.0 * s.w2 * second.by_s)
+            + cofactor(f) * (s.w1 * first.by_j + s.w2 * second.by_j)
+    }
+
+    /// Where the isochoric law is no longer the one that its name says, for H = F - I; `None` where it is.
+    pub fn continuation(&self, h: DMat3) -> Option<Continuation> {
+        let j = 1.0 + jacobian_minus_one(h);
+        let (i1, i2) = invariants(DMat3::IDENTITY + h);
+        let first = is_measure_continued(i1, j, FIRST);
+        let is_flat = match &self.isochoric {
+            Isochoric::MooneyRivlin(l) => l.c10 != 0.0 && first || l.c01 != 0.0 && is_measure_continued(i2, j, SECOND),
+            Isochoric::Ogden(l) => l.is_flat(h),
+            _ => first,
+        };
+        match &self.isochoric {
+            _ if is_flat => Some(Continuation::Volume),
+            Isochoric::Ogden(l) if l.is_thin(h) => Some(Continuation::Stretch),
+            Isochoric::Demiray(l) if l.is_capped(isochoric_measure(i1, j, FIRST).value - 3.0) => {
+                Some(Continuation::Exponent)
+            }
+            _ => None,
+        }
     }
 
     /// Energy density W for H = F - I [J/m^3].
@@ -233,37 +297,88 @@ impl ElasticLaw {
         self.first_piola_kirchhoff(h) * f.transpose() * (1.0 / f.determinant())
     }
 
-    /// Estimate of the isochoric tangent modulus for the stable step: what a wave finds, `(a N) : d2W_iso/dF2 :
-    /// (a N)` for unit vectors a and N. At rest it is 4/3 mu0, and exact.
+    /// Bound of the isochoric tangent modulus for the stable step: of what a wave finds, `m N : d2W_iso/dF2 : m N` for a unit vector
+    /// m and any N, together with the bulk modulus, `(kappa + turned) |cof F N|^2 + straight |N|^2`. At rest `turned` is 4/3 mu0,
+    /// and exact, as in every pure change of volume.
     ///
+    /// Along a wave F + t m N has `dJ/dt = m.u`, u = cof F N; with y = m.F N the second derivative of `a I1` is
+    /// `a'' I1 (m.u)^2 - 4 |a'| (m.u) y + 2 a`. F N has the part J/|u|^2 along u, which makes the first line, and across u at most
+    /// `J (l1^2 - l3^2)/(2 l1 l3)` times |N|^2/|u| (Kantorovich's inequality). The same for `b I2`, whose terms have
+    /// `q = I1 - |F N|^2`, and across u at most 0.58 times the largest `|li^2 - lj^2| lk^3`:
     /// ```text
-    /// straight = 4/3 2 (w1 + w2) max(1, I1/3) + 4 w11 a^2 I1 (I1 I2/(9 J^2) - 1)
-    /// turned   = w1 (a'' I1 - 10/3) + w2 (b'' I2 - 28/3),   a = J^(-2/3), b = J^(-4/3)
+    /// turned   = w1 (a'' I1 - c1/g) + w2 (b'' I2 - c2 (I1 - l1^2)/g),  g = (l1 l2)^2
+    /// c1 = 4 |a'| J - 2 a,  c2 = 4 |b'| J - 2 b
+    /// straight = |w1| |a'| (l1^2 - l3^2) l2 + 1.16 |w2| |b'| max |li^2 - lj^2| lk^3 + w11 |dI1bar/dF|^2
+    ///            + (2 w1 a + 2 w2 b l1^2 - (kappa + turned) (J/l1)^2)+
     /// ```
-    /// the same as in the kernel. The second term of `straight` is the square of the gradient of I1bar and bounds the
-    /// stiffening for every J >= 0.3; `turned` is what the curvatures of a and b have beyond rest. It is an estimate: with
-    /// stretches 0.4..2.5 and J 0.8..1.25, kappa and this together reach at least 0.77 of the true modulus at nu 0.45,
-    /// 0.8 at 0.49 (an exponential law; Mooney-Rivlin 0.96), and 0.68 at 0.3 (`tests/material/waves.rs`). Ogden's law has
-    /// its own form, which is a bound.
+    /// the last term for waves across their direction. The eigenvalues l1^2 of C and g of cof C are bounded by Gershgorin's circles. The
+    /// same as in the kernel; below J = 0.3 `straight` is at least what turning inside out adds. Source: this project; the bound
+    /// is compared with the acoustic tensor in `tests/material/waves.rs`. Strains below [`SMALL_STRAIN`] have a simpler bound, found by
+    /// sampling and compared there, too. Ogden's law has its own form.
     pub fn tangent_bound(&self, h: DMat3) -> TangentBound {
         if let Isochoric::Ogden(l) = &self.isochoric {
             return TangentBound { straight: l.tangent_bound(h), turned: 0.0 };
         }
         let f = DMat3::IDENTITY + h;
         let j = 1.0 + jacobian_minus_one(h);
-        let (a, _) = isochoric_factor(j, -2.0 / 3.0);
         let (i1, i2) = invariants(f);
-        let s = self.isochoric.slopes(a * i1 - 3.0).unwrap_or_default();
-        let gradient_squared = a * a * i1 * (a * a * a * i1 * i2 / 9.0 - 1.0);
-        let curvature = |p: f64, invariant: f64| {
-            isochoric_factor_curvature(j, p) * invariant - isochoric_factor_curvature(1.0, p) * 3.0
-        };
-        TangentBound {
-            straight: 8.0 / 3.0 * (s.w1 + s.w2) * (i1 / 3.0).max(1.0)
-                + 4.0 * s.w11.max(0.0) * gradient_squared.max(0.0),
-            turned: (s.w1 * curvature(-2.0 / 3.0, i1) + s.w2 * curvature(-4.0 / 3.0, i2)).max(0.0),
+        let (first, second) = (isochoric_measure(i1, j, FIRST), isochoric_measure(i2, j, SECOND));
+        let s = self.isochoric.slopes(first.value - 3.0).unwrap_or_default();
+        // |2 a F + dI1bar/dJ cof F|^2, with F : cof F = 3 J.
+        let gradient_squared = 4.0 * first.by_s * (first.by_s * i1 + 3.0 * first.by_j * j) + first.by_j.powi(2) * i2;
+        let stiffening = s.w11.max(0.0) * gradient_squared.max(0.0);
+        let c = f.transpose() * f;
+        let strain = largest_strain(c);
+        if strain < SMALL_STRAIN {
+            let w = s.w1.abs() + s.w2.abs();
+            let turned = 8.0 / 3.0 * (s.w1 + s.w2 + 6.0 * strain * w);
+            return TangentBound { straight: 3.2 * strain * w + stiffening, turned };
         }
+        let cof = cofactor(f);
+        let (largest, area) =
+            (largest_eigenvalue_bound(c).min(i1), largest_eigenvalue_bound(cof.transpose() * cof).min(i2).max(1e-12));
+        let least = (j * j / area).min(largest);
+        let middle = (i1 - largest - least).clamp(least, largest);
+        let (a, b) = (first.by_s, second.by_s);
+        let (fall_a, fall_b) = (first.by_j.abs() / i1.max(1e-6), second.by_j.abs() / i2.max(1e-6));
+        let (c1, c2) = (2.0 * a - 4.0 * fall_a * j.max(0.0), 2.0 * b - 4.0 * fall_b * j.max(0.0));
+        let turned =
+            s.w1 * (first.by_jj + c1.min(0.0) / area) + s.w2 * (second.by_jj + c2.min(0.0) * (i1 - largest) / area);
+        let turned = turned.max(0.0);
+        let [l1, l2, l3] = [largest, middle, least].map(f64::sqrt);
+        let across =
+            ((largest - least) * l2.powi(3)).max((middle - least) * l1.powi(3)).max((largest - middle) * l3.powi(3));
+        let sideways = 2.0 * s.w1 * a + 2.0 * s.w2 * b * largest;
+        let mut straight = s.w1.abs() * fall_a * (largest - least) * l2
+            + 1.16 * s.w2.abs() * fall_b * across
+            + s.w1 * c1.max(0.0)
+            + s.w2 * c2.max(0.0) * (i1 - least)
+            + (sideways - (self.bulk_modulus + turned) * j * j / largest.max(1e-12)).max(0.0);
+        if j < J_CONTINUATION {
+            // Inside out, both terms of a wave along its direction add.
+            let inside_out = 4.0 * (-j).max(0.0);
+            let of_first = 2.0 * a + inside_out * fall_a;
+            let of_second = 2.0 * b + inside_out * fall_b;
+            straight = straight.max(s.w1 * of_first + s.w2 * of_second * i1);
+        }
+        TangentBound { straight: straight.max(0.0) + stiffening, turned }
     }
+}
+
+/// Strain e up to which the tangent bound is `turned = 8/3 (w1 + w2) (1 + 6 e)`, `straight = 3.2 e (w1 + w2)`: most cells of a block, and
+/// far fewer operations.
+const SMALL_STRAIN: f64 = 0.1;
+
+/// Largest change of a diagonal entry of C, and twice the largest entry beside the diagonal.
+fn largest_strain(c: DMat3) -> f64 {
+    let along = DVec3::new(c.x_axis.x, c.y_axis.y, c.z_axis.z) - DVec3::ONE;
+    let beside = DVec3::new(c.x_axis.y, c.y_axis.z, c.z_axis.x);
+    along.abs().max_element() + 2.0 * beside.abs().max_element()
+}
+
+/// Bound of the largest eigenvalue of a symmetric matrix: the largest sum of absolute values of a row (Gershgorin).
+fn largest_eigenvalue_bound(c: DMat3) -> f64 {
+    [c.x_axis, c.y_axis, c.z_axis].map(|row| row.abs().element_sum()).into_iter().fold(0.0, f64::max)
 }
 
 /// Stretch up to which a law of I1bar alone is elliptic: `w1 > 0` and `w1 + 2 w11 (l_max - l_min)^2 > 0` in every

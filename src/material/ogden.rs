@@ -1,21 +1,41 @@
 //! Compressible one-term Ogden law.
 //!
 //! ```text
-//! W_iso = 2 mu/alpha^2 (a(J) sum_i phi(c_i) - 3)                      [J/m^3]
-//! P_iso = 2 mu/alpha^2 (2 a F sum_i phi'(c_i) N_i (x) N_i + a' sum_i phi(c_i) cof F)
+//! W_iso = 2 mu/alpha^2 (M - 3)                                        [J/m^3]
+//! M = J^(-alpha/3) S,     S = sum_i phi(c_i),      phi(x) = x^(alpha/2)         alpha > 0
+//! M = J^(-2|alpha|/3) S,  S = sum_i phi(c_j c_k),  phi(x) = x^(|alpha|/2)       alpha < 0
+//! P_iso = 2 mu/alpha^2 (2 dM/dS F sum_i dS/dc_i N_i (x) N_i + dM/dJ cof F)
 //! ```
-//! `c_i`, `N_i`: eigenvalues and eigenvectors of C; `a = J^(-alpha/3)`, `phi(c) = c^(alpha/2)`, so that `a phi` is the
-//! isochoric stretch to the power alpha. Below `c = 0.01` (a stretch of 0.1) phi continues as its second-order Taylor
-//! polynomial and a as in `kinematics`: finite for every F. `mu0 = mu`.
+//! `c_i`, `N_i`: eigenvalues and eigenvectors of C. M is the sum of the isochoric stretches to the power alpha. Both lines are
+//! one function, since `c_i = J^2/(c_j c_k)`; with the second one, of the stretched areas, a cell that is squeezed flat makes
+//! no term large (alpha = -2 is the Mooney-Rivlin law of c01, as 2 is that of c10). M continues below J = 0.3 as
+//! `kinematics::isochoric_measure`. Where |alpha| < 2, phi continues as its second-order Taylor polynomial, which is the
+//! larger one, below `c = 0.01` (a stretch of 0.1) and `c_j c_k = 1e-4`: finite for every F. `mu0 = mu`.
 //! Source: Ogden 1972 in the normalisation of Abaqus; continuation: this project.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
 use super::Verdict;
-use super::kinematics::{cofactor, isochoric_factor, isochoric_factor_curvature, jacobian_minus_one, symmetric_eigen};
+use super::kinematics::{
+    J_CONTINUATION, cofactor, is_measure_continued, isochoric_measure, jacobian_minus_one, symmetric_eigen,
+};
 
-/// Eigenvalue of C below which phi continues as a polynomial.
+/// Eigenvalue of C, and product of two of them, below which phi continues as a polynomial where |alpha| < 2.
 pub const SMALLEST_EIGENVALUE: f64 = 0.01;
+const SMALLEST_PRODUCT: f64 = 1e-4;
+/// What counts as zero for other exponents: only against division by it.
+const ZERO: f64 = 1e-12;
+
+/// Sum S of a state.
+struct Sum {
+    value: f64,
+    /// dS/dc_i.
+    by_c: [f64; 3],
+    /// d2S/dl_i^2 by the principal stretches.
+    by_stretch: [f64; 3],
+    c: [f64; 3],
+    directions: DMat3,
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ogden {
@@ -30,59 +50,112 @@ impl Ogden {
         self.mu
     }
 
-    /// phi, its first and its second derivative.
-    fn phi(&self, c: f64) -> (f64, f64, f64) {
-        let p = 0.5 * self.alpha;
-        let c0 = SMALLEST_EIGENVALUE;
-        if c >= c0 {
-            let value = c.powf(p);
-            (value, p * value / c, p * (p - 1.0) * value / (c * c))
-        } else {
-            let f0 = c0.powf(p);
-            let f1 = p * f0 / c0;
-            let f2 = (p - 1.0) * f1 / c0;
-            let d = c - c0;
-            (f0 + d * (f1 + 0.5 * d * f2), f1 + d * f2, f2)
+    /// phi, its first and its second derivative; continued below `low` where |alpha| < 2.
+    fn phi(&self, x: f64, low: f64) -> (f64, f64, f64) {
+        let p = 0.5 * self.alpha.abs();
+        let x = x.max(ZERO);
+        let low = if p < 1.0 { low } else { ZERO };
+        let at = x.max(low);
+        let value = at.powf(p);
+        let (first, second) = (p * value / at, p * (p - 1.0) * value / (at * at));
+        let d = (x - low).min(0.0);
+        (value + d * (first + 0.5 * d * second), first + d * second, second)
+    }
+
+    /// Exponent m of `M = J^-m S`.
+    fn degree(&self) -> f64 {
+        if self.alpha > 0.0 { self.alpha / 3.0 } else { -2.0 * self.alpha / 3.0 }
+    }
+
+    fn sum(&self, f: DMat3) -> Sum {
+        let (c, directions) = symmetric_eigen(f.transpose() * f);
+        let c = c.map(|c| c.max(0.0));
+        if self.alpha > 0.0 {
+            let phi = c.map(|c| self.phi(c, SMALLEST_EIGENVALUE));
+            let by_stretch = |i: usize| 2.0 * phi[i].1 + 4.0 * c[i] * phi[i].2;
+            return Sum {
+                value: phi.iter().map(|p| p.0).sum(),
+                by_c: phi.map(|p| p.1),
+                by_stretch: std::array::from_fn(by_stretch),
+                c,
+                directions,
+            };
         }
+        let others = |i: usize| ((i + 1) % 3, (i + 2) % 3);
+        let phi: [_; 3] = std::array::from_fn(|i| {
+            let (j, k) = others(i);
+            self.phi(c[j] * c[k], SMALLEST_PRODUCT)
+        });
+        // c_i stands in the products j and k.
+        let by_c = |i: usize| {
+            let (j, k) = others(i);
+            phi[j].1 * c[k] + phi[k].1 * c[j]
+        };
+        let by_stretch = |i: usize| {
+            let (j, k) = others(i);
+            2.0 * by_c(i) + 4.0 * c[i] * (phi[j].2 * c[k] * c[k] + phi[k].2 * c[j] * c[j])
+        };
+        Sum {
+            value: phi.iter().map(|p| p.0).sum(),
+            by_c: std::array::from_fn(by_c),
+            by_stretch: std::array::from_fn(by_stretch),
+            c,
+            directions,
+        }
+    }
+
+    /// True where M is continued.
+    pub fn is_flat(&self, h: DMat3) -> bool {
+        let sum = self.sum(DMat3::IDENTITY + h);
+        is_measure_continued(sum.value, 1.0 + jacobian_minus_one(h), self.degree())
+    }
+
+    /// True where phi is continued.
+    pub fn is_thin(&self, h: DMat3) -> bool {
+        let [x, y, z] = self.sum(DMat3::IDENTITY + h).c;
+        let (least, low) = if self.alpha > 0.0 {
+            (x.min(y).min(z), SMALLEST_EIGENVALUE)
+        } else {
+            ((x * y).min(y * z).min(z * x), SMALLEST_PRODUCT)
+        };
+        self.alpha.abs() < 2.0 && least < low
     }
 
     /// W_iso for H = F - I [J/m^3].
     pub fn energy(&self, h: DMat3) -> f64 {
-        let f = DMat3::IDENTITY + h;
-        let (c, _) = symmetric_eigen(f.transpose() * f);
-        let (a, _) = isochoric_factor(1.0 + jacobian_minus_one(h), -self.alpha / 3.0);
-        let sum: f64 = c.iter().map(|c| self.phi(*c).0).sum();
-        2.0 * self.mu / self.alpha.powi(2) * (a * sum - 3.0)
+        let sum = self.sum(DMat3::IDENTITY + h);
+        let measure = isochoric_measure(sum.value, 1.0 + jacobian_minus_one(h), self.degree());
+        2.0 * self.mu / self.alpha.powi(2) * (measure.value - 3.0)
     }
 
     /// P_iso for H = F - I [Pa].
     pub fn isochoric_stress(&self, h: DMat3) -> DMat3 {
         let f = DMat3::IDENTITY + h;
-        let (c, n) = symmetric_eigen(f.transpose() * f);
-        let (a, da) = isochoric_factor(1.0 + jacobian_minus_one(h), -self.alpha / 3.0);
-        let phi = c.map(|c| self.phi(c));
-        let slope = n * DMat3::from_diagonal(glam::DVec3::new(phi[0].1, phi[1].1, phi[2].1)) * n.transpose();
-        let sum: f64 = phi.iter().map(|p| p.0).sum();
-        (f * slope * (2.0 * a) + cofactor(f) * (da * sum)) * (2.0 * self.mu / self.alpha.powi(2))
+        let sum = self.sum(f);
+        let measure = isochoric_measure(sum.value, 1.0 + jacobian_minus_one(h), self.degree());
+        let n = sum.directions;
+        let slope = n * DMat3::from_diagonal(DVec3::from(sum.by_c)) * n.transpose();
+        (f * slope * (2.0 * measure.by_s) + cofactor(f) * measure.by_j) * (2.0 * self.mu / self.alpha.powi(2))
     }
 
     /// Bound of the isochoric tangent modulus [Pa]: the largest second derivative of W_iso by one principal stretch,
     /// ```text
-    /// 2 mu/alpha^2 (a (2 phi'_i + 4 c_i phi''_i) + 4 a' J phi'_i + a'' c_j c_k sum phi)
+    /// 2 mu/alpha^2 (dM/dS d2S/dl_i^2 + 4 d2M/dSdJ J dS/dc_i + d2M/dJ2 c_j c_k)
     /// ```
-    /// A scan over rank-one directions finds no stiffer one while J stays near 1. At rest it is 4/3 mu0.
+    /// A scan over rank-one directions finds no stiffer one while J stays near 1. At rest it is 4/3 mu0. Below J = 0.3 the
+    /// second term counts only where it is positive, inside out, and shear of small stretches, `2 dM/dS dS/dc_i`, counts, too;
+    /// with kappa it is at least 0.7 of the stiffest wave there (`tests/material/waves.rs`).
     pub fn tangent_bound(&self, h: DMat3) -> f64 {
-        let f = DMat3::IDENTITY + h;
-        let (c, _) = symmetric_eigen(f.transpose() * f);
+        let sum = self.sum(DMat3::IDENTITY + h);
         let j = 1.0 + jacobian_minus_one(h);
-        let (a, da) = isochoric_factor(j, -self.alpha / 3.0);
-        let dda = isochoric_factor_curvature(j, -self.alpha / 3.0);
-        let phi = c.map(|c| self.phi(c));
-        let sum: f64 = phi.iter().map(|p| p.0).sum();
+        let measure = isochoric_measure(sum.value, j, self.degree());
+        let is_below = j < J_CONTINUATION;
+        // J d2M/dSdJ.
+        let mixed = if is_below { (j * measure.by_j / sum.value).max(0.0) } else { -self.degree() * measure.by_s };
         let along = |i: usize| {
-            let (_, first, second) = phi[i];
-            let others = c[(i + 1) % 3] * c[(i + 2) % 3];
-            a * (2.0 * first + 4.0 * c[i] * second) + 4.0 * da * j * first + dda * others * sum
+            let others = sum.c[(i + 1) % 3] * sum.c[(i + 2) % 3];
+            let straight = if is_below { sum.by_stretch[i].max(2.0 * sum.by_c[i]) } else { sum.by_stretch[i] };
+            measure.by_s * straight + 4.0 * mixed * sum.by_c[i] + measure.by_jj * others
         };
         let largest = along(0).max(along(1)).max(along(2)).max(0.0);
         2.0 * self.mu / self.alpha.powi(2) * largest

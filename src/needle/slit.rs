@@ -14,9 +14,9 @@ pub const POINTS: usize = 3;
 /// Reference length of the stiffness kappa = k/l^2 [m]: what the contact stiffness k of a node is for an area of l^2.
 pub const REFERENCE_EDGE: f64 = 0.6e-3;
 
-/// The faces around a node of a slit, on the node's own side.
+/// The faces around a node of a surface that a tool touches at points: a slit, on the node's own side, or the top face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SlitFaces {
+pub struct NodeFaces {
     /// Contact nodes around, as indices into `Model::contact_nodes`, row by row from the low corner without the node itself;
     /// those of absent faces name the node itself.
     pub ring: [u32; 8],
@@ -24,7 +24,7 @@ pub struct SlitFaces {
     pub present: u32,
 }
 
-impl SlitFaces {
+impl NodeFaces {
     /// Contact nodes at the other corners of face `i + 2 j`: along the first way, along the second, and the far one.
     pub fn corners(&self, i: usize, j: usize) -> [u32; 3] {
         // Places in the 3 x 3 block around the node (place 4), which `ring` leaves out.
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn corners_are_those_of_the_quadrant() {
         // The ring of node 4 of the block 0..9.
-        let faces = SlitFaces { ring: [0, 1, 2, 3, 5, 6, 7, 8], present: 15 };
+        let faces = NodeFaces { ring: [0, 1, 2, 3, 5, 6, 7, 8], present: 15 };
         assert_eq!(faces.corners(0, 0), [3, 1, 0]);
         assert_eq!(faces.corners(1, 0), [5, 1, 2]);
         assert_eq!(faces.corners(0, 1), [3, 7, 6]);

@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::needle::centre_line::CentreLine;
+use crate::verdict::Verdict;
 
 /// Force that moves the tool, in parts [N]; positive along the insertion direction. Means over the frame. All parts but the
 /// inertia act on the tissue.
@@ -68,6 +69,17 @@ impl ForceParts {
     ];
 }
 
+/// One addend of the energy account.
+#[derive(Debug, Clone, Copy)]
+pub struct EnergyPart {
+    /// Column of `energy.csv`.
+    pub column: &'static str,
+    /// Its value [J].
+    pub of: fn(&EnergyAccount) -> f64,
+    /// 1 where external work turns into it, -1 where it was put in.
+    pub sign: f64,
+}
+
 /// Energies [J] at the end of a frame. Work and dissipation are totals since t = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct EnergyAccount {
@@ -98,32 +110,54 @@ pub struct EnergyAccount {
     pub needle: f64,
     /// Put in by changes of parameters while the run went on: the same state stores more or less with other constants.
     pub changes: f64,
+    /// Taken by nodes whose mass was raised for a step: the kinetic energy of the mass that they have no more. Negative where
+    /// they gave.
+    pub raised_mass: f64,
+    /// Taken by the limit on the speed of nodes.
+    pub speed_limit: f64,
+    /// Dissipated at the tip beyond its law, while the cap on its advance holds its force above the threshold.
+    pub advance_cap: f64,
     /// Largest |external| so far, the scale of the imbalance.
     pub external_max: f64,
 }
 
 impl EnergyAccount {
+    /// Where external work goes, in the order of the columns of `energy.csv`. A new part is one line here: the account and the
+    /// columns follow this list.
+    pub const PARTS: [EnergyPart; 17] = [
+        EnergyPart { column: "elastic_j", of: |e| e.elastic, sign: 1.0 },
+        EnergyPart { column: "kinetic_j", of: |e| e.kinetic, sign: 1.0 },
+        EnergyPart { column: "hourglass_j", of: |e| e.hourglass, sign: 1.0 },
+        EnergyPart { column: "damping_j", of: |e| e.damping, sign: 1.0 },
+        EnergyPart { column: "friction_j", of: |e| e.friction, sign: 1.0 },
+        EnergyPart { column: "cutting_j", of: |e| e.cutting, sign: 1.0 },
+        EnergyPart { column: "cohesive_j", of: |e| e.cohesive, sign: 1.0 },
+        EnergyPart { column: "adhesion_j", of: |e| e.adhesion, sign: 1.0 },
+        EnergyPart { column: "plastic_j", of: |e| e.plastic, sign: 1.0 },
+        EnergyPart { column: "damage_j", of: |e| e.damage, sign: 1.0 },
+        EnergyPart { column: "viscous_j", of: |e| e.viscous, sign: 1.0 },
+        EnergyPart { column: "contact_j", of: |e| e.contact, sign: 1.0 },
+        EnergyPart { column: "needle_j", of: |e| e.needle, sign: 1.0 },
+        EnergyPart { column: "changes_j", of: |e| e.changes, sign: -1.0 },
+        EnergyPart { column: "raised_mass_j", of: |e| e.raised_mass, sign: 1.0 },
+        EnergyPart { column: "speed_limit_j", of: |e| e.speed_limit, sign: 1.0 },
+        EnergyPart { column: "advance_cap_j", of: |e| e.advance_cap, sign: 1.0 },
+    ];
+
     /// Sum of everything that external work turned into [J].
     pub fn accounted(&self) -> f64 {
-        self.elastic
-            + self.kinetic
-            + self.hourglass
-            + self.damping
-            + self.friction
-            + self.cutting
-            + self.cohesive
-            + self.adhesion
-            + self.plastic
-            + self.damage
-            + self.viscous
-            + self.contact
-            + self.needle
-            - self.changes
+        Self::PARTS.iter().map(|part| part.sign * (part.of)(self)).sum()
     }
 
-    /// (external - accounted) / largest external work; 0 while nothing has happened.
+    /// What nobody can explain, over the largest external work so far: (external - accounted) / largest |external|, positive
+    /// where energy is lost; 0 while nothing has happened. What a run is judged by has a floor: [`crate::verdict`].
     pub fn imbalance(&self) -> f64 {
         if self.external_max > 0.0 { (self.external - self.accounted()) / self.external_max } else { 0.0 }
+    }
+
+    /// Elastic and hourglass energy [J].
+    pub fn internal(&self) -> f64 {
+        self.elastic + self.hourglass
     }
 }
 
@@ -190,7 +224,12 @@ pub struct FrameRecord {
     pub tip_coordinate: f64,
     /// What each face exerts on the tissue at the end of the frame, indexed by `Face` [N]; zero without driven faces.
     pub reactions: [DVec3; 6],
+    /// Moment of the same about the axis along the normal of the face through the centre of the tissue at rest, right-handed about the
+    /// coordinate axis [N m].
+    pub face_moments: [f64; 6],
     pub energy: EnergyAccount,
+    /// On the run up to this frame.
+    pub verdict: Verdict,
     /// Zero without a flexible needle.
     pub needle: NeedleRecord,
     pub health: Health,

@@ -49,6 +49,9 @@ impl Recorder {
         e.damping += sums.damping_dissipation;
         e.friction += sums.friction_dissipation;
         e.cutting += sums.tip_dissipation + sums.softening_dissipation;
+        e.advance_cap += sums.cap_dissipation;
+        e.raised_mass += sums.raised_mass_energy;
+        e.speed_limit += sums.speed_limit_energy;
         self.cohesive_dissipation += sums.cohesive_dissipation;
         e.cohesive = sums.cohesive_energy + self.cohesive_dissipation;
         e.adhesion += sums.adhesion_dissipation;
@@ -84,7 +87,9 @@ impl Recorder {
             force: parts,
             tip_coordinate: sums.tip_coordinate,
             reactions: sums.reactions,
+            face_moments: sums.face_moments,
             energy: *e,
+            verdict: Default::default(),
             needle: Default::default(),
             core: None,
             targets: Vec::new(),

@@ -10,13 +10,22 @@ use flate2::read::ZlibDecoder;
 use flate2::write::ZlibEncoder;
 use serde::{Deserialize, Serialize};
 
+use super::folder::{CHECKPOINT, SUMMARY};
+use super::summary::{Status, Summary};
 use super::whole_file;
 use crate::observables::FrameRecord;
+use crate::reading::{self, Unread};
 use crate::scene::Scene;
 use crate::solver::checkpoint::Checkpoint;
 use crate::{Error, Result};
 
 const MAGIC: &[u8] = b"stylet checkpoint 1\n";
+
+/// Bytes of a message that are unpacked to see whose it is.
+const FIRST: u64 = 4096;
+
+/// Most bytes of a message: the largest mesh with all histories, and the records of a long run [B].
+const LARGEST_MESSAGE: u64 = 4 << 30;
 
 /// A run that goes on later.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -56,6 +65,10 @@ fn damaged(path: &Path, reason: impl std::fmt::Display) -> Error {
     )
 }
 
+fn other_version(path: &Path, wrote: &str) -> Error {
+    damaged(path, format!("version {wrote:.40} wrote it, this is {}", env!("CARGO_PKG_VERSION")))
+}
+
 impl RunCheckpoint {
     /// Writes the file, whole or not at all.
     ///
@@ -68,18 +81,60 @@ impl RunCheckpoint {
         whole_file::write(path, &bytes.map_err(|source| Error::file(path, source))?)
     }
 
+    /// Reads the checkpoint of the run in a folder.
+    ///
+    /// # Errors
+    /// As [`RunCheckpoint::read`]; a run that has none says why.
+    pub fn of_run(folder: &Path) -> Result<Self> {
+        let path = folder.join(CHECKPOINT);
+        if path.exists() || !folder.is_dir() {
+            return Self::read(&path);
+        }
+        let folder = folder.display();
+        let status = Summary::read(&path.with_file_name(SUMMARY)).map(|summary| summary.status);
+        let (message, way_out) = match status {
+            Ok(Status::Ok | Status::Doubtful(_)) => (
+                format!("the run in {folder} has finished: nothing is left to go on with"),
+                "its results are in that folder; for a run anew give --force and --out instead of --resume",
+            ),
+            Ok(Status::Failed(why)) => (
+                format!(
+                    "the run in {folder} has failed and keeps no checkpoint: {}",
+                    why.lines().next().unwrap_or_default()
+                ),
+                "mend what made it fail, then start it anew with --force",
+            ),
+            Ok(Status::Interrupted) => (
+                format!("the run in {folder} was stopped, and its checkpoint is not there any more"),
+                "put checkpoint.stylet back, or start the run anew with --force",
+            ),
+            Err(_) => (
+                format!(
+                    "there is no checkpoint in {folder}: no run was stopped there, or it was killed before its first one"
+                ),
+                "name the folder of a run that was stopped; a run that has ended keeps none",
+            ),
+        };
+        Err(Error::input(message, way_out))
+    }
+
     /// Reads a file back.
     ///
     /// # Errors
     /// `Error::Input` for a file that is missing, damaged or of another version.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|reason| {
+        let unread = |reason: Unread| {
             Error::input(
                 format!("there is no checkpoint {}: {reason}", path.display()),
-                "name the folder of a run that was stopped; a run that has ended keeps none",
+                reason.way_out("name the folder of a run that was stopped; a run that has ended keeps none"),
             )
-        })?;
-        Self::from_bytes(path, &bytes)
+        };
+        // A large file that is something else is not read as a whole.
+        let head = reading::head(path, reading::most::CHECKPOINT, MAGIC.len() as u64).map_err(unread)?;
+        if head != MAGIC {
+            return Err(damaged(path, "it does not begin like one"));
+        }
+        Self::from_bytes(path, &reading::bytes(path, reading::most::CHECKPOINT).map_err(unread)?)
     }
 
     /// The same from the bytes of a file; `path` stands for it in messages.
@@ -87,8 +142,18 @@ impl RunCheckpoint {
         let Some(packed) = bytes.strip_prefix(MAGIC) else {
             return Err(damaged(path, "it does not begin like one"));
         };
+        let mut decoder = ZlibDecoder::new(packed);
         let mut message = Vec::new();
-        ZlibDecoder::new(packed).read_to_end(&mut message).map_err(|e| damaged(path, e))?;
+        // A few bytes may unpack to a thousand times as many: the first of them tell whether the others are wanted.
+        decoder.by_ref().take(FIRST).read_to_end(&mut message).map_err(|e| damaged(path, e))?;
+        let (version, _) = postcard::take_from_bytes::<&str>(&message).map_err(|e| damaged(path, e))?;
+        if version != env!("CARGO_PKG_VERSION") {
+            return Err(other_version(path, version));
+        }
+        decoder.by_ref().take(LARGEST_MESSAGE).read_to_end(&mut message).map_err(|e| damaged(path, e))?;
+        if message.len() as u64 > LARGEST_MESSAGE {
+            return Err(damaged(path, format!("more than {LARGEST_MESSAGE} bytes are packed into it")));
+        }
         Self::from_message(path, &message)
     }
 
@@ -96,8 +161,7 @@ impl RunCheckpoint {
     pub fn from_message(path: &Path, message: &[u8]) -> Result<Self> {
         let (found, rest) = postcard::take_from_bytes::<Self>(message).map_err(|e| damaged(path, e))?;
         if found.version != env!("CARGO_PKG_VERSION") {
-            let (wrote, this) = (&found.version, env!("CARGO_PKG_VERSION"));
-            return Err(damaged(path, format!("version {wrote:.40} wrote it, this is {this}")));
+            return Err(other_version(path, &found.version));
         }
         if !rest.is_empty() || found.records.len() as u64 != found.simulation.frames {
             return Err(damaged(path, "its parts do not fit together"));

@@ -87,6 +87,12 @@ impl OutputFolder {
     /// `Error::Input` where it cannot be written to.
     pub fn reopen(path: &Path) -> Result<Self> {
         probe_writable(path)?;
+        // What a program that was killed had begun to write is of no use to anybody.
+        for folder in [path.to_path_buf(), path.join(FIELD_FOLDER)] {
+            for file in files_that(&folder, is_unfinished_file).unwrap_or_default() {
+                fs::remove_file(&file).map_err(|reason| not_usable(&file, &reason))?;
+            }
+        }
         Ok(Self { path: path.to_path_buf() })
     }
 
@@ -173,13 +179,16 @@ fn not_usable(path: &Path, reason: &io::Error) -> Error {
     )
 }
 
+/// Beginning of the name of a file that only shows that one can be written.
+const WRITE_TEST: &str = ".write_test_";
+
 /// What must fit on the disk before a run begins [B]: less than the tables and charts of the shortest run.
 const LEAST_SPACE: usize = 16 << 10;
 
 /// Writes and removes a small file: permission bits alone do not tell whether a file system can be written to, nor an empty file
 /// whether it is full.
 fn probe_writable(path: &Path) -> Result<()> {
-    let probe = path.join(format!(".write_test_{}{UNFINISHED}", std::process::id()));
+    let probe = path.join(format!("{WRITE_TEST}{}{UNFINISHED}", std::process::id()));
     let written = fs::write(&probe, [0; LEAST_SPACE]);
     let removed = if probe.exists() { fs::remove_file(&probe) } else { Ok(()) };
     written.and(removed).map_err(|reason| match reason.kind() {
@@ -218,6 +227,12 @@ fn files_that(path: &Path, wanted: fn(&str) -> bool) -> io::Result<Vec<PathBuf>>
         }
     }
     Ok(found)
+}
+
+/// A file of a run that was still being written.
+fn is_unfinished_file(name: &str) -> bool {
+    let ours = |name: &str| is_result_file(name) || is_field_file(name) || name.starts_with(WRITE_TEST);
+    name.strip_suffix(UNFINISHED).is_some_and(ours)
 }
 
 fn is_result_file(name: &str) -> bool {

@@ -108,7 +108,7 @@ pub fn write_forensics(
 
 fn sign_text(sign: Option<Sign>) -> &'static str {
     match sign {
-        Some(Sign::NotFinite) => "a displacement or velocity is no number or out of range",
+        Some(Sign::NotFinite) => "a displacement or velocity is NaN or out of range",
         Some(Sign::Speed) => "a node came near the speed limit",
         Some(Sign::Inversion) => "a cell turned inside out",
         None => "no single step stands out before the frame that stopped the run",
@@ -167,7 +167,7 @@ fn steps_table(steps: &[StepRecord]) -> String {
 fn draw(path: &Path, model: &Model, finding: &Finding, device: Option<&Gpu>) -> Result<()> {
     let mut scene = Scene { targets: Vec::new(), ..model.scene.clone() };
     let mut fields = finding.fields.clone();
-    let plane = Plane::of_scene(&scene, &fields);
+    let plane = Plane::of_scene(&scene, &model.mesh, &fields);
     let far = (finding.place - plane.origin).dot(plane.normal).abs() > NEAR * scene.tissue.cell_size;
     if far || scene.tool.is_none() {
         scene.tool = None;

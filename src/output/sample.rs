@@ -11,7 +11,7 @@ use crate::observables::FrameRecord;
 use crate::scene::{Face, FaceCondition, FaceDrive};
 
 /// Columns of `sample.csv`. A stress is empty where the area, a shear stress also where the direction is not known.
-pub const SAMPLE_COLUMNS: [&str; 12] = [
+pub const SAMPLE_COLUMNS: [&str; 13] = [
     "time_s",
     "face",
     "displacement_x_m",
@@ -24,6 +24,7 @@ pub const SAMPLE_COLUMNS: [&str; 12] = [
     "stretch",
     "nominal_stress_pa",
     "shear_stress_pa",
+    "moment_n_m",
 ];
 
 /// A face that moves, and what turns its forces into stresses.
@@ -49,6 +50,9 @@ pub struct SamplePoint {
     pub rotation: f64,
     /// What the face exerts on the tissue [N].
     pub reaction: DVec3,
+    /// Moment of the same about the axis of the face through its present centre [N m], right-handed about the coordinate axis: what
+    /// turns the face by `rotation`.
+    pub moment: f64,
     /// Present over rest length between the face and the opposite one.
     pub stretch: f64,
     /// Tangential displacement along the drive over the rest length between the faces.
@@ -122,11 +126,14 @@ impl DrivenFace {
         let reaction = record.reactions[self.face as usize];
         let outward = self.outward();
         let tangent = self.tangent();
+        let axis = self.face.axis();
         SamplePoint {
             time: record.time,
             displacement,
             rotation: self.drive.rotation * part,
             reaction,
+            // The axis goes with the face.
+            moment: record.face_moments[self.face as usize] - displacement.cross(reaction)[axis],
             stretch: 1.0 + apart.dot(outward) / self.rest_length,
             shear: tangent.map_or(0.0, |t| apart.dot(t) / self.rest_length),
             nominal_stress: self.rest_area.map(|area| reaction.dot(outward) / area),

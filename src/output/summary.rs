@@ -10,6 +10,8 @@ use super::tables::{hourglass_to_internal, kinetic_to_internal};
 use super::target::TargetFigures;
 use super::whole_file;
 use crate::observables::FrameRecord;
+use crate::reading;
+use crate::verdict::Doubt;
 use crate::{Error, Result};
 
 /// Internal energy below this fraction of its largest value says nothing about hourglassing: the ratio of two numbers
@@ -22,6 +24,8 @@ const TELLING_ENERGY: f64 = 0.01;
 pub enum Status {
     #[default]
     Ok,
+    /// It ended, but its numbers are to be doubted, and why: the verdict of [`crate::verdict`] in words.
+    Doubtful(String),
     /// Stopped by the user; the results up to there are complete.
     Interrupted,
     /// Why the run stopped.
@@ -32,8 +36,9 @@ impl From<Status> for String {
     fn from(status: Status) -> Self {
         match status {
             Status::Ok => "ok".into(),
+            Status::Doubtful(why) => format!("doubtful: {why}"),
             Status::Interrupted => "interrupted".into(),
-            Status::Failed(why) => format!("failed: {why}"),
+            Status::Failed(why) => format!("stopped: {why}"),
         }
     }
 }
@@ -43,7 +48,11 @@ impl From<String> for Status {
         match text.as_str() {
             "ok" => Status::Ok,
             "interrupted" => Status::Interrupted,
-            other => Status::Failed(other.strip_prefix("failed: ").unwrap_or(other).to_string()),
+            other => match (other.strip_prefix("doubtful: "), other.strip_prefix("stopped: ")) {
+                (Some(why), _) => Status::Doubtful(why.into()),
+                (_, Some(why)) => Status::Failed(why.into()),
+                _ => Status::Failed(other.into()),
+            },
         }
     }
 }
@@ -117,10 +126,19 @@ pub struct Summary {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<TargetFigures>,
 
-    /// Largest |external work - accounted energy| of a frame over the largest external work of the run; not a number
-    /// (`null`) if any frame had none.
+    /// What makes the run doubtful: quantity, largest value, bound, frame and time where it began, place.
+    #[serde(default)]
+    pub doubts: Vec<Doubt>,
+    /// Largest part of the work so far that was lost or created without a cause, see [`crate::verdict`]; `null` if it is NaN.
     #[serde(deserialize_with = "null_is_nan")]
     pub energy_imbalance: f64,
+    /// Taken by raised masses, by the speed limit and by the cap on the tip's advance [J].
+    #[serde(default)]
+    pub raised_mass_j: f64,
+    #[serde(default)]
+    pub speed_limit_j: f64,
+    #[serde(default)]
+    pub advance_cap_j: f64,
     /// Medians over the way in.
     #[serde(deserialize_with = "null_is_nan")]
     pub kinetic_to_internal: f64,
@@ -174,13 +192,13 @@ impl Summary {
         }
         self.drops = major_drops(records);
 
-        let scale = records.iter().map(|r| r.energy.external_max).fold(0.0, f64::max);
-        let residual = |r: &FrameRecord| (r.energy.external - r.energy.accounted()).abs();
-        self.energy_imbalance = match scale > 0.0 {
-            true => largest(records.iter().map(residual)) / scale,
-            // Nothing was done to the tissue; what it holds all the same is measured against itself.
-            false => largest(records.iter().map(|r| r.energy.imbalance().abs())),
-        };
+        if let Some(last) = records.last() {
+            self.doubts = last.verdict.doubts.clone();
+            self.energy_imbalance = last.verdict.worst_imbalance;
+            self.raised_mass_j = last.energy.raised_mass;
+            self.speed_limit_j = last.energy.speed_limit;
+            self.advance_cap_j = last.energy.advance_cap;
+        }
         // A scene without a moving tool has no way in: every frame counts.
         let mut inward: Vec<&FrameRecord> = frames_on_the_way_in(records).collect();
         if inward.len() < 2 {
@@ -220,7 +238,8 @@ impl Summary {
 
     /// Reads a summary back.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::file(path, source))?;
+        let text = reading::text(path, reading::most::OWN)
+            .map_err(|unread| unread.of(path, "name the summary.json of a run"))?;
         serde_json::from_str(&text).map_err(|reason| {
             Error::input(
                 format!("{} is no summary of a run: {reason}", path.display()),
@@ -269,10 +288,16 @@ mod tests {
 
     #[test]
     fn status_is_one_string() {
-        for status in [Status::Ok, Status::Interrupted, Status::Failed("an inverted cell".into())] {
+        for status in [
+            Status::Ok,
+            Status::Doubtful("lost".into()),
+            Status::Interrupted,
+            Status::Failed("an inverted cell".into()),
+        ] {
             let text = serde_json::to_string(&status).unwrap();
             assert_eq!(serde_json::from_str::<Status>(&text).unwrap(), status);
         }
-        assert_eq!(serde_json::to_string(&Status::Failed("x".into())).unwrap(), "\"failed: x\"");
+        assert_eq!(serde_json::to_string(&Status::Failed("x".into())).unwrap(), "\"stopped: x\"");
+        assert_eq!(serde_json::to_string(&Status::Doubtful("x".into())).unwrap(), "\"doubtful: x\"");
     }
 }

@@ -33,38 +33,26 @@ pub fn force_columns() -> Vec<&'static str> {
 }
 
 /// Columns of `energy.csv`.
-pub const ENERGY_COLUMNS: [&str; 30] = [
-    "time_s",
-    "depth_m",
-    "external_work_j",
-    "elastic_j",
-    "kinetic_j",
-    "hourglass_j",
-    "damping_j",
-    "friction_j",
-    "cutting_j",
-    "cohesive_j",
-    "adhesion_j",
-    "plastic_j",
-    "damage_j",
-    "viscous_j",
-    "contact_j",
-    "needle_j",
-    "changes_j",
-    "imbalance",
-    "kinetic_to_internal",
-    "hourglass_to_internal",
-    "min_j",
-    "min_corner_j",
-    "clamped_nodes",
-    "inverted_cells",
-    "max_speed_m_per_s",
-    "raised_mass",
-    "largest_damage",
-    "deleted_cells",
-    "return_failures",
-    "torn_area_m2",
-];
+pub fn energy_columns() -> Vec<&'static str> {
+    let mut columns = vec!["time_s", "depth_m", "external_work_j"];
+    columns.extend(EnergyAccount::PARTS.map(|part| part.column));
+    columns.extend([
+        "imbalance",
+        "kinetic_to_internal",
+        "hourglass_to_internal",
+        "min_j",
+        "min_corner_j",
+        "clamped_nodes",
+        "inverted_cells",
+        "max_speed_m_per_s",
+        "raised_mass",
+        "largest_damage",
+        "deleted_cells",
+        "return_failures",
+        "torn_area_m2",
+    ]);
+    columns
+}
 
 /// Columns of `core.csv`.
 pub const CORE_COLUMNS: [&str; 8] =
@@ -187,7 +175,7 @@ impl Tables {
             sample,
             targets,
             force: Table::new(folder.file(FORCE_TABLE), &force_columns())?,
-            energy: Table::new(folder.file(ENERGY_TABLE), &ENERGY_COLUMNS)?,
+            energy: Table::new(folder.file(ENERGY_TABLE), &energy_columns())?,
         };
         records.iter().try_for_each(|record| tables.rows(record))?;
         tables.all().try_for_each(Table::make)?;
@@ -253,32 +241,17 @@ fn force_row(record: &FrameRecord) -> Vec<String> {
 /// # Errors
 /// `Error::File` where it cannot be written.
 pub fn write_energy_table(path: &Path, records: &[FrameRecord]) -> Result<()> {
-    let mut table = Table::new(path.to_path_buf(), &ENERGY_COLUMNS)?;
+    let mut table = Table::new(path.to_path_buf(), &energy_columns())?;
     records.iter().try_for_each(|record| table.row(&energy_row(record)))?;
     table.make()
 }
 
-fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
+fn energy_row(record: &FrameRecord) -> Vec<String> {
     let e = &record.energy;
     let h = &record.health;
-    [
-        number(record.time),
-        number(record.depth),
-        number(e.external),
-        number(e.elastic),
-        number(e.kinetic),
-        number(e.hourglass),
-        number(e.damping),
-        number(e.friction),
-        number(e.cutting),
-        number(e.cohesive),
-        number(e.adhesion),
-        number(e.plastic),
-        number(e.damage),
-        number(e.viscous),
-        number(e.contact),
-        number(e.needle),
-        number(e.changes),
+    let mut row = vec![number(record.time), number(record.depth), number(e.external)];
+    row.extend(EnergyAccount::PARTS.iter().map(|part| number((part.of)(e))));
+    row.extend([
         number(e.imbalance()),
         number(kinetic_to_internal(e)),
         number(hourglass_to_internal(e)),
@@ -292,7 +265,8 @@ fn energy_row(record: &FrameRecord) -> [String; ENERGY_COLUMNS.len()] {
         h.deleted_cells.to_string(),
         h.return_failures.to_string(),
         number(h.torn_area),
-    ]
+    ]);
+    row
 }
 
 fn sample_row(face: &DrivenFace, p: &SamplePoint) -> [String; SAMPLE_COLUMNS.len()] {
@@ -310,6 +284,7 @@ fn sample_row(face: &DrivenFace, p: &SamplePoint) -> [String; SAMPLE_COLUMNS.len
         number(p.stretch),
         known(p.nominal_stress),
         known(p.shear_stress),
+        number(p.moment),
     ]
 }
 

@@ -68,7 +68,7 @@ pub struct Picture {
 impl Picture {
     /// Composes the picture of one moment.
     pub fn compose(scene: &Scene, mesh: &Mesh, snapshot: &FieldSnapshot) -> Self {
-        let plane = Plane::of_scene(scene, snapshot);
+        let plane = Plane::of_scene(scene, mesh, snapshot);
         let slice = slice::cut(mesh, snapshot, &plane, scene.tissue.cell_size);
         let layout = Layout::new(scene, mesh, &plane, &slice);
         let scale = StressScale::new(scene.outputs.stress_scale, &slice);
@@ -84,7 +84,7 @@ impl Picture {
             draw_target(&mut canvas, &layout, &plane, *place, target.radius);
         }
         draw_frame(&mut canvas, &layout);
-        draw_texts(&mut canvas, &layout, scene, snapshot, &slice);
+        draw_texts(&mut canvas, &layout, scene, snapshot, (&plane, &slice));
         draw_colour_bar(&mut canvas, &layout, &scale);
         if path_is_visible(&slice, tool.as_ref()) {
             draw_path_legend(&mut canvas, &layout);
@@ -616,7 +616,13 @@ fn outline(canvas: &mut Canvas, r: Rectangle, width: f64) {
     }
 }
 
-fn draw_texts(canvas: &mut Canvas, layout: &Layout, scene: &Scene, snapshot: &FieldSnapshot, slice: &Slice) {
+fn draw_texts(
+    canvas: &mut Canvas,
+    layout: &Layout,
+    scene: &Scene,
+    snapshot: &FieldSnapshot,
+    (plane, slice): (&Plane, &Slice),
+) {
     let unit = layout.unit;
     let (width, height) = (f64::from(layout.size.0), f64::from(layout.size.1));
     let title = if scene.title.is_empty() { &scene.name } else { &scene.title };
@@ -632,13 +638,25 @@ fn draw_texts(canvas: &mut Canvas, layout: &Layout, scene: &Scene, snapshot: &Fi
     }
     let decimals = if snapshot.time < 1.0 { 3 } else { 2 };
     caption += &format!("t = {:.decimals$} s   cells {} mm", snapshot.time, three_digits(scene.tissue.cell_size * 1e3));
+    // A cut beside its usual place, through the mesh, says where it is.
+    if plane.normal == DVec3::NEG_Y && plane.origin.y != scene.motion.entry.y {
+        caption += &format!("   cut at y = {} mm", three_digits(plane.origin.y * 1e3));
+    }
     let capital = 11.5 * unit;
     let room = bar_left - layout.plot.left - 20.0 * unit;
     canvas.text(&stroke_font::shortened(&caption, capital, room), DVec2::new(layout.plot.left, baseline), capital, INK);
     if slice.cells_left_out > 0 {
         canvas.text(
-            &format!("{} cells not drawn: no number", slice.cells_left_out),
+            &format!("{} cells not drawn: NaN or far outside", slice.cells_left_out),
             DVec2::new(layout.plot.left + 10.0 * unit, layout.plot.top + 22.0 * unit),
+            capital,
+            WARNING,
+        );
+    }
+    if slice.triangles.is_empty() {
+        canvas.text(
+            "the cut meets no tissue",
+            DVec2::new(layout.plot.left + 10.0 * unit, layout.plot.top + 46.0 * unit),
             capital,
             WARNING,
         );

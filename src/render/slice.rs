@@ -50,8 +50,42 @@ pub struct Plane {
 
 impl Plane {
     /// For a needle the plane through its axis and world x; otherwise, and where both coincide, the plane
-    /// y = entry.y.
-    pub fn of_scene(scene: &Scene, snapshot: &FieldSnapshot) -> Self {
+    /// y = entry.y. Where that passes beside the mesh it is moved to the cell nearest to the first target, or to the middle of the
+    /// mesh.
+    pub fn of_scene(scene: &Scene, mesh: &Mesh, snapshot: &FieldSnapshot) -> Self {
+        let plane = Self::of_tool(scene, snapshot);
+        if plane.meets(mesh, scene.tissue.cell_size) {
+            return plane;
+        }
+        let (low, high) = mesh.bounds();
+        let wanted = plane.height(scene.targets.first().map_or(0.5 * (low + high), |target| target.position));
+        let middle = |cell: usize| {
+            let nodes = mesh.cell_nodes(cell);
+            nodes.iter().map(|n| mesh.rest_position(*n)).sum::<DVec3>() / nodes.len() as f64
+        };
+        let near = (0..mesh.cell_count())
+            .filter(|cell| !mesh.is_gap(*cell))
+            .map(|cell| plane.height(middle(cell)))
+            .min_by(|a, b| (a - wanted).abs().total_cmp(&(b - wanted).abs()));
+        Self { origin: plane.origin + plane.normal * near.unwrap_or(0.0), ..plane }
+    }
+
+    /// True where a cell at rest lies on both sides of the cut.
+    fn meets(&self, mesh: &Mesh, cell_size: f64) -> bool {
+        let plane = self.beside_grid_lines(cell_size);
+        (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell)).any(|cell| {
+            let nodes = mesh.cell_nodes(cell);
+            let above = |node: &usize| plane.height(mesh.rest_position(*node)) >= 0.0;
+            nodes.iter().any(above) && !nodes.iter().all(above)
+        })
+    }
+
+    /// Where the mesh is cut.
+    fn beside_grid_lines(&self, cell_size: f64) -> Self {
+        Self { origin: self.origin - self.normal * (BESIDE_GRID_LINES * cell_size), ..*self }
+    }
+
+    fn of_tool(scene: &Scene, snapshot: &FieldSnapshot) -> Self {
         let upright = Self { origin: scene.motion.entry, right: DVec3::X, up: DVec3::Z, normal: DVec3::NEG_Y };
         let Some(Tool::Needle(_)) = scene.tool else {
             return upright;
@@ -117,8 +151,7 @@ pub struct Slice {
 
 /// Cuts the deformed mesh.
 pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64) -> Slice {
-    let mut plane = *plane;
-    plane.origin -= plane.normal * (BESIDE_GRID_LINES * cell_size);
+    let plane = plane.beside_grid_lines(cell_size);
     let von_mises = smoothed_to_nodes(mesh, &snapshot.von_mises, &snapshot.stiffness);
     let (low, high) = mesh.bounds();
     let farthest = FARTHEST_MOVE * (high - low).max_element();

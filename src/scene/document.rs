@@ -8,16 +8,30 @@ use std::ops::Range;
 use std::path::Path;
 
 use codespan_reporting::diagnostic::{Diagnostic, Label};
-use codespan_reporting::files::SimpleFile;
+use codespan_reporting::files::{self, Files};
 use codespan_reporting::term::{self, Chars, Config};
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue, ValueDeserializer};
+
+use crate::error::brief;
+
+/// Most entries of any list: counted before anything is made of them.
+const MOST_ENTRIES: usize = 4096;
+
+/// Most tables and lists within each other; a scene needs five. What walks down a document may then call itself.
+const DEEPEST: usize = 24;
+
+/// Most problems that are told at once.
+const MOST_PROBLEMS: usize = 30;
 
 /// A parsed scene file with overrides.
 pub struct Document<'s> {
     name: String,
     source: &'s str,
+    /// Where every line of the source begins.
+    lines: Vec<usize>,
     overrides: &'s [String],
     /// The merged document; always a table.
     root: Spanned<DeValue<'s>>,
@@ -44,6 +58,7 @@ impl<'s> Document<'s> {
         let mut document = Document {
             name: path.display().to_string(),
             source,
+            lines: files::line_starts(source).collect(),
             overrides,
             root: Spanned::new(0..0, DeValue::Table(DeTable::new())),
             places: BTreeMap::new(),
@@ -69,16 +84,39 @@ impl<'s> Document<'s> {
         if !problems.is_empty() {
             return Err(problems.join("\n"));
         }
+        if let Some((span, path, problem)) = oversized("", &document.root, DEEPEST) {
+            let (message, way_out) = match problem {
+                Oversized::Long(count) => (
+                    format!("`{path}` has {count} entries; no list of a scene may have more than {MOST_ENTRIES}"),
+                    format!(
+                        "keep at most {MOST_ENTRIES} entries, of most lists far fewer; `stylet schema` describes them"
+                    ),
+                ),
+                Oversized::Deep => (
+                    format!("`{path}`: more than {DEEPEST} tables and lists within each other"),
+                    "write the keys as `stylet schema` describes them".into(),
+                ),
+            };
+            return Err(document.render(span, &message, "too much", &way_out));
+        }
         record_places("", &document.root, &mut document.places);
         Ok(document)
     }
 
     /// Reads the document into `T`; the error is rendered.
-    pub fn deserialize<T: DeserializeOwned>(&self) -> Result<T, String> {
+    ///
+    /// A list of a fixed length is checked against the schema first: the reading layer stops after the last number that it wants and
+    /// leaves the others unread.
+    pub fn deserialize<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, String> {
+        let schema = schemars::schema_for!(T).to_value();
+        let mut problems = Problems::new(self);
+        too_long("", self.root.get_ref(), &schema, &schema, &mut problems);
+        problems.check()?;
         T::deserialize(ValueDeserializer::from(self.root.clone())).map_err(|error| {
             let span = error.span().unwrap_or(0..0);
             let message = one_line(error.message());
             let way_out = way_out_of_reading(&message);
+            let message = in_plain_words(&message).unwrap_or(message);
             // A missing field is reported for its whole table; the first line shows which one.
             self.render(span, &message, "here", &way_out)
         })
@@ -115,20 +153,82 @@ impl<'s> Document<'s> {
 
     /// One problem as text: file, line, excerpt, label and the way out.
     fn render(&self, span: Range<usize>, message: &str, label: &str, way_out: &str) -> String {
+        let (message, label, way_out) = (&brief(message), &brief(label), &brief(way_out));
         if span.start > self.source.len() {
-            let text = &self.overrides[span.start - self.source.len() - 1];
+            let text = brief(&self.overrides[span.start - self.source.len() - 1]);
             return format!("error: --set {text}: {message}\n  = way out: {way_out}\n");
         }
-        // Only the first line of a span is shown: a table is recognised by its header.
-        let end = span.end.clamp(span.start, self.source.len());
-        let first_line = self.source[span.start..end].find('\n').map_or(end, |newline| span.start + newline);
+        let (excerpt, shown) = self.excerpt(span);
         let diagnostic = Diagnostic::error()
             .with_message(message)
-            .with_labels(vec![Label::primary((), span.start..first_line).with_message(label)])
+            .with_labels(vec![Label::primary((), shown).with_message(label)])
             .with_notes(vec![format!("way out: {way_out}")]);
         let config = Config { chars: Chars::ascii(), ..Config::default() };
-        term::emit_into_string(&config, &SimpleFile::new(&self.name, self.source), &diagnostic)
+        term::emit_into_string(&config, &excerpt, &diagnostic)
             .unwrap_or_else(|_| format!("error: {}: {message}\n  = way out: {way_out}\n", self.name))
+    }
+
+    /// The line in which a span begins, cut where it is long, and the place of the span in it. Only the first line of a span is shown:
+    /// a table is recognised by its header.
+    fn excerpt(&self, span: Range<usize>) -> (Excerpt<'_>, Range<usize>) {
+        /// Bytes that are shown of a long line, and those of them before the span.
+        const LONGEST: usize = 200;
+        const BEFORE: usize = 60;
+        let index = self.lines.partition_point(|start| *start <= span.start).saturating_sub(1);
+        let (begin, rest) = (self.lines[index], &self.source[self.lines[index]..]);
+        let line = rest.lines().next().unwrap_or_default();
+        let at = (span.start - begin).min(line.len());
+        let to = (span.end.max(span.start) - begin).min(line.len());
+        let column = 1 + line[..at].chars().count();
+        let (mut low, mut high) = (0, line.len());
+        if line.len() > LONGEST {
+            low = line.floor_char_boundary(at.saturating_sub(BEFORE));
+            high = line.floor_char_boundary(low + LONGEST);
+        }
+        let dots = |cut: bool| if cut { "..." } else { "" };
+        let before = dots(low > 0);
+        let text = format!("{before}{}{}", &line[low..high], dots(high < line.len()));
+        let shown = before.len() + at - low..before.len() + to.min(high).max(at) - low;
+        (Excerpt { name: &self.name, text, line: index + 1, column }, shown)
+    }
+}
+
+/// One line of a file, as messages show it.
+struct Excerpt<'a> {
+    name: &'a str,
+    text: String,
+    /// Where the line and the place in it are in the file, counted from 1.
+    line: usize,
+    column: usize,
+}
+
+impl<'a> Files<'a> for Excerpt<'_> {
+    type FileId = ();
+    type Name = &'a str;
+    type Source = &'a str;
+
+    fn name(&'a self, (): ()) -> Result<&'a str, files::Error> {
+        Ok(self.name)
+    }
+
+    fn source(&'a self, (): ()) -> Result<&'a str, files::Error> {
+        Ok(&self.text)
+    }
+
+    fn line_index(&'a self, (): (), _: usize) -> Result<usize, files::Error> {
+        Ok(0)
+    }
+
+    fn line_number(&'a self, (): (), _: usize) -> Result<usize, files::Error> {
+        Ok(self.line)
+    }
+
+    fn column_number(&'a self, (): (), _: usize, _: usize) -> Result<usize, files::Error> {
+        Ok(self.column)
+    }
+
+    fn line_range(&'a self, (): (), _: usize) -> Result<Range<usize>, files::Error> {
+        Ok(0..self.text.len())
     }
 }
 
@@ -156,13 +256,22 @@ impl<'a> Problems<'a> {
             return Ok(());
         }
         self.found.sort_by_key(|(place, _)| *place);
-        let texts: Vec<&str> = self.found.iter().map(|(_, text)| text.trim_end()).collect();
+        let mut texts: Vec<&str> = self.found.iter().map(|(_, text)| text.trim_end()).take(MOST_PROBLEMS).collect();
+        let more = format!("and {} more problems of this kind or another", self.found.len() - texts.len());
+        if self.found.len() > texts.len() {
+            texts.push(&more);
+        }
         Err(texts.join("\n\n") + "\n")
     }
 }
 
 /// The entry of `choices` that differs least from `word`, where it is close enough to be a slip of the keys.
 pub fn closest<'a>(word: &str, choices: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    /// Longer than any name here.
+    const LONGEST: usize = 200;
+    if word.len() > LONGEST {
+        return None;
+    }
     choices
         .into_iter()
         .map(|choice| (edit_distance(word, choice), choice))
@@ -185,6 +294,30 @@ fn edit_distance(a: &str, b: &str) -> usize {
         }
     }
     row[b.len()]
+}
+
+/// "invalid type: integer `16`, expected a string" in words of a scene file; `None` for any other message.
+fn in_plain_words(message: &str) -> Option<String> {
+    let (found, expected) = message.strip_prefix("invalid type: ")?.split_once(", expected ")?;
+    let quoted = found.split_once('`').and_then(|(_, rest)| rest.strip_suffix('`')).unwrap_or_default();
+    let found = match found.split(' ').next()? {
+        "integer" | "floating" => format!("the number {quoted}"),
+        "boolean" => quoted.to_string(),
+        "string" => format!("the text {}", found.strip_prefix("string ")?),
+        "sequence" => "a list".into(),
+        "map" => "a table".into(),
+        _ => found.into(),
+    };
+    let expected = match expected {
+        "a string" => "a text in quotes",
+        "f32" | "f64" => "a number",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number",
+        "a boolean" => "true or false",
+        "a sequence" => "a list [...]",
+        table if table.starts_with("struct ") => "a table with keys of its own",
+        other => other,
+    };
+    Some(format!("{found} stands where {expected} is expected"))
 }
 
 /// The way out of an error of the reading layer, from the names that its message quotes.
@@ -219,7 +352,10 @@ fn apply_override<'s>(
         return fail("there is no `=`".into(), FORM);
     };
     let (path, value) = (path.trim(), value.trim());
-    let parts: Vec<&str> = path.split('.').map(str::trim).collect();
+    let parts: Vec<&str> = path.split('.').map(str::trim).take(DEEPEST + 1).collect();
+    if parts.len() > DEEPEST {
+        return fail(format!("the key has more than {DEEPEST} parts"), FORM);
+    }
     if parts.iter().any(|part| part.is_empty()) {
         return fail("the key is incomplete".into(), FORM);
     }
@@ -316,6 +452,70 @@ fn moved_value<'s>(value: DeValue<'s>, place: &Range<usize>) -> DeValue<'s> {
 /// A message of the TOML reader on one line.
 fn one_line(message: &str) -> String {
     message.trim().replace('\n', ", ")
+}
+
+/// What no scene needs.
+enum Oversized {
+    /// A list of so many entries.
+    Long(usize),
+    Deep,
+}
+
+/// The first list that is too long, or table that lies `depth` levels below `value`, with its place and path; looks no deeper.
+fn oversized(path: &str, value: &Spanned<DeValue>, depth: usize) -> Option<(Range<usize>, String, Oversized)> {
+    let Some(depth) = depth.checked_sub(1) else { return Some((value.span(), path.into(), Oversized::Deep)) };
+    match value.get_ref() {
+        DeValue::Table(table) => {
+            table.iter().find_map(|(key, item)| oversized(&join(path, key.get_ref()), item, depth))
+        }
+        // A list of tables has no place of its own, its entries have.
+        DeValue::Array(array) if array.len() > MOST_ENTRIES => {
+            let span = array.get(MOST_ENTRIES).map_or(value.span(), Spanned::span);
+            Some((span, path.into(), Oversized::Long(array.len())))
+        }
+        DeValue::Array(array) => {
+            array.iter().enumerate().find_map(|(index, item)| oversized(&join(path, &index.to_string()), item, depth))
+        }
+        _ => None,
+    }
+}
+
+/// Reports every list that is longer than the schema allows.
+fn too_long(
+    path: &str,
+    value: &DeValue,
+    schema: &serde_json::Value,
+    whole: &serde_json::Value,
+    problems: &mut Problems,
+) {
+    if let Some(place) = schema["$ref"].as_str().and_then(|place| place.strip_prefix('#')) {
+        return too_long(path, value, whole.pointer(place).unwrap_or_default(), whole, problems);
+    }
+    for choice in ["anyOf", "oneOf", "allOf"].into_iter().filter_map(|key| schema[key].as_array()).flatten() {
+        too_long(path, value, choice, whole, problems);
+    }
+    match value {
+        DeValue::Table(table) => {
+            for (key, item) in table {
+                let below = &schema["properties"][key.get_ref().as_ref()];
+                too_long(&join(path, key.get_ref()), item.get_ref(), below, whole, problems);
+            }
+        }
+        DeValue::Array(array) => {
+            if let Some(most) = schema["maxItems"].as_u64().filter(|most| array.len() as u64 > *most) {
+                problems.report(
+                    path,
+                    format!("`{path}` has {} entries, {most} are wanted", array.len()),
+                    "too long",
+                    format!("write {most} entries; `stylet schema` tells what they mean"),
+                );
+            }
+            for (index, item) in array.iter().enumerate() {
+                too_long(&join(path, &index.to_string()), item.get_ref(), &schema["items"], whole, problems);
+            }
+        }
+        _ => {}
+    }
 }
 
 /// `table.key`, or `key` at the top.

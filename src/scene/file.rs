@@ -7,6 +7,8 @@ use schemars::JsonSchema;
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::{Deserialize, Deserializer};
 
+use super::words;
+
 /// A Stylet scene.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -15,6 +17,7 @@ pub struct SceneFile {
     pub title: Option<String>,
     /// Keys of the effects that are simulated, e.g. ["puncture", "friction", "mass_scaling"].
     #[serde(default)]
+    #[schemars(schema_with = "words::effects")]
     pub effects: Vec<String>,
     pub tissue: TissueTable,
     pub material: MaterialTable,
@@ -75,6 +78,8 @@ pub struct TissueTable {
     /// A file of tetrahedra (.msh, .vtk, .vtu, .inp) instead of the block; relative to the scene file.
     pub mesh: Option<String>,
     /// Unit of length in the mesh file: m, cm, mm, um or inch.
+    #[serde(default)]
+    #[schemars(schema_with = "words::units")]
     pub unit: Option<String>,
     /// Accept a mesh smaller than 1 mm or larger than 1 m, which is otherwise taken for a wrong unit.
     pub accept_size: Option<bool>,
@@ -94,6 +99,7 @@ pub enum LawWord {
 /// A tissue material: a preset, or the constants of a law with one volumetric key, or E and nu with a share of c10.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = words::known_presets)]
 pub struct MaterialTable {
     /// Name in the material library.
     pub preset: Option<String>,
@@ -214,7 +220,7 @@ pub struct SupportTable {
 }
 
 /// A library of tissue materials, e.g. assets/materials.toml.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LibraryFile {
     #[serde(default)]
@@ -222,7 +228,7 @@ pub struct LibraryFile {
 }
 
 /// One material of a library: constants as in [`MaterialTable`], and parameters of its own for effects.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LibraryMaterial {
     pub name: String,
@@ -255,7 +261,7 @@ pub struct LibraryMaterial {
 
 /// Tip forces of a material; `cutting_force_n` or `cutting_energy_j_m2`. What is missing keeps the ratio of the two
 /// forces in the scene's table [puncture].
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CuttingTable {
     pub puncture_force_n: Option<f64>,
@@ -263,19 +269,19 @@ pub struct CuttingTable {
     pub cutting_energy_j_m2: Option<f64>,
 }
 
-/// Conditions on the six faces.
+/// Conditions on the six faces of a block, or of the bounding box of a mesh.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundariesTable {
-    /// Face x = -size/2; default "fixed".
+    /// Face x = -size/2; default "fixed", of a mesh "free".
     pub x_min: Option<FaceEntry>,
-    /// Face x = +size/2; default "fixed".
+    /// Face x = +size/2; default "fixed", of a mesh "free".
     pub x_max: Option<FaceEntry>,
-    /// Face y = -size/2; default "fixed".
+    /// Face y = -size/2; default "fixed", of a mesh "free".
     pub y_min: Option<FaceEntry>,
-    /// Face y = +size/2; default "fixed".
+    /// Face y = +size/2; default "fixed", of a mesh "free".
     pub y_max: Option<FaceEntry>,
-    /// Bottom; default "fixed".
+    /// Bottom; default "fixed", of a mesh "free".
     pub z_min: Option<FaceEntry>,
     /// Top; default "free".
     pub z_max: Option<FaceEntry>,
@@ -333,6 +339,8 @@ pub struct FaceTable {
 #[serde(deny_unknown_fields)]
 pub struct NeedleTable {
     /// Gauge in the needle library, e.g. "16G"; or give `outer_diameter_mm`.
+    #[serde(default, deserialize_with = "words::gauge")]
+    #[schemars(schema_with = "words::gauges")]
     pub gauge: Option<String>,
     /// Outer diameter [mm].
     pub outer_diameter_mm: Option<f64>,
@@ -361,7 +369,7 @@ pub struct NeedleTable {
 #[derive(Debug, Clone, JsonSchema)]
 #[schemars(untagged)]
 pub enum NeedleMaterialEntry {
-    Preset(String),
+    Preset(#[schemars(schema_with = "words::needle_materials")] String),
     Table(NeedleMaterialTable),
 }
 
@@ -578,6 +586,7 @@ pub struct CohesiveTable {
 #[serde(deny_unknown_fields)]
 pub struct CohesivePlaneTable {
     /// Axis of its normal: "x", "y" or "z".
+    #[schemars(schema_with = "words::axes")]
     pub axis: String,
     /// Coordinate [mm]; z is negative below the top face.
     pub at_mm: f64,

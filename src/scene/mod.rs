@@ -10,12 +10,14 @@ pub mod file;
 pub mod motion;
 pub mod presets;
 pub mod task;
+mod words;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
 
+pub use document::closest;
 pub use file::OnTrouble;
 pub use motion::{Motion, Phase, Vibration};
 pub use task::{Goal, Obstacle, Task};

@@ -55,10 +55,8 @@ impl Change {
     /// # Errors
     /// As [`GpuEngine::new`].
     pub fn engine(&self) -> Result<Box<dyn Engine>> {
-        Ok(match &self.device {
-            Some(gpu) => Box::new(self.gpu_engine(gpu)?),
-            None => Box::new(CpuEngine::new(self.model.clone(), self.dt)),
-        })
+        let most_steps = self.purpose.most_steps(self.steps_per_frame);
+        engine(&self.model, self.device.as_ref(), self.dt, most_steps, self.purpose.drawn)
     }
 
     fn gpu_engine(&self, gpu: &Gpu) -> Result<GpuEngine> {
@@ -85,6 +83,20 @@ impl Change {
         engine.collect(true)?;
         Ok(())
     }
+}
+
+/// An engine for this model on this device, without one the CPU engine.
+pub(super) fn engine(
+    model: &Arc<Model>,
+    device: Option<&Gpu>,
+    dt: f64,
+    most_steps: usize,
+    drawn: bool,
+) -> Result<Box<dyn Engine>> {
+    Ok(match device {
+        Some(gpu) => Box::new(GpuEngine::for_purpose(model.clone(), gpu.clone(), dt, most_steps, drawn)?),
+        None => Box::new(CpuEngine::new(model.clone(), dt)),
+    })
 }
 
 impl Simulation {
@@ -186,6 +198,8 @@ impl Simulation {
         }
         self.stable_dt = change.stable_dt;
         self.model = change.model.clone();
+        self.judge.change(super::simulation::sizes(&self.model));
+        self.due_steps.clear();
         let end = match self.purpose.led {
             true => super::simulation::LONGEST_LED,
             false => self.model.duration(),

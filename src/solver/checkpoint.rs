@@ -1,13 +1,17 @@
 //! A simulation between two frames, exactly: a run that goes on from it gives the same numbers bit for bit on the same
 //! adapter.
 
+use std::collections::VecDeque;
+
 use serde::{Deserialize, Serialize};
 
+use super::clock::Clock;
 use super::engine::State;
-use super::guard::Guard;
+use super::stiffening::DueStep;
 use crate::error::Error;
 use crate::needle::flexible::NeedleImage;
 use crate::observables::Recorder;
+use crate::verdict::Judge;
 
 /// What an engine holds between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,13 +28,14 @@ pub struct Checkpoint {
     /// Frames that were collected, and steps before the next one.
     pub frames: u64,
     pub steps: u64,
-    /// Time step [s].
-    pub dt: f64,
+    /// Steps of the frames, and more of them that are due.
+    pub(super) clock: Clock,
+    pub(super) due_steps: VecDeque<DueStep>,
+    pub(super) stiffening_told: bool,
     pub engine: EngineImage,
     pub(super) recorder: Recorder,
     pub(super) needle: Option<NeedleImage>,
-    pub(super) guard: Guard,
-    pub(super) return_failures: u64,
+    pub(super) judge: Judge,
     pub(super) unbalanced_frames: u64,
     pub(super) buckling_told: bool,
 }

@@ -317,7 +317,7 @@ impl Elements {
 
     /// Bound of the stiffness that a cell adds to each of its corners [N/m], with the tangent bound t of the material:
     /// ```text
-    /// tetrahedron: V (kappa |cof B_i| sum|cof B_j| + t_straight |B_i| sum|B_j|)
+    /// tetrahedron: V ((kappa + t_turned) |cof B_i| sum|cof B_j| + t_straight |B_i| sum|B_j|)
     /// hexahedron:  8 V ((kappa + t_turned) max|cof B t|^2 + t_straight max|B t|^2) + hourglass
     /// ```
     /// The first is Gershgorin's, by the rows of the cell's own stiffness; it exceeds the assembled stiffness by up to 3.
@@ -340,7 +340,7 @@ impl Elements {
             let lengths = shape.gradients().iter().map(|b| ((cof * *b).length(), b.length()));
             let (sum_cof, sum) = lengths.clone().fold((0.0, 0.0), |s, l| (s.0 + l.0, s.1 + l.1));
             for (bound, l) in bound.iter_mut().zip(lengths) {
-                *bound = volume * (bulk * l.0 * sum_cof + tangent.straight * l.1 * sum);
+                *bound = volume * ((bulk + tangent.turned) * l.0 * sum_cof + tangent.straight * l.1 * sum);
             }
             return bound;
         };

@@ -16,6 +16,9 @@ use crate::needle::free_path::FreeTip;
 use crate::needle::{Kinematics, ToolPose};
 use crate::scene::Face;
 
+/// Ratio `k dt^2 / (4 m)` from which on an engine tells it: raised masses have 0.81.
+pub const WATCHED_STEP_RATIO: f64 = 0.85;
+
 /// What is given to one step from outside: the only place where user input enters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepInput {
@@ -112,6 +115,14 @@ pub struct FrameSums {
     pub contact_dissipation: f64,
     pub tip_dissipation: f64,
     pub softening_dissipation: f64,
+    /// Dissipated by the tip law beyond the threshold, where the cap on the advance held the force above it [J].
+    pub cap_dissipation: f64,
+    /// Taken by nodes whose mass was raised, and by the speed limit [J].
+    pub raised_mass_energy: f64,
+    pub speed_limit_energy: f64,
+    /// Largest `k dt^2 / (4 m)` of a node in a step, with the bound k of its stiffness and the mass m that it had; the step
+    /// is unstable beyond 1. Zero where none was near it, see [`WATCHED_STEP_RATIO`].
+    pub step_ratio: f64,
     /// Dissipated by tissue that slips on the tip [J].
     pub adhesion_dissipation: f64,
     /// Dissipated by plastic flow and by damage [J].
@@ -126,6 +137,8 @@ pub struct FrameSums {
     pub torn_area: f64,
     /// What each face exerts on the tissue at the last step [N]; zero without driven faces.
     pub reactions: [DVec3; 6],
+    /// Moment of the same about the axis along the normal of the face through the centre of the tissue at rest [N m].
+    pub face_moments: [f64; 6],
     /// Total: stored in contact, stick, tip and bond springs [J].
     pub contact_energy: f64,
     /// Total: material coordinate a of the tip [m].
@@ -212,6 +225,8 @@ pub struct ContactState {
     /// On a free path: distance r0 from the axis where the tip passed [m], and whether it has.
     pub rest_radius: f64,
     pub passed: bool,
+    /// Held by its springs at the last step [J].
+    pub stored: f64,
 }
 
 /// What an engine tells about itself.

@@ -77,6 +77,7 @@ impl Simulation {
         let mut sign = None;
         let mut frame = self.collected;
         'frames: while frame <= last {
+            self.take_due_steps()?;
             let plan = self.plan(frame);
             self.started = frame + 1;
             let mut loads = [DVec3::ZERO; crate::needle::centre_line::ENTRY_COUNT];

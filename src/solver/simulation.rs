@@ -1,18 +1,17 @@
 //! One run in memory: model, engine, time step and the order of frames. Commands and tests use it alike.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::str::FromStr;
 use std::sync::Arc;
 
 use super::checkpoint::{Checkpoint, foreign_image};
 use super::clock::Clock;
-use super::cpu::CpuEngine;
 use super::elements::{CellShape, CellStates, Elements};
 use super::engine::{Engine, FramePlan, FrameSums, State, StepInput};
-use super::guard::Guard;
 use super::stable_dt::{power_iteration, wave_speed_bound};
+use super::stiffening::DueStep;
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, GpuEngine};
+use crate::gpu::Gpu;
 use crate::material::{Verdict, von_mises};
 use crate::material_point::PointState;
 use crate::mesh::Mesh;
@@ -25,6 +24,7 @@ use crate::observables::{
 };
 use crate::scene::motion::HandPose;
 use crate::scene::{MOST_STEPS_PER_FRAME, Scene};
+use crate::verdict::{Judge, Sizes, Verdict as RunVerdict};
 
 /// Which engine the user wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,11 +61,7 @@ impl FromStr for EngineChoice {
 }
 
 /// Frames that may be under way before the oldest result is awaited.
-const AHEAD: u64 = 2;
-
-/// Part of all cell steps so far whose return mapping may fail before the run counts as broken: a few points that are
-/// turned inside out for a step are counted and reported, more make the stress and the dissipation meaningless.
-pub(super) const RETURN_FAILURE_PART: f64 = 1e-3;
+pub(super) const AHEAD: u64 = 2;
 
 /// Longest motion that a hand may lead [s].
 pub(super) const LONGEST_LED: f64 = 3600.0;
@@ -80,9 +76,10 @@ pub struct Purpose {
 }
 
 impl Purpose {
-    /// Steps per frame that are made room for where `steps` are planned: a hand that leads may change the scene too.
+    /// Steps per frame that are made room for where `steps` are planned: tissue that stiffens takes more, and a hand that leads may
+    /// change the scene too.
     pub fn most_steps(self, steps: u64) -> usize {
-        (if self.led || self.drawn { (4 * steps).min(MOST_STEPS_PER_FRAME) } else { steps }) as usize
+        (if self.led || self.drawn { 4 * steps } else { 2 * steps }).min(MOST_STEPS_PER_FRAME).max(steps) as usize
     }
 }
 
@@ -104,9 +101,12 @@ pub struct Simulation {
     led_frames: u64,
     pub(super) started: u64,
     pub(super) collected: u64,
-    guard: Guard,
-    /// Cell steps whose return mapping failed, since t = 0.
-    return_failures: u64,
+    /// Steps of [`Simulation::try_steps`].
+    tried_steps: u64,
+    pub(super) judge: Judge,
+    /// More steps that the stiffness of the tissue asks for.
+    pub(super) due_steps: VecDeque<DueStep>,
+    pub(super) stiffening_told: bool,
     /// Frames after which the state is read, so that no later frame may have been started.
     stops: BTreeSet<u64>,
     pub(super) watch_stretch: bool,
@@ -256,16 +256,8 @@ impl Simulation {
                  solver.mass_scaling (\"auto\" keeps it below 0.03)"
             ));
         }
-        let engine: Box<dyn Engine> = match &device {
-            Some(gpu) => Box::new(GpuEngine::for_purpose(
-                model.clone(),
-                gpu.clone(),
-                dt,
-                purpose.most_steps(steps_per_frame),
-                purpose.drawn,
-            )?),
-            None => Box::new(CpuEngine::new(model.clone(), dt)),
-        };
+        let most = purpose.most_steps(steps_per_frame);
+        let engine = super::change::engine(&model, device.as_ref(), dt, most, purpose.drawn)?;
         let kinematics = match purpose.led {
             true => model.kinematics.is_some().then(|| Kinematics::led(&model.scene.motion)),
             false => model.kinematics.clone(),
@@ -286,13 +278,10 @@ impl Simulation {
             frames,
             started: 0,
             collected: 0,
-            guard: Guard::new(
-                model.mesh.node_count(),
-                model.mesh.cell_count(),
-                model.scene.material.law.shear_modulus(),
-                (0..model.mesh.cell_count()).map(|cell| model.mesh.cell_volume(cell)).sum(),
-            ),
-            return_failures: 0,
+            tried_steps: 0,
+            judge: Judge::new(sizes(&model)),
+            due_steps: VecDeque::new(),
+            stiffening_told: false,
             stops: BTreeSet::new(),
             watch_stretch,
             // The first frame is a single step.
@@ -304,6 +293,11 @@ impl Simulation {
             notices,
             model,
         })
+    }
+
+    /// The verdict on the run so far.
+    pub fn verdict(&self) -> &RunVerdict {
+        self.judge.verdict()
     }
 
     pub fn engine(&mut self) -> &mut dyn Engine {
@@ -363,12 +357,13 @@ impl Simulation {
         Ok(Checkpoint {
             frames: self.collected,
             steps: self.clock.first_step(self.collected),
-            dt: self.clock.dt,
+            clock: self.clock,
+            due_steps: self.due_steps.clone(),
+            stiffening_told: self.stiffening_told,
             engine: self.engine.save()?,
             recorder: self.recorder.clone(),
             needle: self.needle.as_ref().map(|needle| needle.save()),
-            guard: self.guard.clone(),
-            return_failures: self.return_failures,
+            judge: self.judge.clone(),
             unbalanced_frames: self.unbalanced_frames,
             buckling_told: self.buckling_told,
         })
@@ -380,24 +375,30 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::resume`] and [`Simulation::new`].
     pub fn halved(&mut self, checkpoint: &Checkpoint) -> Result<Simulation> {
+        let mut scene = self.model.scene.clone();
+        scene.solver.time_step = Some(0.5 * checkpoint.clock.dt);
+        self.forked(checkpoint, scene, checkpoint.clock.halved())
+    }
+
+    /// A simulation of `scene`, which has the mesh, the effects and the motion of this one, from `checkpoint` on with the steps of
+    /// `clock`.
+    pub(super) fn forked(&mut self, checkpoint: &Checkpoint, scene: Scene, clock: Clock) -> Result<Simulation> {
         self.resume(checkpoint)?;
         let state = self.engine.read_state()?;
-        let mut scene = self.model.scene.clone();
-        scene.solver.time_step = Some(0.5 * self.clock.dt);
-        let (mesh, most_steps) = (self.model.mesh.clone(), 2 * self.clock.steps_per_frame);
+        let (mesh, most_steps) = (self.model.mesh.clone(), clock.steps_per_frame);
         let mut next =
             Simulation::prepare(scene, mesh, self.device.clone(), Vec::new(), most_steps, Purpose::default())?;
+        next.take_clock(clock)?;
         next.engine.write_state(&state)?;
         if let (Some(needle), Some(image)) = (&mut next.needle, &checkpoint.needle) {
             needle.restore(image);
         }
-        next.clock = self.clock.halved();
         next.frames = self.frames;
         (next.started, next.collected) = (checkpoint.frames, checkpoint.frames);
         next.recorder = checkpoint.recorder.clone();
-        next.guard = checkpoint.guard.clone();
-        next.return_failures = checkpoint.return_failures;
+        next.judge = checkpoint.judge.clone();
         next.buckling_told = checkpoint.buckling_told;
+        next.unbalanced_frames = checkpoint.unbalanced_frames;
         // What was told of the scene was told.
         next.notices.clear();
         Ok(next)
@@ -408,12 +409,16 @@ impl Simulation {
     /// # Errors
     /// `Error::Input` where it belongs to another engine, scene or time step.
     pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<()> {
-        let same = checkpoint.dt == self.clock.dt
+        let frame = |clock: &Clock| clock.dt * clock.steps_per_frame as f64;
+        let same = (frame(&checkpoint.clock) / frame(&self.clock) - 1.0).abs() < 1e-9
             && checkpoint.frames <= self.frames
-            && checkpoint.steps == self.clock.first_step(checkpoint.frames)
+            && checkpoint.steps == checkpoint.clock.first_step(checkpoint.frames)
             && checkpoint.needle.is_some() == self.needle.is_some();
         if checkpoint.engine.engine() == self.engine.info().engine && !same {
             return Err(foreign_image(checkpoint.engine.engine(), &checkpoint.engine));
+        }
+        if same {
+            self.take_clock(checkpoint.clock)?;
         }
         self.engine.restore(&checkpoint.engine)?;
         if let (Some(needle), Some(image)) = (&mut self.needle, &checkpoint.needle) {
@@ -421,8 +426,9 @@ impl Simulation {
         }
         (self.started, self.collected) = (checkpoint.frames, checkpoint.frames);
         self.recorder = checkpoint.recorder.clone();
-        self.guard = checkpoint.guard.clone();
-        self.return_failures = checkpoint.return_failures;
+        self.judge = checkpoint.judge.clone();
+        self.due_steps = checkpoint.due_steps.clone();
+        self.stiffening_told = checkpoint.stiffening_told;
         self.unbalanced_frames = checkpoint.unbalanced_frames;
         self.buckling_told = checkpoint.buckling_told;
         Ok(())
@@ -447,12 +453,39 @@ impl Simulation {
         plan
     }
 
+    /// Computes the next `count` steps for the sake of the time that they take, in frames of their own that leave no record; false
+    /// where the run has no more of them. No frame can follow.
+    pub fn try_steps(&mut self, count: u64) -> Result<bool> {
+        let most = self.clock.steps_per_frame;
+        let (first, end) = (self.tried_steps, self.tried_steps + count);
+        if end > self.total_steps {
+            return Ok(false);
+        }
+        let (dt, tool) = (self.clock.dt, self.kinematics.as_ref());
+        for begin in (first..end).step_by(most as usize) {
+            let steps = begin..(begin + most).min(end);
+            let inputs = steps.clone().map(|step| {
+                let input = StepInput::with(&self.model, tool, self.clock.time_of(step), dt);
+                StepInput { step, ..input }
+            });
+            let mut plan = FramePlan { frame: begin, first_step: begin, steps: inputs.collect(), centre_line: None };
+            if let Some(needle) = &self.needle {
+                needle.bend(&mut plan, dt);
+            }
+            self.engine.start_frame(&plan)?;
+        }
+        while self.engine.collect(true)?.is_some() {}
+        self.tried_steps = end;
+        Ok(true)
+    }
+
     fn may_start(&self, frame: u64) -> bool {
         // A window wants each frame as soon as it can be had, not several at once.
         let waits = self.purpose.drawn
             || self.watch_stretch
             || self.needle.is_some()
             || self.model.has_bore()
+            || self.changes_step_at(frame)
             || self.stops.range(self.collected..frame).next().is_some();
         // The beam of a needle that bends looks one frame ahead.
         let led = !self.kinematics.as_ref().is_some_and(|k| k.is_led())
@@ -463,6 +496,7 @@ impl Simulation {
     /// Gives the engine the frames that may be started; [`Simulation::next_frame`] does so by itself.
     pub fn start_frames(&mut self) -> Result<()> {
         while self.may_start(self.started) {
+            self.take_due_steps()?;
             self.engine.start_frame(&self.plan(self.started))?;
             self.started += 1;
         }
@@ -488,15 +522,16 @@ impl Simulation {
         record.needle = bent;
         record.targets = TargetRecord::of(&self.model, self.kinematics.as_ref(), &record, &sums.targets);
         self.tell_of_the_needle(&record);
-        if let Some(trouble) = self.guard.check(&record, sums.steps) {
+        let known = self.judge.verdict().doubts.len();
+        if let Some(trouble) = self.judge.check(&record, sums.steps) {
             return Err(self.stopped(&record, trouble));
         }
-        self.return_failures += u64::from(record.health.return_failures);
-        // Against a whole frame at least: the first one is a single step.
-        let cell_steps = record.step.max(self.clock.steps_per_frame) as f64 * self.model.mesh.cell_count() as f64;
-        if too_many_return_failures(self.return_failures, cell_steps) {
-            return Err(self.flow_lost(&record, self.return_failures as f64 / cell_steps));
+        if self.judge.verdict().doubts.len() > known {
+            let place = self.place_of_doubt(&record);
+            self.judge.place(record.frame, &place);
         }
+        record.verdict = self.judge.verdict().clone();
+        self.watch_step(&record, sums.step_ratio);
         if self.model.has_bore() {
             let state = self.engine.read_state()?;
             let pose = self.kinematics.as_ref().map(|k| k.pose(record.time));
@@ -606,8 +641,16 @@ pub(super) fn too_many_steps(scene: &Scene, stable_dt: f64, steps: u64) -> Error
     )
 }
 
-fn too_many_return_failures(failures: u64, cell_steps: f64) -> bool {
-    failures as f64 > RETURN_FAILURE_PART * cell_steps
+/// What the verdict on a run of this model is measured against.
+pub(super) fn sizes(model: &Model) -> Sizes {
+    let volume: f64 = (0..model.mesh.cell_count()).map(|cell| model.mesh.cell_volume(cell)).sum();
+    let strain = crate::verdict::FLOOR_STRAIN;
+    Sizes {
+        nodes: model.mesh.node_count(),
+        cells: model.mesh.cell_count(),
+        floor: model.scene.material.law.shear_modulus().abs() * volume * strain * strain,
+        mass_scaling: model.mass_scaling(),
+    }
 }
 
 /// H = F - I at the centre of every cell.
@@ -697,16 +740,4 @@ pub fn snapshot(
     fields.displacement = state.displacement;
     fields.stiffness = state.stiffness;
     fields
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_thousandth_of_the_return_mappings_may_fail() {
-        assert!(!too_many_return_failures(0, 0.0));
-        assert!(!too_many_return_failures(100, 1e5));
-        assert!(too_many_return_failures(101, 1e5));
-    }
 }

@@ -5,14 +5,19 @@ use rayon::prelude::*;
 
 use super::elements::{CellStates, Elements};
 use crate::mesh::Mesh;
-use crate::model::Model;
+use crate::model::{ContactSurface, Model};
+
+/// Most by which mass scaling may raise the mass of a node that contact makes stiff. In tissue that is soft beside its tip springs
+/// masses raised tenfold took half of the first work.
+const RAISED_AT_REST: f64 = 4.0;
 
 /// Wave-speed bound of the undamped central difference at rest [s]: the shortest `2 sqrt(m / k)` of all nodes with the
 /// bound `k` of their stiffness ([`Elements::stiffness_bound`]): for cells of one size the edge over the speed of
 /// pressure waves.
 ///
-/// A run takes this one times the safety factor. Squeezed cells and contact are stiffer than at rest: with mass scaling
-/// the mass of their nodes is raised for as long as they are; without, the bound is up to 1.73 times shorter.
+/// A run takes this one times the safety factor. With mass scaling the mass of nodes in contact and around squeezed cells
+/// is raised for as long as they are stiffer, by contact alone at most four times; without, contact counts here in full, and
+/// the step follows the cells ([`super::stiffening`]).
 pub fn wave_speed_bound(model: &Model) -> f64 {
     let rest = vec![DVec3::ZERO; model.mesh.node_count()];
     let mut bound = stiffness_bounds(model, &rest);
@@ -30,8 +35,39 @@ pub fn wave_speed_bound(model: &Model) -> f64 {
             }
         }
     }
+    // Contact and tip springs: with mass scaling the mass follows them, but may not be raised by much before anything is
+    // squeezed; without, the step has room for all of them from the start.
+    let raised = if model.effects.mass_scaling.is_some() { RAISED_AT_REST } else { 1.0 };
+    bound.iter_mut().zip(contact_bounds(model)).for_each(|(k, contact)| *k = k.max((*k + contact) / raised));
     let steps = bound.iter().zip(&mass).map(|(k, m)| 2.0 * (m / k).sqrt());
     steps.fold(f64::INFINITY, f64::min)
+}
+
+/// Bound of the stiffness that tool and tip springs can add at every node while the tissue is at rest [N/m], damping of contact
+/// included.
+pub fn contact_bounds(model: &Model) -> Vec<f64> {
+    let mut bound = vec![0.0; model.mesh.node_count()];
+    if let Some(plan) = &model.indentation {
+        for contact in &model.contact_nodes {
+            bound[contact.node as usize] += plan.stiffness_bound(contact.share);
+        }
+    }
+    let Some(plan) = &model.puncture else { return bound };
+    let springs = model.largest_spring_share();
+    // The wall of a cone is steeper than that of the shaft.
+    let steep = 1.0 + (plan.needle.radius / plan.profile.tip_length).powi(2);
+    for contact in &model.contact_nodes {
+        let k = match contact.surface {
+            _ if !contact.pushed => 0.0,
+            ContactSurface::OpenedPath if plan.free.is_some() => plan.ring_stiffness(contact, 1.0),
+            ContactSurface::OpenedPath => plan.ring_stiffness(contact, plan.params.ring_weight(contact.rest_radius)),
+            ContactSurface::Slit { .. } => plan.face_stiffness() * contact.share,
+            ContactSurface::OuterWall | ContactSurface::Bore => plan.contact_stiffness,
+        };
+        let node = contact.node as usize;
+        bound[node] = bound[node].max(2.0 * k * steep + plan.params.tip_stiffness * springs);
+    }
+    bound
 }
 
 /// Bound of the stiffness that the cells add at every node where the displacement is `u` [N/m]; no history, intact cells.
@@ -53,11 +89,24 @@ pub fn power_iteration(model: &Model) -> f64 {
     2.0 / largest_frequency(model, &vec![DVec3::ZERO; model.mesh.node_count()], &model.node_mass)
 }
 
-/// Largest frequency [rad/s] of small motions about the displacement `base`, with these nodal masses [kg]: power iteration on
-/// M^-1 K. Converges from below.
+/// Largest frequency [rad/s] of small motions about the displacement `base`, with these nodal masses [kg], of the cells alone, without
+/// history: power iteration on M^-1 K. Converges from below.
 pub fn largest_frequency(model: &Model, base: &[DVec3], mass: &[f64]) -> f64 {
     let elements = Elements::new(model);
-    let at_base = elements.internal_forces(model, base, CellStates::default());
+    largest_frequency_of(model, base, mass, &mut |u| {
+        elements.internal_forces(model, u, CellStates::default()).into_iter().map(|f| -f).collect()
+    })
+}
+
+/// The same of any forces on the nodes [N] as a function of their displacement [m]. Copies that are tied move as one where
+/// forces and masses are those of all of them.
+pub fn largest_frequency_of(
+    model: &Model,
+    base: &[DVec3],
+    mass: &[f64],
+    forces: &mut dyn FnMut(&[DVec3]) -> Vec<DVec3>,
+) -> f64 {
+    let at_base = forces(base);
     const ITERATIONS: usize = 60;
     let count = model.mesh.node_count();
     let smallest = model.mesh.smallest_edge();
@@ -73,6 +122,9 @@ pub fn largest_frequency(model: &Model, base: &[DVec3], mass: &[f64]) -> f64 {
             DVec3::new(sign, sign * (0.5 + 0.3 * ripple), 0.7 * sign - 0.2 * ripple)
         })
         .collect();
+    for tie in &model.separation.ties {
+        tie.iter().for_each(|n| mode[*n as usize] = mode[tie[0] as usize]);
+    }
     let mut omega_squared = 0.0;
     for _ in 0..ITERATIONS {
         for (node, value) in mode.iter_mut().enumerate() {
@@ -89,9 +141,9 @@ pub fn largest_frequency(model: &Model, base: &[DVec3], mass: &[f64]) -> f64 {
         }
         let scale = 1e-5 * smallest / largest;
         let u: Vec<DVec3> = base.iter().zip(&mode).map(|(u, v)| *u + *v * scale).collect();
-        let force = elements.internal_forces(model, &u, CellStates::default());
-        let rise = force.par_iter().zip(&at_base).map(|(f, f0)| *f - *f0);
-        let next: Vec<DVec3> = rise.zip(mass).map(|(f, m)| f / (*m * scale)).collect();
+        let force = forces(&u);
+        let fall = force.par_iter().zip(&at_base).map(|(f, f0)| *f0 - *f);
+        let next: Vec<DVec3> = fall.zip(mass).map(|(f, m)| f / (*m * scale)).collect();
         // Rayleigh quotient with the mass matrix.
         let (mut top, mut bottom) = (0.0, 0.0);
         for ((v, a), m) in mode.iter().zip(&next).zip(mass) {
@@ -102,5 +154,5 @@ pub fn largest_frequency(model: &Model, base: &[DVec3], mass: &[f64]) -> f64 {
         let largest = next.iter().map(|v| v.length()).fold(0.0, f64::max);
         mode = next.into_iter().map(|v| v / largest).collect();
     }
-    omega_squared.sqrt()
+    omega_squared.max(0.0).sqrt()
 }

@@ -2,45 +2,71 @@
 
 use glam::DVec3;
 
-use super::guard::{CREATED_PART, INVERTED_PART, LONG_PATIENCE, PATIENCE, Trouble};
-use super::simulation::{RETURN_FAILURE_PART, Simulation};
+use super::simulation::Simulation;
 use crate::error::Error;
 use crate::observables::FrameRecord;
+use crate::verdict::{Quantity, Trouble};
 
 impl Simulation {
-    /// The error of a run that the guard has stopped after the frame of `record`.
+    /// The error of a run that is stopped after the frame of `record`. It names no cure: nobody has tried one yet.
     pub(super) fn stopped(&mut self, record: &FrameRecord, trouble: Trouble) -> Error {
-        match trouble {
-            Trouble::NotFinite => self.broken(record),
-            Trouble::Speed(part) => self.runaway(record, part),
-            Trouble::Energy { created, put_in } => {
-                let (place, way_out) = (self.fastest(), self.smaller_step());
-                self.error(record, format!(
-                    "{:.3e} J of energy were created since t = 0, {:.0} % of the {put_in:.3e} J that were put in (at most {:.0} % in \
-                     {PATIENCE} frames on end); {}\n  way out: {}",
-                    created,
-                    100.0 * created / put_in,
-                    100.0 * CREATED_PART,
-                    place,
-                    way_out
-                ))
-            }
-            Trouble::Inversion(cells) => {
-                let place = record.health.inverted_cell.map_or(String::new(), |cell| {
-                    let x = self.model.mesh.cell_centre(cell as usize) * 1e3;
-                    format!("; one is cell {cell} at ({:.2}, {:.2}, {:.2}) mm", x.x, x.y, x.z)
-                });
+        match (trouble.quantity, trouble.energy) {
+            (Quantity::NotFinite, _) => self.broken(record),
+            (Quantity::ClampedShare, _) => self.runaway(record, trouble.value),
+            (Quantity::ClippedReturns, _) => self.flow_lost(record, &trouble),
+            (Quantity::EnergyImbalance, Some((missing, scale))) => {
+                let (place, step) = (self.fastest(), self.step_above_the_stable_one());
+                let word = if missing < 0.0 { "created" } else { "lost" };
                 self.error(
                     record,
                     format!(
-                        "{cells} cells are inside out and do not get fewer in {LONG_PATIENCE} frames (at most {:.0} % of all \
-                         may){place}\n  way out: load the tissue less or more slowly, refine the cells, or raise \
-                         solver.hourglass_stiffness",
-                        100.0 * INVERTED_PART
+                        "{:.3e} J of energy were {word} since t = 0, {:.0} % of the {scale:.3e} J that were put in (at most {:.0} % in \
+                         {} frames on end); {place}{step}",
+                        missing.abs(),
+                        100.0 * missing.abs() / scale,
+                        100.0 * trouble.bound,
+                        trouble.frames
+                    ),
+                )
+            }
+            (Quantity::InvertedCells, _) => {
+                let cells = record.health.inverted_cells;
+                let place = self.inverted_place(record).map_or(String::new(), |place| format!("; {place}"));
+                self.error(
+                    record,
+                    format!(
+                        "{cells} cells are inside out and do not get fewer in {} frames (at most {:.0} % of all may){place}",
+                        trouble.frames,
+                        100.0 * trouble.bound
+                    ),
+                )
+            }
+            _ => {
+                let row = trouble.quantity.bound();
+                let place = self.fastest();
+                self.error(
+                    record,
+                    format!(
+                        "{}: {} (at most {} in {} frames on end); {place}",
+                        row.text,
+                        row.show(trouble.value),
+                        row.show(trouble.bound),
+                        trouble.frames
                     ),
                 )
             }
         }
+    }
+
+    /// Where a doubt is that began with this frame: the inverted cell, else the fastest node.
+    pub(super) fn place_of_doubt(&mut self, record: &FrameRecord) -> String {
+        self.inverted_place(record).unwrap_or_else(|| self.fastest())
+    }
+
+    fn inverted_place(&self, record: &FrameRecord) -> Option<String> {
+        let cell = record.health.inverted_cell?;
+        let x = self.model.mesh.cell_centre(cell as usize) * 1e3;
+        Some(format!("one is cell {cell} at ({:.2}, {:.2}, {:.2}) mm", x.x, x.y, x.z))
     }
 
     fn error(&self, record: &FrameRecord, message: String) -> Error {
@@ -63,15 +89,12 @@ impl Simulation {
         }
     }
 
-    fn smaller_step(&self) -> String {
-        if self.clock.dt > self.stable_dt {
-            return format!(
-                "the time step {:.3} us is above the stable step {:.3} us: drop time_step_us",
-                self.clock.dt * 1e6,
-                self.stable_dt * 1e6
-            );
+    /// A fact that explains much, where it is one.
+    fn step_above_the_stable_one(&self) -> String {
+        if self.clock.dt <= self.stable_dt {
+            return String::new();
         }
-        "lower solver.safety or the speed of the tool, or write solver.on_trouble = \"halve_step\"".into()
+        format!("; the time step {:.3} us is above the stable step {:.3} us", self.clock.dt * 1e6, self.stable_dt * 1e6)
     }
 
     /// Where and how the state broke.
@@ -102,21 +125,21 @@ impl Simulation {
     /// Where the tissue moves fastest in a run whose speeds are clamped all over.
     fn runaway(&mut self, record: &FrameRecord, part: f64) -> Error {
         let limit = self.model.speed_limit(self.clock.dt);
-        let (place, way_out) = (self.fastest(), self.smaller_step());
+        let (place, step) = (self.fastest(), self.step_above_the_stable_one());
         Error::Diverged {
             frame: record.frame,
             step: record.step,
             time_s: record.time,
             message: format!(
                 "stage integrate_nodes: {:.0} % of the nodes would move faster than the limit of {limit:.4} m/s (a \
-                 tenth of a cell edge per step); {place}\n  way out: {way_out}",
+                 tenth of a cell edge per step); {place}{step}",
                 100.0 * part
             ),
         }
     }
 
     /// Where the plastic flow is largest in a run whose return mapping fails.
-    pub(super) fn flow_lost(&mut self, record: &FrameRecord, part: f64) -> Error {
+    fn flow_lost(&mut self, record: &FrameRecord, trouble: &Trouble) -> Error {
         let place = match self.engine.read_state() {
             Ok(state) => {
                 let strains = state.points.iter().map(|p| p.plastic.alpha).enumerate();
@@ -135,10 +158,9 @@ impl Simulation {
             time_s: record.time,
             message: format!(
                 "stage element_forces: the return mapping of the effect plasticity missed the yield condition in {:.2} % of \
-                 all cell steps (at most {:.1} %); {place}\n  way out: lower solver.safety or the speed of what moves, raise \
-                 yield_stress_kpa or hardening_kpa, or raise solver.hourglass_stiffness where cells fold",
-                100.0 * part,
-                100.0 * RETURN_FAILURE_PART
+                 all cell steps (at most {:.1} %); {place}",
+                100.0 * trouble.value,
+                100.0 * trouble.bound
             ),
         }
     }

@@ -9,6 +9,7 @@
 mod cases;
 mod measure;
 mod prepare;
+pub mod random;
 mod report;
 mod run;
 
@@ -180,10 +181,10 @@ pub fn run(
     let cases = chosen(options)?;
     for case in &cases {
         let path = folder.join(case.scene);
-        if !path.is_file() {
+        if !path.is_file() && !crate::reading::is_built_in(&path) {
             return Err(Error::input(
                 format!("there is no scene {}", path.display()),
-                "call the program in the folder of the repository, or name the folder of the scenes with --scenes",
+                "name the folder of the scenes with --scenes; without it the built-in ones are taken",
             ));
         }
     }

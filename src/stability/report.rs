@@ -8,6 +8,7 @@ use super::run::{End, Trace};
 use super::{Balance, CASES, Case, Cure, Expected, Options, Part};
 use crate::solver::engine::EngineInfo;
 use crate::solver::simulation::EngineChoice;
+use crate::verdict::Quantity;
 
 /// Columns of a terminal.
 const WIDTH: usize = 80;
@@ -60,6 +61,8 @@ pub struct RunReport {
     pub clamped_nodes: u64,
     /// In the last frame.
     pub inverted_cells_at_end: u64,
+    /// What cures took beyond the bound of [`crate::verdict`]: energy that is booked is in balance, and gone all the same.
+    pub doubt: Option<String>,
     /// The number that this run must give, and what it is.
     pub answer: Option<f64>,
     pub answer_is: Option<&'static str>,
@@ -86,6 +89,7 @@ impl RunReport {
             speed_over_wave_speed: None,
             clamped_nodes: 0,
             inverted_cells_at_end: 0,
+            doubt: None,
             answer: None,
             answer_is: part.answer.map(|a| a.what),
             wall_s: 0.0,
@@ -108,6 +112,8 @@ impl RunReport {
         self.speed_over_wave_speed = Some(speed / wave);
         self.clamped_nodes = trace.records.iter().map(|r| u64::from(r.health.clamped_nodes)).sum();
         self.inverted_cells_at_end = last.health.inverted_cells.into();
+        let cured = last.verdict.doubts.iter().find(|d| d.quantity == Quantity::CuredEnergy);
+        self.doubt = cured.map(|d| d.sentence());
         self.counts = true;
     }
 
@@ -149,6 +155,9 @@ impl RunReport {
         }
         if self.inverted_cells_at_end > 0 {
             problems.push(format!("{} cells inverted at the end", self.inverted_cells_at_end));
+        }
+        if let Some(doubt) = &self.doubt {
+            problems.push(format!("doubtful: {doubt}"));
         }
         if let (Some(wanted), Some(value)) = (part.answer, self.answer)
             && !(wanted.at_least..=wanted.at_most).contains(&value)

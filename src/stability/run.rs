@@ -127,6 +127,7 @@ fn part(
         match simulation.next_frame() {
             Ok(Some(record)) => trace.records.push(record),
             Ok(None) => break End::Survived,
+            Err(Error::Ended(_)) => return Ok(None),
             Err(error) => {
                 let Error::Diverged { step, .. } = error else { return Err(error) };
                 stopped_at = Some(step);

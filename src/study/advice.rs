@@ -17,72 +17,94 @@ pub struct Candidate {
     pub same_mesh: bool,
 }
 
-/// The most accurate candidate that keeps real time.
+/// Candidates whose error is known. On the mesh of the reference only the part of mass scaling and step is: what that mesh itself is
+/// wrong by would take a finer one to tell.
+fn known(candidates: &[Candidate]) -> impl Iterator<Item = &Candidate> {
+    candidates.iter().filter(|c| c.error.is_finite() && !c.same_mesh)
+}
+
+/// The fastest of some candidates.
+fn fastest<'a>(candidates: impl Iterator<Item = &'a Candidate>) -> Option<&'a Candidate> {
+    candidates.max_by(|a, b| a.real_time_factor.total_cmp(&b.real_time_factor))
+}
+
+/// The most accurate candidate that keeps real time, of those whose error is known.
 pub fn best_in_real_time(candidates: &[Candidate]) -> Option<&Candidate> {
-    let fast = candidates.iter().filter(|c| c.real_time_factor >= 1.0 && c.error.is_finite());
-    fast.min_by(|a, b| a.error.total_cmp(&b.error))
+    known(candidates).filter(|c| c.real_time_factor >= 1.0).min_by(|a, b| a.error.total_cmp(&b.error))
 }
 
-/// The fastest candidate that is as accurate as `error`.
+/// The fastest candidate that is as accurate as `error`, of those whose error is known.
 pub fn fastest_within(candidates: &[Candidate], error: f64) -> Option<&Candidate> {
-    let good = candidates.iter().filter(|c| c.error <= error);
-    good.max_by(|a, b| a.real_time_factor.total_cmp(&b.real_time_factor))
+    fastest(known(candidates).filter(|c| c.error <= error))
 }
 
-/// What to choose on an adapter, for real time and for 1 % error.
+/// What to choose on an adapter, for real time and for 1 % error. No mesh is recommended for an accuracy that it was measured
+/// against itself.
 pub fn sentences(adapter: &str, candidates: &[Candidate]) -> Vec<String> {
     let percent = |error: f64| format!("{} %", digits(100.0 * error));
     let accuracy = format!("{} %", trimmed(100.0 * ACCURATE));
-    let usable: Vec<Candidate> = candidates.iter().filter(|c| c.error.is_finite()).cloned().collect();
-    if usable.is_empty() {
+    let finished: Vec<Candidate> = candidates.iter().filter(|c| c.error.is_finite()).cloned().collect();
+    if finished.is_empty() {
         return vec![format!("No finished run of this study on {adapter} can be compared with the reference.")];
     }
-    let fastest = usable.iter().max_by(|a, b| a.real_time_factor.total_cmp(&b.real_time_factor));
-    let best = usable.iter().min_by(|a, b| a.error.total_cmp(&b.error));
     let mut sentences = Vec::new();
-    match (best_in_real_time(&usable), fastest) {
+    match (best_in_real_time(&finished), fastest(finished.iter())) {
         (Some(choice), _) => sentences.push(format!(
-            "For real time on {adapter} choose {}: error of the force curve {}, {} times real time{}.",
+            "For real time on {adapter} choose {}: error of the force curve {}, {} times real time.",
             choice.settings.describe(),
             percent(choice.error),
             digits(choice.real_time_factor),
-            remark(choice)
+        )),
+        // Fast enough is only the mesh that has nothing to be compared with.
+        (None, Some(fastest)) if fastest.real_time_factor >= 1.0 => sentences.push(format!(
+            "Real time on {adapter}: {}, {} times real time. It is the mesh of the reference, so the error of the mesh is not known; \
+             mass scaling and step alone change the force curve by {}.",
+            fastest.settings.describe(),
+            digits(fastest.real_time_factor),
+            percent(fastest.error)
         )),
         (None, Some(fastest)) => sentences.push(format!(
-            "No setting of this study is real time on {adapter}; the fastest, {}, is {} times slower than real time, with an \
-             error of the force curve of {}.",
+            "No setting of this study is real time on {adapter}; the fastest, {}, is {}{}.",
             fastest.settings.describe(),
-            digits(1.0 / fastest.real_time_factor),
-            percent(fastest.error)
+            speed(fastest.real_time_factor),
+            if fastest.same_mesh {
+                String::new()
+            } else {
+                format!(", with an error of the force curve of {}", percent(fastest.error))
+            }
         )),
         (None, None) => {}
     }
-    match (fastest_within(&usable, ACCURATE), best) {
-        (Some(choice), _) => sentences.push(format!(
-            "For {accuracy} error choose {}: error {}, {}{}.",
+    if let Some(choice) = fastest_within(&finished, ACCURATE) {
+        sentences.push(format!(
+            "For {accuracy} error choose {}: error {}, {}.",
             choice.settings.describe(),
             percent(choice.error),
             speed(choice.real_time_factor),
-            remark(choice)
-        )),
-        (None, Some(best)) => sentences.push(format!(
-            "No setting of this study comes within {accuracy} of the reference; the closest, {}, has an error of {} and is {}{}.",
+        ));
+        return sentences;
+    }
+    sentences.push(match known(&finished).min_by(|a, b| a.error.total_cmp(&b.error)) {
+        Some(best) => format!(
+            "No setting of this study on a mesh coarser than that of the reference comes within {accuracy} of it; the closest, {}, has an \
+             error of {} and is {}.",
             best.settings.describe(),
             percent(best.error),
             speed(best.real_time_factor),
-            remark(best)
-        )),
-        (None, None) => {}
+        ),
+        None => format!("No run of this study on {adapter} has another mesh than the reference, so no error of a mesh is known."),
+    });
+    // What is known of the reference's mesh is said, but it is no recommendation.
+    if let Some(own) = fastest(finished.iter().filter(|c| c.same_mesh && c.error <= ACCURATE)) {
+        sentences.push(format!(
+            "On the mesh of the reference itself {} changes the force curve by {} and is {}; how far that mesh is from a finer one \
+             this study cannot say. For a mesh that is known to be within {accuracy} give it a larger --budget.",
+            own.settings.describe(),
+            percent(own.error),
+            speed(own.real_time_factor)
+        ));
     }
     sentences
-}
-
-/// What the error of a candidate does not hold.
-fn remark(candidate: &Candidate) -> &'static str {
-    match candidate.same_mesh {
-        true => " (on the mesh of the reference, so without the error of that mesh itself)",
-        false => "",
-    }
 }
 
 /// A real-time factor in words.

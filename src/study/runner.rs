@@ -120,6 +120,7 @@ pub fn run(
                 run.failure = Some(error.to_string());
                 break;
             }
+            Err(Error::Ended(_)) => return Ok(None),
             Err(error) => return Err(error),
         };
         told(record.time / simulation.duration());
@@ -162,6 +163,7 @@ impl RunRecord {
         summary.take_frames(records);
         let finite = |value: f64| Some(value).filter(|v| v.is_finite());
         self.energy_imbalance = finite(summary.energy_imbalance);
+        self.doubt = records.last().and_then(|r| r.verdict.sentence());
         self.kinetic_to_internal = finite(summary.kinetic_to_internal);
         self.hourglass_to_internal = finite(summary.hourglass_to_internal);
         self.clamped_nodes = summary.clamped_nodes;

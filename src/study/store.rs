@@ -9,6 +9,7 @@ use super::Settings;
 use super::plan::Plan;
 use crate::error::{Error, Result};
 use crate::output::whole_file;
+use crate::reading;
 
 pub const PLAN: &str = "plan.json";
 /// Folder of the finished runs.
@@ -16,9 +17,6 @@ pub const RUNS: &str = "runs";
 pub const PAGE: &str = "study.html";
 pub const TABLE: &str = "study.csv";
 pub const FIGURES: &str = "study.json";
-
-/// Energy imbalance of a run that can be trusted.
-const LARGEST_IMBALANCE: f64 = 0.02;
 
 /// One finished run. `None` stands for "the run does not hold this number".
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -40,6 +38,9 @@ pub struct RunRecord {
     pub finished: u64,
     /// Why the run ended early.
     pub failure: Option<String>,
+    /// Why its numbers are to be doubted, see [`crate::verdict`].
+    #[serde(default)]
+    pub doubt: Option<String>,
 
     pub cells: u64,
     pub nodes: u64,
@@ -76,18 +77,12 @@ impl RunRecord {
         self.depth_m.iter().copied().zip(self.force_n.iter().copied()).collect()
     }
 
-    /// Why its numbers mean nothing, where they do not: it ended early or did not keep its energy.
+    /// Why its numbers mean nothing, where they do not: it ended early or is doubtful.
     pub fn unfit(&self) -> Option<String> {
         if let Some(why) = &self.failure {
             return Some(super::subject::first_line(why));
         }
-        let imbalance = self.energy_imbalance.filter(|i| *i > LARGEST_IMBALANCE)?;
-        Some(format!(
-            "energy imbalance {} % of the work (at most {} %), {} clamped node steps",
-            super::digits(100.0 * imbalance),
-            super::trimmed(100.0 * LARGEST_IMBALANCE),
-            self.clamped_nodes
-        ))
+        self.doubt.as_ref().map(|why| format!("doubtful: {why}"))
     }
 
     /// Simulated time over wall time.
@@ -179,10 +174,10 @@ impl Store {
     /// `Error::Input` where the file is no plan of this version.
     pub fn plan(&self) -> Result<Option<Plan>> {
         let path = self.file(PLAN);
-        match fs::read_to_string(&path) {
+        match reading::text(&path, reading::most::OWN) {
             Ok(text) => parse_plan(&path, &text).map(Some),
-            Err(reason) if reason.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(reason) => Err(Error::file(path, reason)),
+            Err(unread) if unread.is_missing() => Ok(None),
+            Err(unread) => Err(unread.of(&path, "name the folder of a study, which you may read")),
         }
     }
 
@@ -197,7 +192,7 @@ impl Store {
     /// A finished run; `None` where it is missing or broken, which a new run mends.
     pub fn run(&self, id: &str) -> Option<RunRecord> {
         let path = self.run_file(id);
-        parse_run(&path, &fs::read_to_string(&path).ok()?).ok()
+        parse_run(&path, &reading::text(&path, reading::most::OWN).ok()?).ok()
     }
 
     pub fn write_run(&self, run: &RunRecord) -> Result<()> {
@@ -218,7 +213,8 @@ impl Store {
         for entry in entries {
             let path = entry?.path();
             let ours = path.extension().is_some_and(|e| e == "json")
-                && fs::read_to_string(&path).is_ok_and(|text| serde_json::from_str::<RunRecord>(&text).is_ok());
+                && reading::text(&path, reading::most::OWN)
+                    .is_ok_and(|text| serde_json::from_str::<RunRecord>(&text).is_ok());
             if ours {
                 fs::remove_file(path)?;
             }

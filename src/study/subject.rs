@@ -12,6 +12,7 @@ use crate::gpu::Gpu;
 use crate::gpu::device::{adapter_wanted_by_name, describe};
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
+use crate::reading;
 use crate::scene::{Phase, Scene, Tool};
 use crate::solver::simulation::EngineChoice;
 use crate::solver::stable_dt::wave_speed_bound;
@@ -64,7 +65,7 @@ impl Subject {
     /// the wanted engine is not to be had.
     pub fn load(path: &Path, overrides: &[String], choice: EngineChoice) -> Result<Self> {
         let loaded = Scene::load(path, overrides)?;
-        let text = std::fs::read_to_string(path).map_err(|reason| Error::file(path, reason))?;
+        let text = reading::text(path, reading::most::SCENE).map_err(|unread| unread.of(path, "name a scene file"))?;
         let (scene, changes) = insertion(loaded)?;
         let gpu = match choice {
             // No adapter is looked for: parts of a study on several machines then agree.

@@ -4,7 +4,6 @@
 //! share one. A file that cannot be read is told and left as it is.
 
 use std::fs;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -13,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::score::Score;
 use super::texts;
 use crate::output::whole_file;
+use crate::reading::{self, Unread};
 use crate::study::subject::fnv1a;
 use crate::{Error, Result};
 
@@ -216,9 +216,12 @@ fn reserve(folder: &Path, stem: &str, mut number: u32) -> Result<(u32, PathBuf)>
 /// # Errors
 /// `Error::Input` where it is no attempt, `Error::File` where it cannot be read.
 pub fn read(path: &Path) -> Result<Attempt> {
-    let file = fs::File::open(path).map_err(|source| Error::file(path, source))?;
-    let mut bytes = Vec::new();
-    file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(|source| Error::file(path, source))?;
+    let bytes = reading::bytes(path, LARGEST_FILE).map_err(|unread| match unread {
+        Unread::System(source) => Error::file(path, source),
+        Unread::Refused { reason, .. } => {
+            Error::input(texts::no_attempt(&path.display().to_string(), &reason), texts::BROKEN_WAY_OUT)
+        }
+    })?;
     parse(path, &bytes)
 }
 

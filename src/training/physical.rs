@@ -25,15 +25,13 @@ use super::texts;
 use crate::observables::{CoreSample, EnergyAccount, FrameRecord};
 use crate::output::{Summary, TargetFigures};
 use crate::scene::Scene;
+use crate::verdict::Doubt;
 
 /// Time over which a force rate is taken [s]: several frames, shorter than a reaction of the hand.
 pub const RATE_WINDOW: f64 = 0.1;
 
 /// Speed below which the needle counts as standing [m/s].
 pub const STANDSTILL: f64 = 0.2e-3;
-
-/// Largest energy imbalance of a run that can be trusted; the same bound as in studies.
-pub const LARGEST_IMBALANCE: f64 = 0.02;
 
 /// Largest kinetic over internal energy, a median over the way in: beyond it mass scaling shows in the force.
 pub const LARGEST_KINETIC: f64 = 0.05;
@@ -50,7 +48,7 @@ const LAYER_STEP: f64 = 2e-5;
 /// Whether the numbers of a run mean something.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Trust {
-    /// Largest |external work - accounted energy| over the largest external work; `None` where it is no number.
+    /// Largest energy imbalance, see [`crate::verdict`]; `None` where it is NaN.
     pub energy_imbalance: Option<f64>,
     /// Medians over the way in.
     pub kinetic_to_internal: Option<f64>,
@@ -81,8 +79,8 @@ impl Trust {
         if records.iter().any(|r| r.health.not_finite || !r.force.axial.is_finite()) {
             trust.reasons.push(texts::NOT_A_NUMBER.into());
         }
+        trust.reasons.extend(records.last().into_iter().flat_map(|r| r.verdict.doubts.iter().map(Doubt::sentence)));
         for (value, bound, name) in [
-            (trust.energy_imbalance, LARGEST_IMBALANCE, texts::ENERGY_IMBALANCE),
             (trust.kinetic_to_internal, LARGEST_KINETIC, texts::KINETIC_TO_INTERNAL),
             (trust.hourglass_to_internal, LARGEST_HOURGLASS, texts::HOURGLASS_TO_INTERNAL),
         ] {

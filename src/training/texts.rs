@@ -105,13 +105,13 @@ pub const KINETIC_TO_INTERNAL: &str = "kinetic/internal energy";
 pub const HOURGLASS_TO_INTERNAL: &str = "hourglass/internal energy";
 pub const CLAMPED_NODES: &str = "clamped node steps";
 pub const NO_FRAMES: &str = "the run holds no frame";
-pub const NOT_A_NUMBER: &str = "a force or a displacement is no number";
+pub const NOT_A_NUMBER: &str = "a force or a displacement is NaN";
 
 /// A ratio beyond its bound, both fractions.
 pub fn outside_gate(name: &str, value: Option<f64>, bound: f64) -> String {
     match value {
         Some(value) => format!("{name} {:.1} %, at most {:.1} % can be trusted", 100.0 * value, 100.0 * bound),
-        None => format!("{name} is no number"),
+        None => format!("{name} is NaN"),
     }
 }
 

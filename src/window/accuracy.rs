@@ -55,7 +55,8 @@ impl Accuracy {
         match size {
             Ok(size) => {
                 let factor = self.predicted(*size, scene, timing, now);
-                ui.label(format!("{} {}, {} {factor:.2}", size.cells, texts::CELLS, texts::PREDICTED));
+                let factor = factor.map_or(texts::AFTER_THE_FIRST_FRAME.into(), |factor| format!("{factor:.2}"));
+                ui.label(format!("{} {}, {} {factor}", size.cells, texts::CELLS, texts::PREDICTED));
             }
             Err(reason) => {
                 ui.colored_label(ui.visuals().error_fg_color, reason);
@@ -86,10 +87,13 @@ impl Accuracy {
         Ok(MeshSize { cells: model.mesh.cell_count() as u64, unit_step_s })
     }
 
-    /// Real-time factor of the tissue alone, from what a frame of `now` (cells, steps) takes here.
-    fn predicted(&self, size: MeshSize, scene: &Scene, timing: &Timing, (cells, steps): (u64, u64)) -> f64 {
+    /// Real-time factor of the tissue alone, from what a frame of `now` (cells, steps) takes here; `None` before there was one.
+    fn predicted(&self, size: MeshSize, scene: &Scene, timing: &Timing, (cells, steps): (u64, u64)) -> Option<f64> {
+        if timing.physics <= 0.0 {
+            return None;
+        }
         let cost = UnitCost { step_s: 0.0, cell_step_s: timing.physics / (cells * steps).max(1) as f64 };
-        predicted_factor(size, &self.settings(scene), &cost, scene.solver.frame_rate)
+        Some(predicted_factor(size, &self.settings(scene), &cost, scene.solver.frame_rate))
     }
 
     fn settings(&self, scene: &Scene) -> Settings {
@@ -109,7 +113,13 @@ impl Accuracy {
             (c.settings.cell_size_mm / self.edge_mm).ln().abs()
                 + 0.25 * (c.settings.mass_scaling / self.mass_scaling).ln().abs()
         };
-        match self.studied.iter().filter(|c| c.error.is_finite()).min_by(|a, b| far(a).total_cmp(&far(b))) {
+        // On the mesh of the reference no error of the mesh was measured.
+        match self
+            .studied
+            .iter()
+            .filter(|c| c.error.is_finite() && !c.same_mesh)
+            .min_by(|a, b| far(a).total_cmp(&far(b)))
+        {
             Some(c) => format!(
                 "{} {:.1} % {} {} mm, S {:.0}",
                 texts::ERROR,
@@ -128,4 +138,21 @@ fn studied(scene: &Scene) -> Vec<Candidate> {
     let folder = format!("out/study_{}", safe_name(&scene.name));
     let Ok((store, plan)) = Store::existing(Path::new(&folder)) else { return Vec::new() };
     Analysis::read(&store, &plan).map(|analysis| analysis.candidates()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nothing was timed yet: no factor, rather than an infinite one.
+    #[test]
+    fn nothing_is_predicted_before_the_first_frame() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/effects/puncture.toml");
+        let scene = Scene::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
+        let accuracy = Accuracy::new(&scene);
+        let size = accuracy.measured_size(&scene).unwrap();
+        assert_eq!(accuracy.predicted(size, &scene, &Timing::default(), (1000, 10)), None);
+        let timed = Timing { physics: 0.01, ..Timing::default() };
+        assert!(accuracy.predicted(size, &scene, &timed, (1000, 10)).is_some_and(|f| f > 0.0 && f.is_finite()));
+    }
 }

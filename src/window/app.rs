@@ -30,9 +30,11 @@ use super::tool_shape::{self, ToolPlace};
 use super::tuning::{Pace, Source};
 use super::watch::Watch;
 use super::{PACES, ViewOptions};
+use crate::ending;
 use crate::gpu::compose::{SOURCES, read_sources};
 use crate::gpu::{Gpu, Memory};
 use crate::haptic::LoopTiming;
+use crate::reading;
 use crate::scene::Scene;
 use crate::session::Session;
 use crate::solver::change::Reach;
@@ -95,7 +97,10 @@ pub struct ViewOutcome {
 pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome> {
     if !PACES.contains(&options.pace) {
         let way_out = format!("write a number from {} to {}", PACES.start(), PACES.end());
-        return Err(Error::input(format!("--pace {} is no pace that the window can aim at", options.pace), way_out));
+        return Err(Error::input(
+            format!("--speed-factor {} is not a speed that the window can aim at", options.pace),
+            way_out,
+        ));
     }
     let (source, scene, recorded) = match &options.session {
         None => {
@@ -167,7 +172,7 @@ fn no_display(reason: &str) -> Error {
 /// The scores of an attempt, where its folder holds some.
 fn read_score(folder: &Path) -> Option<Result<Score>> {
     let path = folder.join("score.json");
-    let text = std::fs::read_to_string(&path).ok()?;
+    let text = reading::text(&path, reading::most::OWN).ok()?;
     let wrong = |e: serde_json::Error| {
         Error::input(
             format!("{}: no scores: {e}", path.display()),
@@ -180,7 +185,8 @@ fn read_score(folder: &Path) -> Option<Result<Score>> {
 /// The force curve of a run.
 fn read_curve(folder: &Path) -> Result<ReferenceCurve> {
     let path = if folder.is_dir() { folder.join("force.csv") } else { folder.to_path_buf() };
-    let mut reader = csv::Reader::from_path(&path).map_err(|e| Error::file(&path, e.into()))?;
+    let bytes = reading::bytes(&path, reading::most::TABLE).map_err(|e| e.of(&path, "give the folder of a run"))?;
+    let mut reader = csv::Reader::from_reader(bytes.as_slice());
     let wrong = |reason: String| Error::input(format!("{}: {reason}", path.display()), "give the folder of a run");
     let headers = reader.headers().map_err(|e| wrong(e.to_string()))?.clone();
     let column = |name: &str| headers.iter().position(|h| h == name).ok_or_else(|| wrong(format!("no column {name}")));
@@ -285,6 +291,8 @@ impl ApplicationHandler for App {
         }
         match self.open_window(event_loop) {
             Ok(open) => {
+                // From here on there is something to keep.
+                ending::begin();
                 open.window.request_redraw();
                 self.open = Some(open);
             }
@@ -336,6 +344,10 @@ impl ApplicationHandler for App {
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        if ending::is_asked() {
+            self.close(event_loop);
+            return;
+        }
         let Some(open) = &self.open else { return };
         if Instant::now() >= open.next {
             open.window.request_redraw();
@@ -625,9 +637,9 @@ impl Open {
     fn read_anew(&mut self, shaders: Option<&Path>) {
         let tuning = &mut self.practice.tuning;
         if self.recorded.is_none() && self.scene_file.has_changed() {
-            match std::fs::read_to_string(&tuning.source.path) {
+            match reading::text(&tuning.source.path, reading::most::SCENE) {
                 Ok(text) => tuning.wish_for(Source { text, ..tuning.coming().clone() }, Reach::Start),
-                Err(error) => tuning.refusal = Some(Error::file(&tuning.source.path, error).to_string()),
+                Err(error) => tuning.refusal = Some(error.of(&tuning.source.path, "save the file again").to_string()),
             }
         }
         if let Some(folder) = shaders

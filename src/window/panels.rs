@@ -305,7 +305,8 @@ pub fn readings(
         row(texts::CUTTING, format!("{:.2} mJ", record.energy.cutting * 1e3));
         row(texts::FRAMES, format!("{:.0} /s", practice.timing.frames_per_second()));
         row(texts::PHYSICS, format!("{:.1} ms", practice.timing.physics * 1e3));
-        row(texts::REAL_TIME, format!("{:.2}", practice.timing.real_time_factor()));
+        let factor = practice.timing.real_time_factor();
+        row(texts::REAL_TIME, if factor > 0.0 { format!("{factor:.2}") } else { "-".into() });
         if practice.leader == Leader::Hand {
             let latency = practice.latency;
             let told = format!("{} frame(s), {:.0} ms", latency.most_frames, latency.mean * 1e3);
@@ -319,13 +320,24 @@ pub fn readings(
         }
     });
     ui.horizontal_wrapped(|ui| {
-        let imbalance = record.energy.imbalance().abs();
-        light(ui, texts::ENERGY_LIGHT, &format!("{:.2} %", 100.0 * imbalance), imbalance < 0.02, imbalance < 0.1);
+        let imbalance = record.verdict.worst_imbalance;
+        let bound = crate::verdict::Quantity::EnergyImbalance.bound();
+        let stops = bound.stop.map_or(f64::INFINITY, |stop| stop.0);
+        light(
+            ui,
+            texts::ENERGY_LIGHT,
+            &format!("{:.2} %", 100.0 * imbalance),
+            imbalance <= bound.ok,
+            imbalance <= stops,
+        );
         let clamped = record.health.clamped_nodes;
         light(ui, texts::CLAMPED_LIGHT, &clamped.to_string(), clamped == 0, clamped < 10);
         let inverted = record.health.inverted_cells;
         light(ui, texts::INVERTED_LIGHT, &inverted.to_string(), inverted == 0, inverted < 5);
     });
+    if let Some(why) = record.verdict.sentence() {
+        ui.colored_label(egui::Color32::from_rgb(230, 159, 0), format!("{}: {why}", texts::DOUBTFUL));
+    }
     match &practice.state {
         State::Stopped(reason) => {
             ui.colored_label(egui::Color32::from_rgb(230, 159, 0), format!("{}\n{reason}", texts::STOPPED));

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use super::kernels_on_disk::KernelsOnDisk;
 use crate::effects::parameter::with_overrides;
 use crate::gpu::Gpu;
+use crate::reading;
 use crate::scene::Scene;
 use crate::solver::change::{Change, Reach};
 use crate::solver::engine::Engine;
@@ -30,7 +31,7 @@ impl Source {
     /// Those of [`Scene::load`], for a file that cannot be read too.
     pub fn read(path: PathBuf, overrides: Vec<String>) -> Result<(Self, Scene)> {
         let scene = Scene::load(&path, &overrides)?;
-        let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
+        let text = reading::text(&path, reading::most::SCENE).map_err(|e| e.of(&path, "name a scene file"))?;
         Ok((Source { path, text, overrides }, scene))
     }
 

@@ -118,11 +118,87 @@ fn missing_file() {
     let place = Place::new();
     place.tiny(&[]);
     place.call(&["run", "tinny.toml", "--out", "results"]).refused().says("tinny.toml").says("did you mean");
-    // The default scene is not here.
-    place.call(&[]).refused().says("muscle_biopsy.toml");
-    // A folder is no scene.
-    place.call(&["run", ".", "--out", "results"]).refused();
+    // A folder is no scene; it names those that it holds.
+    place.call(&["run", ".", "--out", "results"]).refused().says(". is a folder").says("./tiny.toml");
+    // An ending that all scenes share is no likeness.
+    let answer = place.call(&["check", "nosuch.toml"]).refused();
+    assert!(!answer.stderr.contains("did you mean"), "{}", answer.all());
+    // A built-in scene of another folder is none of this one.
+    place.call(&["run", "training/hit_target.toml"]).refused().says("training/hit_target.toml");
     assert_eq!(place.files("."), ["tiny.toml"]);
+}
+
+/// What never ends, or is larger than anything a person means, is refused before it is read.
+#[cfg(unix)]
+#[test]
+fn endless_and_huge_sources_are_refused_at_once() {
+    let place = Place::new();
+    let made = std::process::Command::new("mkfifo").arg(place.path("pipe")).status().unwrap();
+    assert!(made.success());
+    std::fs::create_dir_all(place.path("pipes/runs")).unwrap();
+    for name in ["checkpoint.stylet", "session.json", "plan.json"] {
+        std::os::unix::fs::symlink(place.path("pipe"), place.path("pipes").join(name)).unwrap();
+    }
+    for name in ["huge.toml", "huge.msh", "huge.csv", "huge.json"] {
+        std::fs::File::create(place.path(name)).unwrap().set_len(2 << 30).unwrap();
+    }
+    for name in ["pipe.msh", "zero.msh"] {
+        std::os::unix::fs::symlink(if name == "pipe.msh" { "pipe" } else { "/dev/zero" }, place.path(name)).unwrap();
+    }
+    place.tiny(&[]);
+    let mesh = |name: &str| {
+        format!(
+            "[tissue]\nmesh = \"{name}\"\nunit = \"mm\"\n[material]\npreset = \"fat\"\n[solver]\nduration_s = 0.1\n\
+             [boundaries]\nz_min = \"fixed\"\n"
+        )
+    };
+    for name in ["pipe.msh", "zero.msh", "huge.msh"] {
+        place.write(&format!("of_{name}.toml"), &mesh(name));
+    }
+    let library = |name: &str| TINY.replace("preset =", &format!("library = \"{name}\"\npreset ="));
+    for name in ["pipe", "huge.toml"] {
+        place.write(&format!("library_{name}.toml"), &library(name));
+    }
+    let calls: &[&[&str]] = &[
+        &["run", "pipe"],
+        &["check", "/dev/zero"],
+        &["check", "/dev/stdin"],
+        &["check", "huge.toml"],
+        &["check", "of_pipe.msh.toml"],
+        &["check", "of_zero.msh.toml"],
+        &["check", "of_huge.msh.toml"],
+        &["check", "library_pipe.toml"],
+        &["check", "library_huge.toml.toml"],
+        &["fit", "pipe"],
+        &["fit", "/dev/zero"],
+        &["fit", "huge.csv"],
+        &["replay", "pipe"],
+        &["replay", "/dev/zero"],
+        &["replay", "huge.json"],
+        &["replay", "pipes"],
+        &["run", "--resume", "pipes"],
+        &["study", "--merge", "pipes", "--out", "whole"],
+        &["study", "--merge", "tiny.toml", "--out", "whole"],
+    ];
+    for args in calls {
+        let begin = std::time::Instant::now();
+        let answer = place.call(args).refused();
+        let took = begin.elapsed().as_secs_f64();
+        assert!(took < 5.0, "{args:?} took {took} s\n{}", answer.all());
+        assert_eq!(answer.stderr.matches("error: ").count(), 1, "{}", answer.all());
+    }
+}
+
+/// `--resume` says why there is nothing to go on with.
+#[test]
+fn a_run_that_cannot_go_on_says_why() {
+    let place = Place::new();
+    place.tiny(&[("depth_mm = 3.0", "depth_mm = 0.1")]);
+    place.call(&["run", "tiny.toml", "--engine", "cpu", "--out", "out"]).ended(0);
+    place.call(&["run", "--resume", "out"]).refused().says("the run in out has finished");
+    std::fs::create_dir(place.path("empty")).unwrap();
+    place.call(&["run", "--resume", "empty"]).refused().says("no run was stopped there");
+    place.call(&["run", "--resume", "none"]).refused().says("there is no checkpoint none");
 }
 
 #[test]
@@ -179,9 +255,12 @@ fn output_folder_without_write_permission() {
 fn wrong_commands_and_options() {
     let place = Place::new();
     place.tiny(&[]);
-    let calls: [(&[&str], &str); 6] = [
+    let calls: [(&[&str], &str); 9] = [
         (&["run", "tiny.toml", "--frob"], "--frob"),
-        (&["frobnicate", "tiny.toml"], "tiny.toml"),
+        (&["frobnicate", "tiny.toml"], "no subcommand and no scene file called frobnicate"),
+        (&["chek", "tiny.toml"], "did you mean stylet check?"),
+        (&["chek"], "did you mean stylet check?"),
+        (&["chek", "--engine", "cpu"], "did you mean stylet check?"),
         (&["run", "tiny.toml", "--engine", "tpu"], "auto, gpu or cpu"),
         (&["run", "tiny.toml", "--out"], "--out"),
         (&["bench", "--max-cells", "many"], "many"),
@@ -208,6 +287,9 @@ fn wrong_overrides() {
         ("tissue.cell_size_mm=nan", "not a finite number"),
         ("motion.phase.7.depth_mm=2", "no index"),
         ("tissue=3", "--set tissue=3"),
+        ("tissue.size_mm=[14, 14, 9, 4]", "`tissue.size_mm` has 4 entries, 3 are wanted"),
+        (&format!("tissue{}=1", ".a".repeat(50_000)), "the key has more than"),
+        (&format!("tissue.{}=1", "a".repeat(50_000)), "aaa... "),
     ] {
         place.call(&["run", "tiny.toml", "--set", text, "--out", "results"]).refused().says("--set").says(expected);
     }

@@ -186,7 +186,7 @@ fn a_needle_without_puncture_runs_with_a_notice() {
     place.tiny(&[("[\"puncture\", \"friction\", \"mass_scaling\"]", "[]"), ("depth_mm = 3.0", "depth_mm = 0.05")]);
     for engine in engines(&place) {
         let answer = place.call(&["run", "tiny.toml", "--engine", engine, "--out", engine]).ended(0);
-        answer.says("note: ").says("effect `puncture` is not listed").says("solver.mass_scaling");
+        answer.says("note: ").says("does not touch the tissue").says("add \"puncture\"").says("solver.mass_scaling");
         let summary = place.summary(engine);
         assert_eq!(summary["effects"].as_array().unwrap().len(), 0);
         // The hand feels the inertia of the needle at its start, and nothing else.
@@ -208,7 +208,7 @@ fn a_diverging_run_fails_and_keeps_its_results() {
         let answer = answer.says("rest position").says("(step ").says(&format!("are in {engine}"));
         let summary = place.summary(engine);
         let status = summary["status"].as_str().unwrap();
-        assert!(status.starts_with("failed: run stopped in frame"), "{}", answer.all());
+        assert!(status.starts_with("stopped: run stopped in frame"), "{}", answer.all());
         // As many rows as the frames before the failure, all complete.
         let (_, force) = place.table(engine, "force.csv");
         let (_, energy) = place.table(engine, "energy.csv");
@@ -255,6 +255,126 @@ fn ctrl_c_ends_the_run_with_complete_results() {
         assert!((summary["simulated_s"].as_f64().unwrap() - last).abs() < 1e-9, "{summary:#}");
         assert!(place.path(engine).join("force.svg").exists());
     }
+}
+
+/// Waits for rows of a run's table, more than were there, sends it a signal, waits for its end; the answer and how long it took
+/// after the signal.
+#[cfg(unix)]
+fn signalled(place: &Place, args: &[&str], folder: &str, signal: &str) -> (Answer, std::time::Duration) {
+    let table = place.path(folder).join("force.csv");
+    let rows = || std::fs::read_to_string(&table).map_or(1, |t| t.lines().count());
+    let before = rows();
+    let mut child = place.program(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let begin = std::time::Instant::now();
+    while rows() <= before {
+        assert!(begin.elapsed().as_secs() < 120, "no frame in two minutes");
+        if child.try_wait().unwrap().is_some() {
+            panic!("ended before the signal: {}", Answer::from(child.wait_with_output().unwrap()).all());
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let sent = std::time::Instant::now();
+    assert!(std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+    let answer = Answer::from(child.wait_with_output().unwrap());
+    (answer, sent.elapsed())
+}
+
+/// What a scheduler sends ends a run as Ctrl-C does: with results, a checkpoint, a sentence, and the exit code of the signal. No
+/// checkpoint need have been asked for.
+#[cfg(unix)]
+#[test]
+fn every_signal_that_ends_a_job_leaves_results_and_a_checkpoint() {
+    let place = Place::new();
+    place.tiny(&[("\"mass_scaling\"]", "]"), ("speed_mm_s = 2.0", "speed_mm_s = 0.1")]);
+    for (signal, code) in [("-TERM", 143), ("-HUP", 129), ("-XCPU", 152), ("-USR1", 138), ("-INT", 130)] {
+        let out = &signal[1..];
+        let args = ["run", "tiny.toml", "--engine", "cpu", "--out", out, "--checkpoint", "0"];
+        let (answer, took) = signalled(&place, &args, out, signal);
+        let answer =
+            answer.ended(code).says("stopped by ").says("SIG").says(&format!("results and a checkpoint are in {out}"));
+        assert_eq!(answer.stderr.lines().filter(|l| l.contains("stopped by")).count(), 1, "{}", answer.all());
+        assert!(took.as_secs_f64() < 4.0, "{signal}: {took:?}");
+        assert_eq!(place.summary(out)["status"], "interrupted");
+        assert!(place.path(out).join("checkpoint.stylet").exists(), "{signal}");
+        assert_eq!(place.table(out, "force.csv").1.len(), place.table(out, "energy.csv").1.len());
+    }
+    // And it goes on from there.
+    let (answer, _) = signalled(&place, &["run", "--resume", "HUP"], "HUP", "-TERM");
+    answer.ended(143).says("going on at");
+}
+
+/// A frame of many thousand steps is given up; the run is kept as it was before.
+#[cfg(unix)]
+#[test]
+fn a_long_frame_is_not_waited_for() {
+    let place = Place::new();
+    place.tiny(&[
+        ("\"mass_scaling\"]", "]"),
+        ("mass_scaling = 40000", "frame_rate_hz = 2.0"),
+        ("speed_mm_s = 2.0", "speed_mm_s = 0.1"),
+    ]);
+    for engine in engines(&place) {
+        let (answer, took) =
+            signalled(&place, &["run", "tiny.toml", "--engine", engine, "--out", engine], engine, "-TERM");
+        answer.ended(143).says("stopped by SIGTERM").says("go on with");
+        assert!(took.as_secs_f64() < 4.0, "{engine}: {took:?}");
+        assert!(place.path(engine).join("checkpoint.stylet").exists());
+    }
+}
+
+/// `nohup`: the end of the terminal is none of the program.
+#[cfg(unix)]
+#[test]
+fn a_run_under_nohup_outlives_its_terminal() {
+    let place = Place::new();
+    place.tiny(&[]);
+    let line =
+        "trap '' HUP; \"$0\" run tiny.toml --engine cpu --out out & run=$!; sleep 0.3; kill -HUP $run; wait $run";
+    let stylet = place.program(&[]).get_program().to_owned();
+    let mut shell = std::process::Command::new("bash");
+    shell.args(["-c", line]).arg(stylet).current_dir(place.path("."));
+    Answer::from(shell.output().unwrap()).ended(0);
+    assert_ne!(place.summary("out")["status"], "interrupted");
+}
+
+/// Nobody reads what a run says: it goes on and keeps its results.
+#[test]
+fn a_run_outlives_who_listens_to_it() {
+    let place = Place::new();
+    place.tiny(&[]);
+    // A message before the first step, and one at the end.
+    let args = ["run", "tiny.toml", "--engine", "cpu", "--out", "out"];
+    let mut child = place.program(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop((child.stdout.take(), child.stderr.take()));
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_ne!(place.summary("out")["status"], "interrupted");
+    assert!(place.path("out/force.svg").exists());
+    // A refusal that nobody hears is one all the same.
+    let mut child = place.program(&["check", "none.toml"]).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stderr.take());
+    assert_eq!(child.wait().unwrap().code(), Some(2));
+}
+
+/// The scenes of the repository, and the files that they name, are there wherever the program is called.
+#[test]
+fn built_in_scenes_are_found_from_everywhere() {
+    let place = Place::new();
+    for scene in ["scenes/muscle_biopsy.toml", "./scenes/forearm.toml", "scenes/../scenes/target.toml"] {
+        let answer = place.call(&["check", scene, "--engine", "cpu"]).ended(0);
+        assert!(answer.stdout.contains("the scene that is built into the program is used"), "{}", answer.all());
+    }
+    let few =
+        ["--set", "tissue.cell_size_mm=2.4", "--set", "motion.phase=[{kind=\"insert\", speed_mm_s=10, depth_mm=1}]"];
+    let args = [&["--engine", "cpu", "--out", "out"], &few[..]].concat();
+    place.call(&args).ended(0).says("built into the program");
+    assert_eq!(place.summary("out")["scene"], "muscle_biopsy");
+    // A file of that name wins.
+    std::fs::create_dir(place.path("scenes")).unwrap();
+    place.write("scenes/muscle_biopsy.toml", TINY);
+    let answer = place.call(&["check", "--engine", "cpu"]).ended(0);
+    assert!(answer.stdout.contains("tiny") && !answer.stdout.contains("built into"), "{}", answer.all());
+    place.call(&["stability", "--only", "step_1_1", "--short", "--engine", "cpu"]).ended(0);
+    place.call(&["fit", "assets/curves/synthetic_tension.csv"]).ended(0);
 }
 
 #[test]

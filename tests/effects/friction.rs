@@ -34,16 +34,19 @@ fn block_under_punch(acceleration: DVec3, mu: f64, damping: f64) -> Arc<Model> {
 }
 
 /// Starts at the speed `v0` along x, in balance with the punch under gravity `g` along z: every column of nodes rests
-/// on the spring of its own contact node and is compressed by its own weight.
+/// on the springs of its share of the face and is compressed by its own weight.
 fn start(engine: &mut dyn Engine, model: &Model, g: f64, v0: f64) {
     let mut state = engine.read_state().unwrap();
     let height = model.scene.tissue.size.z;
     let [nx, ny, nz] = model.mesh.block().nodes();
     let column = |n: usize| (0..nz).map(|k| model.node_mass[n % (nx * ny) + k * nx * ny]).sum::<f64>();
+    let stiffness = model.indentation.expect("a tool that presses").face_stiffness;
+    let top = |n: usize| (n % (nx * ny) + (nz - 1) * nx * ny) as u32;
+    let share: std::collections::HashMap<u32, f64> = model.contact_nodes.iter().map(|c| (c.node, c.share)).collect();
     for (node, u) in state.displacement.iter_mut().enumerate() {
         let above_base = model.mesh.rest_position(node).z + height;
         let squeeze = DENSITY * g / MATERIAL_A.p_wave_modulus() * 0.5 * (height.powi(2) - above_base.powi(2));
-        u.z = column(node) * g / model.tool_contact_stiffness() + squeeze;
+        u.z = column(node) * g / (stiffness * share[&top(node)]) + squeeze;
     }
     state.velocity.fill(DVec3::new(v0, 0.0, 0.0));
     engine.write_state(&state).unwrap();

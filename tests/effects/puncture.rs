@@ -158,7 +158,10 @@ fn the_energy_account_of_an_insertion_closes() {
                 f.damping_dissipation
                     + f.contact_dissipation
                     + f.tip_dissipation
+                    + f.cap_dissipation
                     + f.softening_dissipation
+                    + f.raised_mass_energy
+                    + f.speed_limit_energy
                     + f.friction_dissipation
             })
             .sum();

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use stylet::material::Mode;
 use stylet::material::fit::nominal_stress;
 use stylet::material::kinematics::J_CONTINUATION;
-use stylet::material::{ElasticLaw, Isochoric};
+use stylet::material::{Continuation, ElasticLaw, Isochoric, Verdict};
 
 use crate::*;
 
@@ -140,7 +140,10 @@ fn neutral_constants_give_the_neo_hookean_law() {
             // phi(c) = c is its own Taylor polynomial.
             assert!(largest_entry(p - expected) <= tolerance * largest_entry(expected), "{isochoric:?} at J {j}");
         }
-        let at_rest = |law: &ElasticLaw| law.tangent_bound(DMat3::ZERO).straight;
+        let at_rest = |law: &ElasticLaw| {
+            let bound = law.tangent_bound(DMat3::ZERO);
+            bound.straight + bound.turned
+        };
         assert!((at_rest(&near) / at_rest(&reference) - 1.0).abs() < 1e-6);
     }
 }
@@ -158,8 +161,8 @@ fn small_strains_see_the_shear_modulus() {
         let volume = law.first_piola_kirchhoff(DMat3::IDENTITY * strain).x_axis.x / (3.0 * strain);
         assert!((volume / law.bulk_modulus - 1.0).abs() < 1e-4, "{isochoric:?}: bulk {volume}");
         let at_rest = law.tangent_bound(DMat3::ZERO);
-        assert!((at_rest.straight / (4.0 / 3.0 * mu) - 1.0).abs() < 1e-12, "{isochoric:?}: bound at rest {at_rest:?}");
-        assert!(at_rest.turned.abs() < 1e-12 * mu, "{isochoric:?}: bound at rest {at_rest:?}");
+        let sum = at_rest.straight + at_rest.turned;
+        assert!((sum / (4.0 / 3.0 * mu) - 1.0).abs() < 1e-12, "{isochoric:?}: bound at rest {at_rest:?}");
     }
 }
 
@@ -234,4 +237,137 @@ fn closed_forms_agree_with_the_textbook() {
     let g: f64 = 0.6;
     let found = nominal_stress(&ogden(6000.0, 4.0), Mode::Shear, g);
     assert!(close(found, 2.0 * 6000.0 / 16.0 * 4.0 * g * (g * g + 2.0)));
+}
+
+/// A law with constants of any size that are stable for every deformation, and Ogden's with |alpha| below 1, too.
+fn random_law(random: &mut Random, kind: usize) -> ElasticLaw {
+    let size = 10f64.powf(random.between(2.0, 5.0));
+    let part = random.between(0.0, 1.0);
+    let sign = if random.between(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
+    let isochoric = match kind {
+        0 => neo_hookean(size),
+        1 => mooney_rivlin(size * part, size * (1.0 - part)),
+        2 => yeoh(size, size * random.between(0.0, 2.0), size * part),
+        3 => ogden(size, sign * random.between(1.0, 12.0)),
+        4 => ogden(size, sign * random.between(0.05, 1.0)),
+        _ => demiray(size, 10f64.powf(random.between(-2.0, 1.0))),
+    };
+    let nu = random.between(0.05, 0.495);
+    let bulk_modulus = 2.0 * isochoric.shear_modulus() * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu));
+    let law = ElasticLaw { isochoric, bulk_modulus };
+    assert!(kind == 4 || law.verdict() == Verdict::Stable, "{law:?}");
+    law
+}
+
+const KINDS: usize = 6;
+
+/// Stretches down to `least`, some of them equal, some inside out.
+fn squeezed(random: &mut Random, least: f64) -> DMat3 {
+    let mut stretch = || random.between(least.ln(), 3.0_f64.ln()).exp();
+    let [a, b, c] = [stretch(), stretch(), stretch()];
+    let mut l = match random.between(0.0, 4.0) as usize {
+        0 => [a, a, a],
+        1 => [a, a, b],
+        _ => [a, b, c],
+    };
+    if random.between(0.0, 1.0) < 0.3 {
+        l[0] = -l[0];
+    }
+    random.with_stretches(l)
+}
+
+#[test]
+fn no_state_has_less_energy_than_rest() {
+    let mut random = Random::new(21);
+    for kind in 0..KINDS {
+        for _ in 0..3000 {
+            let law = random_law(&mut random, kind);
+            let h = squeezed(&mut random, 1e-4) - DMat3::IDENTITY;
+            let (iso, all) = (law.isochoric_energy(h), law.energy_density(h));
+            // Rounding of a sum of powers near 3.
+            let rounding =
+                -1e-9 * law.shear_modulus() * law.shear_modulus().max(law.bulk_modulus) / law.shear_modulus();
+            assert!(iso >= rounding && iso.is_finite(), "{law:?}: W_iso {iso} at {h}");
+            assert!(all >= rounding && all.is_finite(), "{law:?}: W {all} at {h}");
+        }
+    }
+}
+
+#[test]
+fn the_stress_of_squeezed_states_is_the_derivative_of_the_energy() {
+    let mut random = Random::new(22);
+    let mut worst = [0.0_f64; KINDS];
+    for (kind, worst) in worst.iter_mut().enumerate() {
+        for _ in 0..1000 {
+            let law = random_law(&mut random, kind);
+            let h = squeezed(&mut random, 0.02) - DMat3::IDENTITY;
+            let expected = stress_from_energy(&law, h);
+            let found = law.first_piola_kirchhoff(h);
+            // What a difference of energies over 2e-6 does not know.
+            let noise = 1e-9 * (law.energy_density(h) + law.shear_modulus());
+            let error = (largest_entry(found - expected) - noise).max(0.0) / largest_entry(expected);
+            assert!(error < 1e-4, "{law:?}: {error:.1e} at {h}");
+            *worst = worst.max(error);
+        }
+    }
+    println!("P against dW/dF of squeezed states: {:.1e}", worst.iter().fold(0.0, |a: f64, b| a.max(*b)));
+}
+
+#[test]
+fn what_is_squeezed_pushes_back() {
+    let mut random = Random::new(23);
+    for kind in 0..KINDS {
+        for _ in 0..300 {
+            let law = random_law(&mut random, kind);
+            let r = random.rotation();
+            // Powers below 2 are continued below a stretch of 0.1, where a point-like cell holds nothing.
+            let ends = matches!(law.isochoric, Isochoric::Ogden(l) if l.alpha.abs() < 2.0);
+            for s in [0.95, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01, 1e-3].into_iter().filter(|s| !ends || *s >= 0.1) {
+                let p = law.first_piola_kirchhoff(r * s - DMat3::IDENTITY);
+                let mean = (0..3).map(|i| p.col(i).dot(r.col(i))).sum::<f64>();
+                assert!(mean < 0.0, "{law:?} squeezed from all sides to {s}: {mean} Pa");
+            }
+            // Flat: the traction on the faces that come together.
+            let sides = [random.between(0.3, 3.0), random.between(0.3, 3.0)];
+            let (q, s) = (random.rotation(), 1e-3);
+            let f = r * DMat3::from_diagonal(DVec3::new(sides[0], sides[1], s)) * q;
+            let normal = q.transpose() * DVec3::Z;
+            let traction = (law.first_piola_kirchhoff(f - DMat3::IDENTITY) * normal).dot(r * DVec3::Z);
+            assert!(traction < 0.0, "{law:?} squeezed flat, sides {sides:?}: {traction} Pa");
+        }
+    }
+}
+
+#[test]
+fn what_is_small_but_not_flat_obeys_the_law_itself() {
+    let mut random = Random::new(24);
+    for kind in 0..KINDS {
+        for _ in 0..200 {
+            let law = random_law(&mut random, kind);
+            // The same shape at J = 1 and at J = 0.17.
+            let l = [random.between(0.9, 1.1), random.between(0.9, 1.1)];
+            let f = random.with_stretches([l[0], l[1], 1.0 / (l[0] * l[1])]);
+            let small = law.isochoric_energy(f * 0.17_f64.cbrt() - DMat3::IDENTITY);
+            let large = law.isochoric_energy(f - DMat3::IDENTITY);
+            assert_eq!(law.continuation(f * 0.17_f64.cbrt() - DMat3::IDENTITY), None);
+            assert!((small - large).abs() < 1e-9 * law.shear_modulus(), "{law:?}: {small} {large}");
+        }
+        let law = random_law(&mut random, kind);
+        let flat = DMat3::from_diagonal(DVec3::new(1.0, 1.0, 0.1)) - DMat3::IDENTITY;
+        assert!(law.continuation(flat).is_some(), "{law:?}");
+    }
+    let stretched = DMat3::from_diagonal(DVec3::new(3.0, 0.6, 0.6)) - DMat3::IDENTITY;
+    assert_eq!(law(demiray(1000.0, 7.0)).continuation(stretched), Some(Continuation::Exponent));
+    assert_eq!(law(neo_hookean(1000.0)).continuation(stretched), None);
+}
+
+#[test]
+fn ogdens_law_of_minus_two_is_that_of_areas() {
+    let mut random = Random::new(25);
+    let (near, reference) = (law(ogden(6600.0, -2.0)), law(mooney_rivlin(0.0, 3300.0)));
+    for j in JACOBIANS {
+        let h = with_jacobian(&mut random, j) - DMat3::IDENTITY;
+        let (p, expected) = (near.first_piola_kirchhoff(h), reference.first_piola_kirchhoff(h));
+        assert!(largest_entry(p - expected) < 1e-9 * largest_entry(expected), "J {j}: {p} {expected}");
+    }
 }

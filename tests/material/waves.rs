@@ -68,21 +68,21 @@ fn bound_over_truth(isochoric: Isochoric, nu: f64) -> f64 {
 
 #[test]
 fn the_stable_step_knows_the_stiffness_of_deformed_cells() {
-    // Floors as documented at `tangent_bound`; at rest the ratio is 1 for every law.
-    for (isochoric, nu, floor) in [
-        (neo_hookean(3300.0), 0.3, 0.67),
-        (neo_hookean(3300.0), 0.45, 0.87),
-        (mooney_rivlin(0.0, 3300.0), 0.45, 0.76),
-        (mooney_rivlin(2300.0, 1000.0), 0.45, 0.84),
-        (mooney_rivlin(2300.0, 1000.0), 0.49, 0.95),
-        (yeoh(2000.0, 900.0, 300.0), 0.45, 0.77),
-        (yeoh(2000.0, 900.0, 300.0), 0.49, 0.89),
-        (demiray(5000.0, 0.5), 0.45, 0.8),
-        (demiray(1170.0, 6.84), 0.49, 0.78),
+    // At rest the ratio is 1 for every law; differences of the stress have an error of 1e-6.
+    for (isochoric, nu) in [
+        (neo_hookean(3300.0), 0.3),
+        (neo_hookean(3300.0), 0.45),
+        (mooney_rivlin(0.0, 3300.0), 0.45),
+        (mooney_rivlin(2300.0, 1000.0), 0.3),
+        (mooney_rivlin(2300.0, 1000.0), 0.49),
+        (yeoh(2000.0, 900.0, 300.0), 0.45),
+        (yeoh(2000.0, 900.0, 300.0), 0.49),
+        (demiray(5000.0, 0.5), 0.45),
+        (demiray(1170.0, 6.84), 0.49),
     ] {
         let least = bound_over_truth(isochoric, nu);
         println!("{isochoric:?}, nu {nu}: kappa and tangent bound over the stiffest wave: at least {least:.3}");
-        assert!(least > floor, "{isochoric:?}, nu {nu}: {least}");
+        assert!(least > 0.9999, "{isochoric:?}, nu {nu}: {least}");
     }
 }
 
@@ -138,6 +138,45 @@ fn the_tangent_bound_of_ogdens_law_is_one_and_no_larger_than_needed() {
     }
 }
 
+/// Largest wave of a cell over directions, truth and bound: kappa and the tangent bound, of states with J in a range.
+fn squeezed_bound_over_truth(isochoric: Isochoric, nu: f64, jacobians: &[f64]) -> f64 {
+    let mut random = Random::new(17);
+    let law = ElasticLaw { isochoric, bulk_modulus: bulk_from_poisson(isochoric, nu) };
+    let directions = directions();
+    let mut least = f64::INFINITY;
+    for j in jacobians {
+        for _ in 0..25 {
+            let sides = [random.between(0.4, 1.8), random.between(0.4, 1.8)];
+            let h = random.with_stretches([sides[0], sides[1], j / (sides[0] * sides[1])]) - DMat3::IDENTITY;
+            let a = tangent(&|h| law.first_piola_kirchhoff(h), h);
+            let cof = cofactor(DMat3::IDENTITY + h);
+            let bound = law.tangent_bound(h);
+            // As in the element stage: the largest of both parts apart.
+            let turned = directions.iter().map(|n| (cof * *n).length_squared()).fold(0.0, f64::max);
+            let bound = (law.bulk_modulus + bound.turned) * turned + bound.straight;
+            let truth = directions.iter().map(|n| eigenvalues(acoustic_tensor(&a, *n)).1).fold(0.0, f64::max);
+            least = least.min(bound / truth);
+        }
+    }
+    least
+}
+
+#[test]
+fn the_stable_step_knows_the_stiffness_of_flat_and_inverted_cells() {
+    let mut all = Vec::new();
+    for isochoric in all_laws().into_iter().chain([-8.0, -4.0, -1.0, 1.0, 8.0].map(|alpha| ogden(6000.0, alpha))) {
+        for nu in [0.3, 0.45] {
+            let flat = squeezed_bound_over_truth(isochoric, nu, &[0.299, 0.25, 0.15, 0.08, 0.03, 0.01]);
+            let inverted = squeezed_bound_over_truth(isochoric, nu, &[-0.01, -0.1, -0.5, -1.0]);
+            println!("{isochoric:?}, nu {nu}: bound over the stiffest wave: flat {flat:.3}, inverted {inverted:.3}");
+            all.push((isochoric, nu, flat.min(inverted)));
+        }
+    }
+    for (isochoric, nu, least) in all {
+        assert!(least > 0.7, "{isochoric:?}, nu {nu}: {least}");
+    }
+}
+
 /// The stiffening term alone: what the bound of a law of I1bar has beyond that of its slope.
 #[test]
 fn the_stiffening_term_bounds_the_gradient_of_the_invariant() {
@@ -151,8 +190,9 @@ fn the_stiffening_term_bounds_the_gradient_of_the_invariant() {
         let l = DVec3::from(stretches);
         let (j, i1) = (l.x * l.y * l.z, l.length_squared());
         let e = j.powf(-2.0 / 3.0) * i1 - 3.0;
-        let slope = 8.0 / 3.0 * (2.0 * c20 * e) * (i1 / 3.0).max(1.0);
-        let stiffening = law.tangent_bound(h).straight - slope;
+        // What a law with this slope and no stiffening has.
+        let plain = ElasticLaw { isochoric: neo_hookean(2.0 * c20 * e), ..law };
+        let stiffening = law.tangent_bound(h).straight - plain.tangent_bound(h).straight;
         // The bound adds the squares of all three, of which the largest is at least a third.
         // The gradient of I1bar by the stretches: 2 a (l_i - I1/(3 l_i)); the stiffest rank-one motion is along an axis.
         let gradient = stretches.map(|l| (2.0 * j.powf(-2.0 / 3.0) * (l - i1 / (3.0 * l))).powi(2));

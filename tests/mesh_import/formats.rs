@@ -53,6 +53,16 @@ fn formats_with_names_keep_them() {
     assert_eq!(regions, ["region-1", "region-2"]);
 }
 
+/// VTK's own programs write XML under .vtk, and others the reverse: the content says which it is.
+#[test]
+fn either_vtk_format_is_read_under_either_extension() {
+    for (file, name) in [("cube_text.vtu", "a.vtk"), ("cube_zlib.vtu", "a.vtk"), ("cube_51_text.vtk", "a.vtu")] {
+        let bytes = std::fs::read(folder().join(file)).unwrap();
+        let under = |name: &str| parse(name, &bytes, MILLIMETRES).unwrap_or_else(|e| panic!("{e}")).mesh;
+        assert!(under(name) == under(file), "{file} as {name}");
+    }
+}
+
 #[test]
 fn notices_say_what_was_changed() {
     let notices = |file: &str| read(&folder().join(file), LengthUnit::Millimetre).unwrap().notices.join("\n");

@@ -33,13 +33,13 @@ fn the_samples_of_this_file_are_right() {
 fn format_by_extension_confirmed_by_content() {
     assert_contains(&refusal("mesh", b"x"), &["mesh: a file without extension"]);
     assert_contains(&refusal("a.stl", b"solid"), &["hold a surface, not a volume"]);
-    assert_contains(&refusal("a.med", b"x"), &[".med is not a mesh format", ".msh (2.2, 4.1)"]);
+    assert_contains(&refusal("a.med", b"x"), &[".med is not a mesh format", ".msh (1, 2.2, 4.1)"]);
     assert_contains(
         &refusal("a.msh", VTK.as_bytes()),
         &["it looks like a VTK legacy file", "rename the file to end in .vtk"],
     );
     assert_contains(&refusal("a.vtu", INP.as_bytes()), &["it looks like an Abaqus input file"]);
-    assert_contains(&refusal("a.msh", b"(0 \"fluent\")"), &["starts with $MeshFormat"]);
+    assert_contains(&refusal("a.msh", b"(0 \"fluent\")"), &["starts with $MeshFormat, or $NOD"]);
     assert_contains(&refusal("a.inp", b" \n"), &["the file is empty"]);
     assert!(read(Path::new("/nowhere/a.msh"), LengthUnit::Metre).unwrap_err().to_string().contains("/nowhere/a.msh"));
 }
@@ -72,6 +72,21 @@ fn gmsh() {
     assert_contains(&refusal("a.msh", &binary[..3000]), &["a.msh: byte ", "the file ends after"]);
     let nodes = binary.windows(6).position(|w| w == b"$Nodes").unwrap();
     assert_contains(&refusal("a.msh", &binary[..nodes]), &["the file ends without $Nodes"]);
+}
+
+/// Version 1: no header, `$NOD` and `$ELM`, the number of nodes in every element.
+#[test]
+fn gmsh_1() {
+    let text = std::fs::read_to_string(folder().join("cube_1_text.msh")).unwrap();
+    let refused =
+        |from: &str, to: &str, parts: &[&str]| assert_contains(&refusal("a.msh", &with(&text, from, to)), parts);
+    refused("$NOD\n", "$NOD\n9", &["the section ends where a node should stand: its count is larger"]);
+    refused("$ENDNOD", "$EndNodes", &["`$EndNodes` stands where $ENDNOD should stand"]);
+    refused("$ELM", "$Elements", &["$Elements stands in a file of version 1, which has $NOD and $ELM alone"]);
+    refused(" 4 2 2 4 ", " 4 2 2 5 ", &["has 5 nodes; tetrahedra of its type have 4"]);
+    refused(" 4 2 2 4 ", " 4 2 2 4 7", &["names node 7", "which is not in the file"]);
+    assert_contains(&refusal("a.msh", &text.as_bytes()[..text.find("$ELM").unwrap()]), &["the file ends without $ELM"]);
+    assert_contains(&refusal("a.msh", b"$NOD\n0\n$ENDNOD\n$ELM\n0\n$ENDELM\n"), &["no tetrahedra"]);
 }
 
 #[test]

@@ -60,8 +60,8 @@ def make_mesh():
 
 
 def write_with_gmsh():
-    for version, text in (("4.1", "41"), ("2.2", "22")):
-        for binary in (0, 1):
+    for version, text in (("4.1", "41"), ("2.2", "22"), ("1", "1")):
+        for binary in (0, 1) if version != "1" else (0,):
             gmsh.option.setNumber("Mesh.MshFileVersion", float(version))
             gmsh.option.setNumber("Mesh.Binary", binary)
             gmsh.write(str(FOLDER / f"cube_{text}_{'binary' if binary else 'text'}.msh"))

@@ -90,6 +90,13 @@ fn run(name: &str, overrides: &[&str], engine: EngineChoice) -> Run {
     Run { simulation, records, summary, figures }
 }
 
+/// Largest residual of a frame over the largest external work of the whole run: a bound on its end, where the verdict has one on
+/// every moment.
+fn whole_run_imbalance(records: &[FrameRecord]) -> f64 {
+    let residual = records.iter().map(|r| (r.energy.external - r.energy.accounted()).abs()).fold(0.0, f64::max);
+    residual / records.iter().map(|r| r.energy.external_max).fold(0.0, f64::max)
+}
+
 impl Run {
     fn state(&mut self) -> State {
         self.simulation.engine().read_state().unwrap()

@@ -288,6 +288,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
     let local = [
         "CellEnergy",
         "IsochoricFactors",
+        "Measure",
         "AnchorPlace",
         "StraightColumn",
         "BentColumn",
@@ -300,6 +301,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "StepSums",
         "Overlap",
         "SlitForce",
+        "PointForce",
         "Slopes",
         "IsochoricStress",
         "PointPlace",

@@ -1,6 +1,6 @@
-//! Gmsh meshes, MSH 2.x and 4.1, as text and binary.
+//! Gmsh meshes, MSH 1, 2.x and 4.1, the latter two as text and binary.
 //!
-//! Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". A binary file holds the
+//! Source: Gmsh reference manual, "MSH file format", "MSH file format version 1 (Legacy)" and "version 2 (Legacy)". A binary file holds the
 //! records of the text as `int` (4 bytes), `double` and, in version 4.1, `size_t` (its width stands in the header).
 //! Regions are physical volumes; physical surfaces, curves and points become node sets.
 
@@ -43,6 +43,8 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Version {
+    /// `$NOD` and `$ELM` without a header; always text.
+    V1,
     V2,
     V41,
 }
@@ -153,14 +155,29 @@ impl GmshFile<'_> {
                     .source
                     .broken(at, format!("`{title}` stands where a section ($...) should start")));
             };
-            if !found_format && section != "MeshFormat" && section != "Comments" {
-                return Err(self.records.source.fail(
-                    at,
-                    format!("${section} stands before $MeshFormat; files of version 1 start so"),
-                    SAVE_41,
-                ));
+            if !found_format && section == "NOD" {
+                self.version = Version::V1;
+                found_format = true;
             }
+            if !found_format && section != "MeshFormat" && section != "Comments" {
+                return Err(self.records.source.fail(at, format!("${section} stands before $MeshFormat"), SAVE_41));
+            }
+            let first = self.version == Version::V1;
             match section {
+                "NOD" if first => {
+                    self.read_nodes_2()?;
+                    found_nodes = true;
+                }
+                "ELM" if first && found_nodes => {
+                    self.read_elements_1()?;
+                    self.found_elements = true;
+                }
+                _ if first => {
+                    return Err(self.records.source.broken(
+                        at,
+                        format!("${section} stands in a file of version 1, which has $NOD and $ELM alone"),
+                    ));
+                }
                 "MeshFormat" => {
                     self.header()?;
                     found_format = true;
@@ -176,7 +193,7 @@ impl GmshFile<'_> {
                 }
                 "Nodes" => {
                     match self.version {
-                        Version::V2 => self.read_nodes_2()?,
+                        Version::V1 | Version::V2 => self.read_nodes_2()?,
                         Version::V41 => self.read_nodes_41()?,
                     }
                     found_nodes = true;
@@ -186,7 +203,7 @@ impl GmshFile<'_> {
                 }
                 "Elements" => {
                     match self.version {
-                        Version::V2 => self.read_elements_2()?,
+                        Version::V1 | Version::V2 => self.read_elements_2()?,
                         Version::V41 => self.read_elements_41()?,
                     }
                     self.found_elements = true;
@@ -199,9 +216,8 @@ impl GmshFile<'_> {
             self.end_section(section)?;
         }
         let end = self.records.source.at();
-        for (found, section) in
-            [(found_format, "$MeshFormat"), (found_nodes, "$Nodes"), (self.found_elements, "$Elements")]
-        {
+        let [nodes, elements] = if self.version == Version::V1 { ["$NOD", "$ELM"] } else { ["$Nodes", "$Elements"] };
+        for (found, section) in [(found_format, "$MeshFormat"), (found_nodes, nodes), (self.found_elements, elements)] {
             if !found {
                 return Err(self.records.source.broken(end, format!("the file ends without {section}")));
             }
@@ -213,14 +229,15 @@ impl GmshFile<'_> {
         self.records.source.skip_space();
         let at = self.records.source.at();
         let line = self.records.source.line().unwrap_or_default().trim_ascii();
-        if line.strip_prefix(b"$End") == Some(section.as_bytes()) {
+        let end = if self.version == Version::V1 { "$END" } else { "$End" };
+        if line.strip_prefix(end.as_bytes()) == Some(section.as_bytes()) {
             return Ok(());
         }
         let found = if line.is_empty() { "the file ends".to_string() } else { format!("`{}` stands", excerpt(line)) };
         Err(self.records.source.broken(
             at,
             format!(
-                "{found} where $End{section} should stand: the file is cut short or the count of the section is wrong"
+                "{found} where {end}{section} should stand: the file is cut short or the count of the section is wrong"
             ),
         ))
     }
@@ -246,7 +263,7 @@ impl GmshFile<'_> {
             b"2" | b"2.0" | b"2.1" | b"2.2" => Version::V2,
             b"4.1" => Version::V41,
             _ => {
-                let message = format!("MSH version {} is not read here, only 2.2 and 4.1", excerpt(version));
+                let message = format!("MSH version {} is not read here, only 1, 2.2 and 4.1", excerpt(version));
                 return Err(source.fail(at, message, SAVE_41));
             }
         };
@@ -352,7 +369,7 @@ impl GmshFile<'_> {
         self.end_text_line()?;
         for _ in 0..count {
             let at = self.records.source.at();
-            self.expect_record(at, "a node", "$EndNodes")?;
+            self.expect_record(at, "a node", "the end of the section")?;
             let id = self.records.id("the id of a node")?;
             let position = self.records.position(id)?;
             self.records.end()?;
@@ -424,6 +441,31 @@ impl GmshFile<'_> {
         Ok(())
     }
 
+    /// A line of version 1: id, type, physical group, entity, number of nodes, nodes.
+    fn read_elements_1(&mut self) -> Result<()> {
+        let count: u64 = self.records.source.number_in_line("the number of elements")?;
+        self.end_text_line()?;
+        for _ in 0..count {
+            let at = self.records.source.at();
+            self.expect_record(at, "an element", "$ENDELM")?;
+            let id = self.records.id("the id of an element")?;
+            let shape = self.shape(at)?;
+            let group = Group {
+                physical: self.records.int("the physical group")?.unsigned_abs(),
+                entity: self.records.int("the geometric entity")?,
+            };
+            let nodes = self.records.id("the number of nodes")?;
+            if nodes != u64::from(shape.nodes) {
+                let message =
+                    format!("element {id} has {nodes} nodes; {} of its type have {}", shape.kind, shape.nodes);
+                return Err(self.records.source.broken(at, message));
+            }
+            self.read_corners(at, id, shape, group)?;
+            self.records.end()?;
+        }
+        Ok(())
+    }
+
     fn read_elements_2(&mut self) -> Result<()> {
         let count: u64 = self.records.source.number_in_line("the number of elements")?;
         self.end_text_line()?;
@@ -470,6 +512,11 @@ impl GmshFile<'_> {
                 _ => {}
             }
         }
+        self.read_corners(at, id, shape, group)
+    }
+
+    /// The nodes of an element of version 1 or 2, which ends with them.
+    fn read_corners(&mut self, at: usize, id: u64, shape: Shape, group: Group) -> Result<()> {
         let mut nodes = [0; 4];
         for corner in 0..shape.nodes {
             let node = self.records.id("a node of an element")?;

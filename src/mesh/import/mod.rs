@@ -18,6 +18,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use super::tets::TetMesh;
+use crate::reading::{self, Unread};
 use crate::{Error, Result};
 
 /// A mesh from a file and what is to be said about it.
@@ -107,17 +108,14 @@ pub fn read(path: &Path, unit: LengthUnit) -> Result<Imported> {
 /// Reads a mesh file.
 pub fn read_with(path: &Path, options: ImportOptions) -> Result<Imported> {
     let format = Format::of_name(path)?;
-    if is_endless(path) {
-        let name = path.display();
-        return Err(Error::input(format!("{name}: a device or a pipe is no mesh file"), "name the file itself"));
-    }
-    let bytes = std::fs::read(path).map_err(|source| Error::file(path, source))?;
-    parse_as(format, &path.display().to_string(), &bytes, options)
-}
-
-/// True for a device or a pipe, which may never end.
-pub(crate) fn is_endless(path: &Path) -> bool {
-    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+    let unread = |unread| match unread {
+        Unread::System(source) => Error::file(path, source),
+        refused => refused.of(path, ""),
+    };
+    let name = path.display().to_string();
+    // A large file that is something else is not read as a whole.
+    format.confirm(&name, &reading::head(path, reading::most::MESH, HEAD).map_err(unread)?)?;
+    parse_as(format, &name, &reading::bytes(path, reading::most::MESH).map_err(unread)?, options)
 }
 
 /// Reads a mesh from memory; `name` stands for the file in messages, its extension tells the format.
@@ -126,6 +124,7 @@ pub fn parse(name: &str, bytes: &[u8], options: ImportOptions) -> Result<Importe
 }
 
 fn parse_as(format: Format, name: &str, bytes: &[u8], options: ImportOptions) -> Result<Imported> {
+    let format = format.found_in(bytes);
     format.confirm(name, bytes)?;
     let raw = match format {
         Format::Gmsh => gmsh::read(name, bytes)?,
@@ -135,6 +134,9 @@ fn parse_as(format: Format, name: &str, bytes: &[u8], options: ImportOptions) ->
     };
     repair::repair(raw, options)
 }
+
+/// Bytes that tell the format of a file.
+const HEAD: u64 = 4096;
 
 /// The formats that are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -168,7 +170,8 @@ impl Format {
 
     /// The format that the extension promises.
     fn of_name(path: &Path) -> Result<Format> {
-        const READ_HERE: &str = "meshes are read from Gmsh .msh (2.2, 4.1), VTK .vtk and .vtu, and Abaqus .inp files";
+        const READ_HERE: &str =
+            "meshes are read from Gmsh .msh (1, 2.2, 4.1), VTK .vtk and .vtu, and Abaqus .inp files";
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         if let Some(format) = Format::ALL.into_iter().find(|f| f.extension() == extension) {
             return Ok(format);
@@ -189,7 +192,7 @@ impl Format {
 
     /// Whether the first bytes look like this format.
     fn looks_like(self, bytes: &[u8]) -> bool {
-        let head = &bytes[..bytes.len().min(4096)];
+        let head = &bytes[..bytes.len().min(HEAD as usize)];
         let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
         let holds = |word: &[u8]| head.windows(word.len()).any(|w| w == word);
         match self {
@@ -198,6 +201,16 @@ impl Format {
             Format::VtkXml => head.starts_with(b"<") && holds(b"<VTKFile"),
             Format::Abaqus => head.starts_with(b"*"),
         }
+    }
+
+    /// The format of the content where the extension promises the other one of VTK's two: many programs write either into `.vtk`.
+    fn found_in(self, bytes: &[u8]) -> Format {
+        let other = match self {
+            Format::VtkLegacy => Format::VtkXml,
+            Format::VtkXml => Format::VtkLegacy,
+            Format::Gmsh | Format::Abaqus => return self,
+        };
+        if other.looks_like(bytes) { other } else { self }
     }
 
     /// Refuses a file whose content is not what its extension promises.
@@ -218,7 +231,9 @@ impl Format {
         Err(Error::input(
             promised,
             match self {
-                Format::Gmsh => "a Gmsh mesh starts with $MeshFormat; .msh files of other programs must be converted",
+                Format::Gmsh => {
+                    "a Gmsh mesh starts with $MeshFormat, or $NOD in version 1; .msh files of other programs must be converted"
+                }
                 Format::VtkLegacy => "a VTK legacy file starts with `# vtk DataFile Version`; write the file again",
                 Format::VtkXml => "a .vtu file starts with <VTKFile type=\"UnstructuredGrid\">; write the file again",
                 Format::Abaqus => "an Abaqus input file starts with a keyword such as *HEADING or *NODE",

@@ -30,6 +30,16 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
     } else {
         text
     };
+    if let Some((line, count)) = crowded_tag(text) {
+        return Err(Error::input(
+            format!("{name}:{line}: a tag with {count} attributes; one of a mesh has at most {MOST_ATTRIBUTES}"),
+            WRITE_AGAIN,
+        ));
+    }
+    // Every element inherits a list of all name spaces around it.
+    if text.matches("xmlns").count() > MOST_ATTRIBUTES {
+        return Err(Error::input(format!("{name}: it declares more name spaces than any mesh has"), WRITE_AGAIN));
+    }
     // A document type could refer to other files and blow up entities; no writer of this format makes one.
     let options = ParsingOptions { allow_dtd: false, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options).map_err(|error| {
@@ -37,6 +47,45 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
     })?;
     let file = VtuFile::new(name, &document, appended)?;
     file.read()
+}
+
+/// Most attributes of a tag: arrays have ten, and readers of XML compare each with all others.
+const MOST_ATTRIBUTES: usize = 100;
+
+/// Line of the first tag with too many attributes, and how many it has.
+fn crowded_tag(text: &str) -> Option<(usize, usize)> {
+    let bytes = text.as_bytes();
+    let mut at = 0;
+    while let Some(begin) = bytes[at..].iter().position(|b| *b == b'<').map(|n| at + n) {
+        let rest = &text[begin..];
+        let skipped = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")]
+            .into_iter()
+            .find(|(open, _)| rest.starts_with(open))
+            .map(|(open, close)| rest[open.len()..].find(close).map_or(rest.len(), |n| open.len() + n + close.len()));
+        if let Some(length) = skipped {
+            at = begin + length;
+            continue;
+        }
+        let (mut count, mut quote, mut end) = (0, None, bytes.len());
+        for (n, byte) in bytes[begin..].iter().enumerate() {
+            match (quote, byte) {
+                (Some(open), byte) if open == byte => quote = None,
+                (Some(_), _) => {}
+                (None, b'"' | b'\'') => quote = Some(byte),
+                (None, b'=') => count += 1,
+                (None, b'>') => {
+                    end = begin + n + 1;
+                    break;
+                }
+                _ => {}
+            }
+        }
+        if count > MOST_ATTRIBUTES {
+            return Some((1 + bytes[..begin].iter().filter(|b| **b == b'\n').count(), count));
+        }
+        at = end;
+    }
+    None
 }
 
 /// Splits the XML from the appended data, which may be raw bytes and start behind an underscore.

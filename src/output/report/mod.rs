@@ -9,6 +9,7 @@ use super::folder::{CORE_TABLE, FORCE_TABLE, PictureMoment, SUMMARY};
 use super::parts_chart::ForceStack;
 use super::summary::Summary;
 use crate::observables::ForceParts;
+use crate::reading;
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -29,13 +30,16 @@ pub struct CaseResults {
     pub core: Option<Columns>,
 }
 
+/// Way out where a file of a run is not there.
+const NO_RESULT: &str = "make the run again, for a report with --force";
+
 /// A table of numbers by the name of its columns; an empty cell is NaN.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Columns(BTreeMap<String, Vec<f64>>);
 
 impl Columns {
     fn read(path: &Path) -> Result<Self> {
-        Self::parse(path, &std::fs::read(path).map_err(|reason| Error::file(path, reason))?)
+        Self::parse(path, &reading::bytes(path, reading::most::TABLE).map_err(|unread| unread.of(path, NO_RESULT))?)
     }
 
     /// Reads a table from the bytes of a file; `path` stands for it in messages.
@@ -93,7 +97,7 @@ impl CaseResults {
     /// Reads the folder of a run. The error tells the file and what is wrong with it.
     pub fn read(name: &str, scene: Scene, folder: &Path, finished: &str) -> Result<Self> {
         let path = folder.join(SUMMARY);
-        let text = std::fs::read_to_string(&path).map_err(|reason| Error::file(&path, reason))?;
+        let text = reading::text(&path, reading::most::OWN).map_err(|unread| unread.of(&path, NO_RESULT))?;
         let summary: Summary = serde_json::from_str(&text).map_err(|reason| broken(&path, &reason))?;
         let all: serde_json::Map<String, serde_json::Value> =
             serde_json::from_str(&text).map_err(|reason| broken(&path, &reason))?;
@@ -136,7 +140,7 @@ impl CaseResults {
     /// The stress picture at a depth [m], where the run drew one.
     pub fn picture(&self, depth: f64) -> Option<Vec<u8>> {
         let name = format!("{}.png", PictureMoment::Depth(depth).picture_stem());
-        std::fs::read(self.folder.join(name)).ok()
+        reading::bytes(&self.folder.join(name), reading::most::OWN).ok()
     }
 
     /// Largest speed of the tool [mm/s].

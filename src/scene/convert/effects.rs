@@ -21,7 +21,12 @@ impl Check<'_> {
             if !keys.contains(&key.as_str()) {
                 self.unknown_name(&format!("effects.{index}"), "effect", key, &keys);
             } else if file.effects[..index].contains(key) {
-                self.notices.push(format!("Effect `{key}` is listed twice."));
+                self.problems.report(
+                    &format!("effects.{index}"),
+                    format!("effect `{key}` is listed twice"),
+                    "it is either on or not",
+                    "remove one of the two",
+                );
             }
         }
         let listed = |key: &str| file.effects.iter().any(|listed| listed == key);
@@ -55,6 +60,16 @@ impl Check<'_> {
                 "add [needle], [sphere] or [flat_punch], or remove the effect",
             );
         }
+        for (with, key, touch) in [(is_needle, "puncture", "[needle]"), (is_indenter, "indentation", "this tool")] {
+            if listed("friction") && with && !listed(key) {
+                self.problems.report(
+                    &place("friction"),
+                    format!("effect `friction` needs `{key}`: without it {touch} does not touch the tissue"),
+                    "nothing to rub on",
+                    format!("add \"{key}\" to the list `effects`, or remove \"friction\""),
+                );
+            }
+        }
         if listed("flexible_needle") && !(is_needle && listed("puncture")) {
             self.problems.report(
                 &place("flexible_needle"),
@@ -87,10 +102,18 @@ impl Check<'_> {
             }
         }
         if is_needle && !listed("puncture") {
-            self.notices.push("The needle has no effect on the tissue: effect `puncture` is not listed.".into());
+            self.notices.push(
+                "The needle does not touch the tissue and feels nothing of it: add \"puncture\" to the list `effects`, or remove \
+                 [needle] and [motion]."
+                    .into(),
+            );
         }
         if is_indenter && !listed("indentation") {
-            self.notices.push("The tool has no effect on the tissue: effect `indentation` is not listed.".into());
+            self.notices.push(
+                "The tool does not touch the tissue and feels nothing of it: add \"indentation\" to the list `effects`, or remove \
+                 the tool and [motion]."
+                    .into(),
+            );
         }
         for (key, present) in [
             ("puncture", file.puncture.is_some()),
@@ -494,6 +517,78 @@ impl Check<'_> {
                 "turn the azimuth to 0 or 90 degrees, or remove \"cohesive\" (the path then opens by softening)",
             );
         }
+    }
+
+    /// The faces carry more before they fail than at the moment at which they fail: `cohesive::LEAST_OPENING_RATIO`. Their penalty
+    /// stiffness comes from the material of the scene and the edge of its cells [m].
+    pub(super) fn cohesive_openings(
+        &mut self,
+        file: &SceneFile,
+        material: &TissueMaterial,
+        cell: f64,
+        effects: &EffectSet,
+    ) {
+        const LEAST: f64 = effects::cohesive::LEAST_OPENING_RATIO;
+        let Some(params) = &effects.cohesive else { return };
+        let law = effects::cohesive::Law::new(params, material.law.youngs_modulus(), cell);
+        let (ratio, share) = law.least_opening_ratio();
+        if ratio >= LEAST {
+            return;
+        }
+        let table = file.cohesive.clone().unwrap_or_default();
+        let keys = [
+            ("strength_kpa", table.strength_kpa.is_some()),
+            ("energy_j_m2", table.energy_j_m2.is_some()),
+            ("shear_strength_kpa", table.shear_strength_kpa.is_some()),
+            ("shear_energy_j_m2", table.shear_energy_j_m2.is_some()),
+        ];
+        let place = match keys.iter().find(|(_, written)| *written) {
+            Some((key, _)) => format!("cohesive.{key}"),
+            None if file.cohesive.is_some() => "cohesive".into(),
+            None => format!("effects.{}", file.effects.iter().position(|key| key == "cohesive").unwrap_or(0)),
+        };
+        let (onset, end) = law.openings(share);
+        let mode = match share {
+            0.0 => "opening".to_string(),
+            1.0 => "shear".to_string(),
+            _ => format!("openings with {:.0} % of shear", 100.0 * share),
+        };
+        // A little more than needed: the numbers are rounded, and a way out must lead out.
+        let more = 1.01 * LEAST / ratio;
+        let shear = |differs: bool, key: &str, value: f64| {
+            if differs { format!(" and {key} {}", four_digits(value)) } else { String::new() }
+        };
+        let (energy, strength) = (params.energy * more, params.strength / more.sqrt());
+        let shear_energy = shear(params.shear_energy != params.energy, "shear_energy_j_m2", params.shear_energy * more);
+        let shear_strength = shear(
+            params.shear_strength != params.strength,
+            "shear_strength_kpa",
+            params.shear_strength / more.sqrt() / 1e3,
+        );
+        let penalty = match params.penalty {
+            Some(penalty) => format!("penalty_pa_m of at least {:.3e}", penalty * more),
+            None => format!("penalty_factor of at least {}", four_digits(params.penalty_factor * more)),
+        };
+        self.problems.report(
+            &place,
+            format!(
+                "REFUSED cohesion: in {mode} the faces begin to fail at {} mm (strength {} kPa over the penalty stiffness {:.3e} \
+                 Pa/m) and have failed at {} mm (twice the energy {} J/m^2 over the strength): the second must be at \
+                 least {LEAST} times the first",
+                four_digits(onset / MM),
+                four_digits(law.penalty * onset / 1e3),
+                law.penalty,
+                four_digits(end / MM),
+                four_digits(law.fracture_energy(share)),
+            ),
+            format!("they would fail at {} times the opening at which they begin to", four_digits(ratio)),
+            format!(
+                "write under [cohesive] energy_j_m2 of at least {}{shear_energy}, or strength_kpa of at most {}{shear_strength}, or \
+                 {penalty} (a shorter time step)",
+                four_digits(energy),
+                four_digits(strength / 1e3),
+            ),
+        );
     }
 
     fn adhesion(&mut self, t: &AdhesionTable) -> effects::adhesion::Params {

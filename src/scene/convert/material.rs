@@ -7,7 +7,7 @@ use super::{Check, KPA, MM, Within, library};
 use crate::material::{
     Demiray, ElasticLaw, Isochoric, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict, four_digits, ripple_growth_time,
 };
-use crate::mesh::import::is_endless;
+use crate::reading;
 
 /// Young's modulus above which a material is no soft tissue [Pa].
 const LARGEST_TISSUE_MODULUS: f64 = 10.0e6;
@@ -101,6 +101,9 @@ impl Check<'_> {
         // Stands in after a reported problem, so that the other tables are still checked; it never leaves `scene`.
         let placeholder = TissueMaterial::new("refused", "", ElasticLaw::mooney_rivlin(1.0, 1.0, 1.0), density);
         self.material_ranges(at, table);
+        // A volumetric part out of its range, such as a Poisson's ratio of 0.5, makes no law that a verdict could speak of.
+        let in_range = table.poisson_ratio.is_none_or(|nu| (0.0..0.5).contains(&nu))
+            && [table.bulk_modulus_kpa, table.d_per_mpa, table.youngs_modulus_kpa].iter().flatten().all(|x| *x > 0.0);
         let Some(name) = &table.preset else {
             if table.library.is_some() {
                 self.notices.push(format!("`{at}.library` has no effect without a preset."));
@@ -110,7 +113,9 @@ impl Check<'_> {
             let origin =
                 if constants.is_empty() { "E and nu".into() } else { constants.join(", ").replace("_kpa", "") };
             let material = TissueMaterial::new("constants", format!("{origin} of the scene file"), law, density);
-            self.verdict(at, table, &material, cell_size);
+            if in_range {
+                self.verdict(at, table, &material, cell_size);
+            }
             return (material, None);
         };
         let constant = written_constants(table).iter().find_map(|(key, value)| value.map(|_| *key));
@@ -141,7 +146,9 @@ impl Check<'_> {
         let range = preset.range.as_ref().map(|range| format!("; valid: {range}")).unwrap_or_default();
         let density = if table.density_kg_m3.is_some() { density } else { preset.density };
         let material = TissueMaterial::new(name, format!("{}{range}", preset.source), law, density);
-        self.verdict(at, table, &material, cell_size);
+        if in_range {
+            self.verdict(at, table, &material, cell_size);
+        }
         (material, Some(preset))
     }
 
@@ -157,24 +164,17 @@ impl Check<'_> {
         };
         let path = self.folder.join(library);
         let place = format!("{at}.library");
-        if is_endless(&path) {
-            self.problems.report(
-                &place,
-                format!("the material library {} is a device or a pipe", path.display()),
-                "no file",
-                "name the file itself, e.g. library = \"my_materials.toml\"",
-            );
-            return None;
-        }
-        let source = match std::fs::read_to_string(&path) {
+        let source = match reading::text(&path, reading::most::SCENE) {
             Ok(source) => source,
             Err(error) => {
                 self.problems.report(
                     &place,
                     format!("cannot read the material library {}: {error}", path.display()),
                     "not readable",
-                    "write its path relative to the scene file, e.g. library = \"my_materials.toml\", \
-                     or remove the key to use the built-in presets",
+                    error.way_out(
+                        "write its path relative to the scene file, e.g. library = \"my_materials.toml\", \
+                         or remove the key to use the built-in presets",
+                    ),
                 );
                 return None;
             }

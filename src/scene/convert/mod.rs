@@ -25,6 +25,7 @@ use super::file::*;
 use super::*;
 use crate::material::four_digits;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
+use crate::reading::{self, Unread};
 
 const MM: f64 = 1e-3;
 const KPA: f64 = 1e3;
@@ -44,8 +45,19 @@ const HIGHEST_FRAME_RATE: f64 = 1e5;
 /// Reads, checks and converts; the error is the rendered text of all problems of the first stage that finds any:
 /// document, keys, numbers, geometry, memory.
 pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, String> {
-    let source = std::fs::read_to_string(path).map_err(|error| unreadable(path, &error))?;
-    parse(path, &source, overrides)
+    let source = reading::text(path, reading::most::SCENE).map_err(|unread| match unread {
+        Unread::System(error) => unreadable(path, &error),
+        Unread::Refused { reason, way_out } => {
+            format!("error: cannot read the scene file {}: {reason}\n  = way out: {way_out}\n", path.display())
+        }
+    })?;
+    let mut scene = parse(path, &source, overrides)?;
+    if reading::is_built_in(path) {
+        let notice =
+            format!("there is no file {} here: the scene that is built into the program is used", path.display());
+        scene.notices.insert(0, notice);
+    }
+    Ok(scene)
 }
 
 /// The same with the text in memory.
@@ -72,12 +84,23 @@ fn toml_files(folder: &Path) -> Vec<String> {
 fn unreadable(path: &Path, error: &std::io::Error) -> String {
     let name = path.display();
     let named = path.parent().filter(|p| !p.as_os_str().is_empty());
-    let stem = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    // Beside the file first; a bare name may also mean one of the program's own scenes.
+    if path.is_dir() {
+        let scenes = toml_files(path);
+        let way_out = match scenes.first() {
+            Some(first) => {
+                format!("give one of its scenes, e.g. {}; there are: {}", path.join(first).display(), scenes.join(", "))
+            }
+            None => "give the path of a scene file (.toml); this folder holds none".into(),
+        };
+        return format!("error: {name} is a folder, not a scene file\n  = way out: {way_out}\n");
+    }
+    let stem = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    // Beside the file first; a bare name may also mean one of the program's own scenes. The ending that all share is no likeness.
     let folders = [named.unwrap_or(Path::new(".")), Path::new("scenes")];
     let near = folders.iter().find_map(|folder| {
         let scenes = toml_files(folder);
-        closest(&stem, scenes.iter().map(String::as_str)).map(|near| folder.join(near))
+        let stems = scenes.iter().map(|name| name.trim_end_matches(".toml"));
+        closest(&stem, stems).map(|near| folder.join(format!("{near}.toml")))
     });
     let listed = named.unwrap_or(Path::new("scenes"));
     let scenes = toml_files(listed);
@@ -164,6 +187,7 @@ impl Check<'_> {
         for (index, material) in parameters::all_materials(&material, &regions) {
             self.snap_back(file, index, material, tissue.cell_size, &effects);
         }
+        self.cohesive_openings(file, &material, tissue.cell_size, &effects);
         if mesh.is_none() {
             let open_bottom = faces[Face::ZMin as usize].fixed == [false; 3] && effects.cohesive.is_none();
             self.geometry(&tissue, tool.as_ref(), &motion, open_bottom);
@@ -194,7 +218,7 @@ impl Check<'_> {
                     .into(),
             );
         }
-        Ok(Scene {
+        let scene = Scene {
             title: file.title.clone().unwrap_or_else(|| name.replace('_', " ")),
             name,
             path: path.to_path_buf(),
@@ -212,7 +236,54 @@ impl Check<'_> {
             targets,
             task,
             notices: std::mem::take(&mut self.notices),
-        })
+        };
+        if scene.mesh.is_none() {
+            self.planes(&scene);
+            self.problems.check()?;
+        }
+        Ok(scene)
+    }
+
+    /// Every plane of [cohesive] has a grid line of its own, and leaves no cells so thin that they decide the time step.
+    fn planes(&mut self, scene: &Scene) {
+        /// Thinnest cell beside a plane, in parts of the cell size.
+        const THINNEST: f64 = 0.1;
+        let Some(cohesive) = scene.effects.cohesive.as_ref().filter(|c| !c.planes.is_empty()) else { return };
+        let grid = BlockMesh::for_scene(scene);
+        for (index, plane) in cohesive.planes.iter().enumerate() {
+            let axis = ["x", "y", "z"][plane.axis];
+            if cohesive.planes[..index].iter().any(|other| (other.axis, other.at) == (plane.axis, plane.at)) {
+                self.problems.report(
+                    &format!("cohesive.plane.{index}.at_mm"),
+                    format!("the plane {axis} = {} mm is there already", four_digits(plane.at / MM)),
+                    "the same plane",
+                    "remove one of the two",
+                );
+                continue;
+            }
+            let lines = &grid.lines[plane.axis];
+            let doubled = lines.iter().filter(|line| **line == plane.at).count() == 2 && lines.is_sorted();
+            let gap = |line: &f64| Some((line - plane.at).abs()).filter(|gap| *gap > 0.0);
+            let thinnest = lines.iter().filter_map(gap).fold(f64::INFINITY, f64::min);
+            if doubled && thinnest >= THINNEST * scene.tissue.cell_size {
+                continue;
+            }
+            self.problems.report(
+                &format!("cohesive.plane.{index}.at_mm"),
+                format!(
+                    "the plane {axis} = {} mm lies {} mm from another plane, slit or face, too close for cells of {} mm",
+                    four_digits(plane.at / MM),
+                    four_digits(thinnest / MM),
+                    four_digits(scene.tissue.cell_size / MM)
+                ),
+                "no grid line of its own",
+                format!(
+                    "move it to at least {} mm from the others and from the faces, write a smaller tissue.cell_size_mm, or remove \
+                     one of two planes that mean the same",
+                    four_digits(scene.tissue.cell_size / MM)
+                ),
+            );
+        }
     }
 
     /// Reports a number outside its range and returns it unchanged.

@@ -49,7 +49,17 @@ impl Check<'_> {
                 }
                 None => {
                     let names: Vec<&str> = presets::needles().iter().map(|p| p.gauge.as_str()).collect();
-                    self.unknown_name("needle.gauge", "needle gauge", gauge, &names);
+                    let meant = format!("{gauge}G");
+                    if names.contains(&meant.as_str()) {
+                        self.problems.report(
+                            "needle.gauge",
+                            format!("a gauge is a text that ends in G, and {gauge} is not"),
+                            "a number",
+                            format!("did you mean \"{meant}\"? There are: {}", names.join(", ")),
+                        );
+                    } else {
+                        self.unknown_name("needle.gauge", "needle gauge", gauge, &names);
+                    }
                 }
             },
             (None, Some(outer)) => {

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::CpuEngine;
-use crate::effects::puncture::advance_limit;
+use crate::effects::puncture::{advance_limit, share_beyond};
 use crate::material::kinematics::cofactor;
 use crate::mesh::BlockMesh;
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
@@ -127,6 +127,8 @@ impl CpuEngine {
         let before = tip_springs(mesh, u, radius, &tip, pose);
         let force: f64 = before.anchors.iter().map(|a| spring * a.0.max(0.0)).sum();
         let mut moved = false;
+        // Threshold [N] where the cap on the advance holds the force above it.
+        let mut capped = f64::INFINITY;
         if tip.inside {
             let f = before.gradient;
             let direction = tip.along;
@@ -159,6 +161,9 @@ impl CpuEngine {
             let cap = advance_limit(tip.coordinate == 0.0, travel);
             let slip_cap = 4.0 * travel + SLIP_CAP;
             let advance = ((force - threshold) / (p.tip_stiffness * stretch)).clamp(0.0, cap);
+            if advance == cap {
+                capped = threshold;
+            }
             let retreat = ((-SLACK - before.mean_gap) / stretch).clamp(0.0, slip_cap);
             let sway = before.sway.length();
             let held = threshold.min(force) / p.tip_stiffness;
@@ -199,7 +204,10 @@ impl CpuEngine {
         if moved {
             let pairs = before.anchors.iter().zip(&after.anchors);
             let lost: f64 = pairs.map(|(b, a)| on * spring * a.0.max(0.0) * (b.0.max(0.0) - a.0.max(0.0))).sum();
-            self.sums.tip_dissipation += lost + p.tip_stiffness * sway.dot(before.sway - sway);
+            let force = after.anchors.iter().map(|a| on * spring * a.0.max(0.0)).sum();
+            let beyond = lost * share_beyond(force, capped);
+            self.sums.cap_dissipation += beyond;
+            self.sums.tip_dissipation += lost - beyond + p.tip_stiffness * sway.dot(before.sway - sway);
         }
         self.tip_sway = sway * spring;
         self.tip_energy = 0.5 * p.tip_stiffness * sway.length_squared()

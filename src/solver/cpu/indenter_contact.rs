@@ -1,70 +1,117 @@
 //! Stage `indenter_contact` in f64. Equations: src/effects/indentation.rs.
 
+use glam::DVec3;
+
 use super::{ContactSums, CpuEngine};
+use crate::effects::indentation::{Plan, penetration};
+use crate::model::{ContactNode, Model};
 use crate::needle::ToolPose;
+use crate::needle::slit::{POINTS, weights};
 use crate::scene::Tool;
-use crate::solver::engine::ContactState;
+use crate::solver::engine::{ContactState, State};
 
 impl CpuEngine {
     /// Stage `indenter_contact`: penalty contact of the top face with a sphere or a flat punch.
     pub(super) fn indenter_contact(&mut self, pose: &ToolPose) {
         let model = self.model.clone();
-        let (Some(params), Some(tool)) = (model.effects.indentation, &model.scene.tool) else { return };
-        let k = model.tool_contact_stiffness();
+        let (Some(plan), Some(tool)) = (&model.indentation, &model.scene.tool) else { return };
+        let bonded = matches!(tool, Tool::FlatPunch { bonded: true, .. });
+        let dt = self.dt;
         let mut stored = 0.0;
-        for (contact, memory) in model.contact_nodes.iter().zip(&mut self.state.contact) {
+        let State { contact: memories, displacement, velocity, .. } = &mut self.state;
+        for (contact, memory) in model.contact_nodes.iter().zip(memories) {
             let node = contact.node as usize;
-            let x = model.mesh.rest_position(node) + self.state.displacement[node];
-            let (depth, n, bonded) = match *tool {
-                Tool::Sphere { radius } => {
-                    let centre = pose.tip - pose.direction * radius;
-                    let to = x - centre;
-                    let length = to.length();
-                    (radius - length, to / length, false)
-                }
-                Tool::FlatPunch { radius, bonded } => {
-                    let s = (pose.tip - x).dot(pose.direction);
-                    let inside = contact.rest_radius <= radius;
-                    (if inside { s } else { -1.0 }, pose.direction, bonded)
-                }
-                Tool::Needle(_) => return,
-            };
-            let v = self.state.velocity[node] - pose.velocity;
-            let vn = v.dot(n);
-            let damping = 2.0 * params.contact_damping * (k * model.node_mass[node]).sqrt();
+            let x = model.mesh.rest_position(node) + displacement[node];
+            let v = velocity[node] - pose.velocity;
+            let k = plan.face_stiffness * contact.share;
+            self.added_bound[node] += plan.stiffness_bound(contact.share);
             let mut sums = ContactSums::default();
-            if bonded && (memory.touching || depth > 0.0) {
-                memory.touching = true;
-                memory.stick += (v - n * vn) * self.dt;
-                sums.normal = n * (k * depth) - v * damping - memory.stick * k;
-                sums.damping_power = damping * v.length_squared();
-                sums.stored = 0.5 * k * (depth * depth + memory.stick.length_squared());
-            } else if depth > 0.0 {
-                memory.touching = true;
-                let normal = (k * depth - damping * vn).max(0.0);
-                sums.normal = n * normal;
-                sums.damping_power = (k * depth - normal) * vn;
-                sums.stored = 0.5 * k * depth * depth;
-                if let Some(friction) = model.effects.friction {
-                    let kt = friction.stiffness_ratio * k;
-                    let trial = memory.stick + (v - n * vn) * self.dt;
-                    let trial = trial - n * trial.dot(n);
-                    let length = trial.length();
-                    let allowed = friction.coefficient * normal / kt;
-                    memory.stick = if length > allowed { trial * (allowed / length) } else { trial };
-                    sums.friction = memory.stick * -kt;
-                    sums.friction_work = kt * memory.stick.dot(trial - memory.stick);
-                    sums.stored += 0.5 * kt * memory.stick.length_squared();
+            if bonded {
+                let Some((depth, n)) = penetration(tool, x - pose.tip, pose.direction, contact.rest_radius) else {
+                    return;
+                };
+                memory.touching |= depth > 0.0;
+                if memory.touching {
+                    let damping = plan.face_damping * k;
+                    memory.stick += (v - n * v.dot(n)) * dt;
+                    sums.normal = n * (k * depth) - v * damping - memory.stick * k;
+                    sums.damping_power = damping * v.length_squared();
+                    sums.stored = 0.5 * k * (depth * depth + memory.stick.length_squared());
                 }
+                sums.torque = (x - pose.tip).cross(sums.normal);
             } else {
-                *memory = ContactState::default();
+                let pressing = press_at_points(&model, plan, tool, pose, contact, displacement, velocity, &mut sums);
+                if pressing > 0.0 {
+                    memory.touching = true;
+                    if let Some(friction) = model.effects.friction {
+                        let n = sums.normal.normalize_or_zero();
+                        let kt = friction.stiffness_ratio * k;
+                        let trial = memory.stick + (v - n * v.dot(n)) * dt;
+                        let trial = trial - n * trial.dot(n);
+                        let length = trial.length();
+                        let allowed = friction.coefficient * pressing / kt;
+                        memory.stick = if length > allowed { trial * (allowed / length) } else { trial };
+                        sums.friction = memory.stick * -kt;
+                        sums.friction_work = kt * memory.stick.dot(trial - memory.stick);
+                        sums.stored += 0.5 * kt * memory.stick.length_squared();
+                    }
+                } else if memory.touching {
+                    // What its springs held goes with the contact.
+                    sums.released = memory.stored;
+                    *memory = ContactState::default();
+                }
+                sums.torque += (x - pose.tip).cross(sums.friction);
             }
-            let total = sums.normal + sums.friction;
-            sums.torque = (x - pose.tip).cross(total);
-            self.external[node] += total;
+            memory.stored = sums.stored;
+            self.external[node] += sums.normal + sums.friction;
             stored += sums.stored;
-            self.sums.book(&sums, pose, self.dt);
+            self.sums.book(&sums, pose, dt);
         }
         self.contact_energy = stored;
     }
+}
+
+/// Adds what falls on a node of the points of all faces around it; the sum of the normal forces [N], each with its weight.
+#[allow(clippy::too_many_arguments)]
+fn press_at_points(
+    model: &Model,
+    plan: &Plan,
+    tool: &Tool,
+    pose: &ToolPose,
+    contact: &ContactNode,
+    displacement: &[DVec3],
+    velocity: &[DVec3],
+    sums: &mut ContactSums,
+) -> f64 {
+    let Some(faces) = &contact.faces else { return 0.0 };
+    let mut pressing = 0.0;
+    for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+        if faces.present & (1 << (i + 2 * j)) == 0 {
+            continue;
+        }
+        let others = faces.corners(i, j).map(|c| &model.contact_nodes[c as usize]);
+        let nodes = [contact, others[0], others[1], others[2]].map(|c| c.node as usize);
+        let rest = nodes.map(|n| model.mesh.rest_position(n));
+        let area = (rest[1] - rest[0]).cross(rest[2] - rest[0]).length();
+        let k = plan.face_stiffness * area / (POINTS * POINTS) as f64;
+        for (a, b) in (0..POINTS).flat_map(|a| (0..POINTS).map(move |b| (a, b))) {
+            let w = weights(a, b);
+            let at = |values: [DVec3; 4]| (0..4).map(|c| values[c] * w[c]).sum::<DVec3>();
+            let lever = at(std::array::from_fn(|c| rest[c] + displacement[nodes[c]] - pose.tip));
+            let rest_radius = (at(rest) - model.scene.motion.entry).truncate().length();
+            let Some((depth, n)) = penetration(tool, lever, pose.direction, rest_radius).filter(|p| p.0 > 0.0) else {
+                continue;
+            };
+            let vn = (at(nodes.map(|n| velocity[n])) - pose.velocity).dot(n);
+            let elastic = k * depth;
+            let normal = (elastic - plan.face_damping * k * vn).max(0.0);
+            let force = n * (w[0] * normal);
+            pressing += w[0] * normal;
+            sums.normal += force;
+            sums.torque += lever.cross(force);
+            sums.stored += w[0] * 0.5 * k * depth * depth;
+            sums.damping_power += w[0] * (elastic - normal) * vn;
+        }
+    }
+    pressing
 }

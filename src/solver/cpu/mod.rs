@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::checkpoint::{EngineImage, foreign_image};
 use super::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
-use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput};
+use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput, WATCHED_STEP_RATIO};
 use crate::effects::adhesion::Bond;
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
@@ -39,6 +39,20 @@ struct ContactSums {
     friction_work: f64,
     damping_power: f64,
     stored: f64,
+    /// Held by the springs of a contact that has ended [J].
+    released: f64,
+}
+
+/// Sums of one node over one step: energies [J], counts and the ratio of [`FrameSums::step_ratio`].
+#[derive(Debug, Clone, Copy, Default)]
+struct NodeSums {
+    damping: f64,
+    work: f64,
+    raised_energy: f64,
+    clamped_energy: f64,
+    clamped: u32,
+    raised: u32,
+    step_ratio: f64,
 }
 
 /// The f64 engine.
@@ -123,6 +137,32 @@ impl CpuEngine {
 
     /// One step: the list of stages.
     fn step(&mut self, input: &StepInput) {
+        self.forces(input);
+        self.integrate_nodes(input);
+    }
+
+    /// Force [N] and stiffness bound [N/m] of every node at the present state, as a step with this input would find them; tied
+    /// copies have those of all of them. Nothing changes: a look at one step, for tests and bisecting.
+    pub fn forces_and_bounds(&mut self, input: &StepInput) -> (Vec<DVec3>, Vec<f64>) {
+        let kept = (self.state.clone(), self.sums.clone());
+        self.forces(input);
+        let nodes = 0..self.model.mesh.node_count();
+        let at = |node: usize| {
+            let (force, bound) = self.elements.gather(&self.model.mesh, &self.cells, node);
+            (force + self.external[node], bound + self.added_bound[node])
+        };
+        let (mut forces, mut bounds): (Vec<DVec3>, Vec<f64>) = nodes.map(at).unzip();
+        for tie in &self.model.separation.ties {
+            let copies = || tie.iter().map(|n| *n as usize);
+            let sum = (copies().map(|n| forces[n]).sum::<DVec3>(), copies().map(|n| bounds[n]).sum::<f64>());
+            copies().for_each(|n| (forces[n], bounds[n]) = sum);
+        }
+        (self.state, self.sums) = kept;
+        (forces, bounds)
+    }
+
+    /// All stages but the last: forces and stiffness bounds.
+    fn forces(&mut self, input: &StepInput) {
         let model = self.model.clone();
         self.external.fill(DVec3::ZERO);
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
@@ -146,7 +186,6 @@ impl CpuEngine {
         if let (Some(_), Some(pose)) = (model.effects.indentation, input.pose) {
             self.indenter_contact(&pose);
         }
-        self.integrate_nodes(input);
     }
 
     /// Stage `element_forces`; tetrahedra get their averaged pressure first.
@@ -191,7 +230,7 @@ impl CpuEngine {
         let gravity = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling());
         let (cells, elements) = (&self.cells, &self.elements);
         let (external, added_bound) = (&self.external, &self.added_bound);
-        let nodes: Vec<(f64, f64, u32, u32)> = self
+        let nodes: Vec<NodeSums> = self
             .state
             .displacement
             .par_iter_mut()
@@ -213,15 +252,17 @@ impl CpuEngine {
                 }
                 force += load;
                 let share = if copies.len() > 1 { model.node_mass[node] / scaled } else { 1.0 };
+                let mut sums = NodeSums::default();
                 let mut mass = scaled;
-                let mut raised = 0;
                 if selective {
                     let needed = bound * dt * dt / (4.0 * 0.81);
                     if needed > scaled {
                         mass = needed.min(100.0 * scaled);
-                        raised = 1;
+                        sums.raised = 1;
                     }
                 }
+                let ratio = bound * dt * dt / (4.0 * mass);
+                sums.step_ratio = if ratio > WATCHED_STEP_RATIO { ratio } else { 0.0 };
                 let old = *v;
                 let mut new = (old * (1.0 - 0.5 * alpha * dt) + force * (dt / mass)) / (1.0 + 0.5 * alpha * dt);
                 // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
@@ -232,10 +273,11 @@ impl CpuEngine {
                     }
                 }
                 let speed = new.length();
-                let mut clamped = 0;
+                let mut stopped = DVec3::ZERO;
                 if speed > limit {
-                    new *= limit / speed;
-                    clamped = 1;
+                    stopped = new * (1.0 - limit / speed);
+                    new -= stopped;
+                    sums.clamped = 1;
                 }
                 let mut free_mid = 0.5 * (old + new);
                 let mut work = 0.0;
@@ -254,17 +296,28 @@ impl CpuEngine {
                 }
                 let mid = 0.5 * (old + new);
                 work += load.dot(mid) * dt;
+                sums.damping = share * alpha * mass * free_mid.length_squared() * dt;
+                sums.work = share * work;
+                // The kinetic energy is told with the mass at rest: what the rest of the mass gained in this step is gone.
+                sums.raised_energy = share * 0.5 * (mass - scaled) * (new.length_squared() - old.length_squared());
+                // Work of the force that holds the node back, `m (1 + alpha dt/2) / dt` times what it took of the velocity.
+                sums.clamped_energy = share * mass * (1.0 + 0.5 * alpha * dt) * stopped.dot(free_mid);
                 *v = new;
                 *u += new * dt;
-                (share * alpha * mass * free_mid.length_squared() * dt, share * work, clamped, raised)
+                sums
             })
             .collect();
         // In the order of the nodes: sums of threads that come as they come would differ in their last bits from run to run.
-        let result = nodes.iter().fold((0.0, 0.0, 0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2, a.3 + b.3));
-        self.sums.damping_dissipation += result.0;
-        self.sums.load_work += result.1;
-        self.sums.clamped_nodes += result.2;
-        self.sums.raised_mass += result.3;
+        let sums = &mut self.sums;
+        for node in &nodes {
+            sums.damping_dissipation += node.damping;
+            sums.load_work += node.work;
+            sums.raised_mass_energy += node.raised_energy;
+            sums.speed_limit_energy += node.clamped_energy;
+            sums.clamped_nodes += node.clamped;
+            sums.raised_mass += node.raised;
+            sums.step_ratio = sums.step_ratio.max(node.step_ratio);
+        }
     }
 
     /// Dissipated by plastic flow and by damage since t = 0 [J].
@@ -305,7 +358,9 @@ impl CpuEngine {
         sums.damage_dissipation = dissipated.1 - self.booked.1;
         self.booked = dissipated;
         if model.has_driven_faces() {
-            sums.reactions = face_reactions(model, &elements.nodal_forces(&model.mesh, &self.cells));
+            let forces = elements.nodal_forces(&model.mesh, &self.cells);
+            sums.reactions = face_reactions(model, &forces);
+            sums.face_moments = face_moments(model, &forces, &self.state.displacement);
         }
         let torn = state.pairs.iter().zip(&model.separation.pairs).map(|(d, p)| d * p.area);
         sums.torn_area = torn.sum();
@@ -329,7 +384,7 @@ impl FrameSums {
         self.angular_impulse += c.torque * dt;
         self.tool_work += (total.dot(pose.velocity) + c.torque.dot(pose.angular_velocity)) * dt;
         self.friction_dissipation += c.friction_work;
-        self.contact_dissipation += c.damping_power * dt;
+        self.contact_dissipation += c.damping_power * dt + c.released;
     }
 }
 
@@ -365,6 +420,20 @@ pub fn face_reactions(model: &Model, internal_force: &[DVec3]) -> [DVec3; 6] {
     reactions
 }
 
+/// Moment of the same about the axis along the normal of each face through the centre of the tissue at rest [N m].
+pub fn face_moments(model: &Model, internal_force: &[DVec3], displacement: &[DVec3]) -> [f64; 6] {
+    let mut moments = [0.0; 6];
+    for (node, (force, u)) in internal_force.iter().zip(displacement).enumerate() {
+        for face in Face::ALL {
+            if model.lies_on(node, face) {
+                let arm = model.mesh.rest_position(node) + *u - model.face_centre(face);
+                moments[face as usize] += arm.cross(*force)[face.axis()];
+            }
+        }
+    }
+    moments
+}
+
 impl Engine for CpuEngine {
     fn info(&self) -> &EngineInfo {
         &self.info
@@ -374,6 +443,9 @@ impl Engine for CpuEngine {
         self.sums = FrameSums { frame: plan.frame, steps: plan.steps.len() as u32, ..Default::default() };
         self.centre_line = plan.centre_line;
         for input in &plan.steps {
+            if crate::ending::is_overdue() {
+                return Err(Error::Ended(crate::ending::reason()));
+            }
             self.step(input);
         }
         if let Some(pose) = plan.steps.last().and_then(|s| s.pose) {

@@ -96,6 +96,8 @@ impl CpuEngine {
                 let v = velocity[node] - pose.velocity - bend.rate;
                 grip = Some((n, v, coefficient * force.rubbing, plan.face_stiffness() * contact.share));
             } else if !touches {
+                // What the springs of a contact held goes with it.
+                sums.released = memory.stored;
                 *memory =
                     ContactState { rest_radius: memory.rest_radius, passed: memory.passed, ..ContactState::default() };
             } else {
@@ -160,6 +162,7 @@ impl CpuEngine {
                 sums.friction_work = kt * memory.stick.dot(trial - memory.stick);
                 sums.stored += 0.5 * kt * memory.stick.length_squared();
             }
+            memory.stored = sums.stored;
             let total = sums.tip + sums.normal + sums.friction;
             sums.torque += relative.cross(sums.tip + sums.friction);
             bend_power += sums.friction.dot(bend.rate);
@@ -218,7 +221,8 @@ fn free_contact(
     let passes = tip.coordinate > 0.0 && ahead <= 0.0 && ahead > -ring && radius < ring;
     let passed = tip.inside && s > -PASSED_MARGIN && (memory.passed || passes);
     if passed != memory.passed {
-        *memory = ContactState { passed, rest_radius: if passed { radius } else { 0.0 }, ..ContactState::default() };
+        let rest_radius = if passed { radius } else { 0.0 };
+        *memory = ContactState { passed, rest_radius, stored: memory.stored, ..ContactState::default() };
     }
     let needle = plan.profile;
     // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.

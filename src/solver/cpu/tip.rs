@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::CpuEngine;
 use crate::effects::adhesion::{self, Bond};
-use crate::effects::puncture::advance_limit;
+use crate::effects::puncture::{self, advance_limit};
 use crate::mesh::BlockMesh;
 use crate::model::PuncturePlan;
 use crate::needle::ToolPose;
@@ -88,8 +88,11 @@ impl CpuEngine {
             anchors = place(&self.state.displacement, a + advance);
             // Force after the advance times the loss of stretch: with the force of the next step this closes the
             // trapezoidal rule of the leapfrog work; the loss of spring energy would count half a step twice.
-            let lost = before.iter().zip(&anchors).map(|(b, p)| spring * p.gap * (b.gap - p.gap));
-            self.sums.tip_dissipation += lost.sum::<f64>();
+            let lost: f64 = before.iter().zip(&anchors).map(|(b, p)| spring * p.gap * (b.gap - p.gap)).sum();
+            let force = anchors.iter().map(|p| spring * p.gap).sum();
+            let beyond = if advance == cap { puncture::share_beyond(force, threshold) } else { 0.0 };
+            self.sums.tip_dissipation += lost * (1.0 - beyond);
+            self.sums.cap_dissipation += lost * beyond;
         }
         self.state.bond.gap = mean_distance(&anchors);
         let bond_energy = model.effects.adhesion.map_or(0.0, |p| 0.5 * p.stiffness * self.state.bond.stretch.powi(2));

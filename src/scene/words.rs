@@ -1,0 +1,77 @@
+//! The words that a scene may choose from, for the JSON schema: taken from the tables that the program itself looks them up in.
+
+use std::fmt;
+
+use schemars::{Schema, SchemaGenerator, json_schema};
+use serde::de::{Deserializer, Error, Visitor};
+use serde_json::json;
+
+use super::presets;
+use crate::effects::EFFECTS;
+use crate::mesh::import::LengthUnit;
+
+/// A text that is one of `words`.
+fn one_of<'a>(words: impl Iterator<Item = &'a str>) -> Schema {
+    json_schema!({ "type": "string", "enum": words.collect::<Vec<&str>>() })
+}
+
+/// The list of effects: each at most once.
+pub fn effects(_: &mut SchemaGenerator) -> Schema {
+    let key = one_of(EFFECTS.iter().map(|effect| effect.key));
+    json_schema!({ "type": "array", "items": key, "uniqueItems": true })
+}
+
+/// Gauges of the needle library.
+pub fn gauges(_: &mut SchemaGenerator) -> Schema {
+    one_of(presets::needles().iter().map(|needle| needle.gauge.as_str()))
+}
+
+/// Names of the needle materials.
+pub fn needle_materials(_: &mut SchemaGenerator) -> Schema {
+    one_of(presets::needle_materials().iter().map(|material| material.name.as_str()))
+}
+
+/// Units of length of a mesh file.
+pub fn units(_: &mut SchemaGenerator) -> Schema {
+    one_of(LengthUnit::ALL.into_iter().map(LengthUnit::symbol))
+}
+
+/// Axes of a plane.
+pub fn axes(_: &mut SchemaGenerator) -> Schema {
+    one_of(["x", "y", "z"].into_iter())
+}
+
+/// Without a library of its own a material knows the built-in presets alone.
+pub fn known_presets(material: &mut Schema) {
+    let names: Vec<&str> = presets::tissues().iter().map(|preset| preset.name.as_str()).collect();
+    material.insert("if".into(), json!({ "not": { "required": ["library"] } }));
+    material.insert("then".into(), json!({ "properties": { "preset": { "enum": names } } }));
+}
+
+/// Reads a gauge; a bare number is kept as its digits, so that the refusal can name the gauge that is meant.
+///
+/// # Errors
+/// Anything but a text or a number.
+pub fn gauge<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    struct Gauge;
+    impl Visitor<'_> for Gauge {
+        type Value = String;
+
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a gauge in quotes like \"16G\"")
+        }
+
+        fn visit_str<E: Error>(self, text: &str) -> Result<String, E> {
+            Ok(text.into())
+        }
+
+        fn visit_i64<E: Error>(self, number: i64) -> Result<String, E> {
+            Ok(number.to_string())
+        }
+
+        fn visit_f64<E: Error>(self, number: f64) -> Result<String, E> {
+            Ok(number.to_string())
+        }
+    }
+    deserializer.deserialize_any(Gauge).map(Some)
+}

@@ -1,0 +1,534 @@
+//! The one verdict on a run, by one table of bounds: `ok`, `doubtful` or `stopped`.
+//!
+//! After every frame the [`Judge`] compares what the frame tells with [`BOUNDS`]. A quantity beyond its first bound makes the
+//! run doubtful, with the frame and the place where it began; beyond its second bound, for as many frames on end as the table
+//! says, the run is stopped. Summary, score, study, window and reports take the verdict from the last [`FrameRecord`] and
+//! judge nothing themselves.
+//!
+//! The energy imbalance is what nobody can explain: external work less all parts of the account
+//! ([`crate::observables::EnergyAccount::PARTS`]), which include what raised masses and the speed limit took. It is divided by
+//! the largest work so far, at least by a floor: the energy of a strain of 1e-4 in the whole tissue, below which a
+//! balance compares rounding with rounding, the work of 200 steps at the rate of the frame, and 100 times its kinetic energy:
+//! the leapfrog has velocities half a step before displacements, so that its account is known to half a step. What is lost
+//! stays lost, and shows once the motion is over. What stops a run is measured by the work alone.
+
+use serde::{Deserialize, Serialize};
+
+use crate::observables::FrameRecord;
+
+/// Strain whose energy in the whole tissue is the floor of the imbalance.
+pub const FLOOR_STRAIN: f64 = 1e-4;
+
+/// What an account is measured by at least, since it is known to half a step only: steps of a frame with its rate of work, and times its
+/// kinetic energy. Motions near the limit of the step swing between kinetic and stored energy within a few steps.
+pub const FLOOR_STEPS: f64 = 200.0;
+pub const FLOOR_KINETIC: f64 = 100.0;
+
+/// What a run is judged by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    EnergyImbalance,
+    CuredEnergy,
+    ClampedShare,
+    RaisedShare,
+    InvertedCells,
+    HourglassShare,
+    InertiaShare,
+    ClippedReturns,
+    UnbalancedNeedle,
+    NotFinite,
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct Bound {
+    pub quantity: Quantity,
+    /// Name in files.
+    pub key: &'static str,
+    /// What it is, in words that complete "... is x %".
+    pub text: &'static str,
+    /// Largest value of a run that is ok.
+    pub ok: f64,
+    /// Value beyond which the run is stopped, and for how many frames on end.
+    pub stop: Option<(f64, u32)>,
+    /// Shown in percent; else as a number.
+    pub percent: bool,
+    /// Why this bound.
+    pub reason: &'static str,
+}
+
+/// The bounds, in the order in which they are told.
+pub const BOUNDS: [Bound; 10] = [
+    Bound {
+        quantity: Quantity::NotFinite,
+        key: "not_finite",
+        text: "a displacement or velocity is NaN or out of the range of the engine",
+        ok: 0.0,
+        stop: Some((0.0, 1)),
+        percent: false,
+        reason: "nothing that follows means anything",
+    },
+    Bound {
+        quantity: Quantity::EnergyImbalance,
+        key: "energy_imbalance",
+        text: "energy lost or created without a cause, over the largest external work so far",
+        ok: 0.02,
+        stop: Some((0.2, 10)),
+        percent: true,
+        reason: "forces are no better than the energy that they move",
+    },
+    Bound {
+        quantity: Quantity::CuredEnergy,
+        key: "cured_energy",
+        text: "energy taken by raised masses and the speed limit, over the largest external work so far",
+        ok: 0.05,
+        stop: Some((0.5, 10)),
+        percent: true,
+        reason: "a cure may take a little of the work; where it takes much, the tissue does not answer with its own inertia",
+    },
+    Bound {
+        quantity: Quantity::ClampedShare,
+        key: "clamped_share",
+        text: "node steps of a frame that ran into the speed limit",
+        ok: 5e-3,
+        stop: Some((0.05, 1)),
+        percent: true,
+        reason: "an unstable step clamps nearly all nodes and would go on for ever",
+    },
+    Bound {
+        quantity: Quantity::RaisedShare,
+        key: "raised_mass_share",
+        text: "node steps so far whose mass was raised to keep the step stable",
+        ok: 0.3,
+        stop: None,
+        percent: true,
+        reason: "inertia is not what mass_scaling says",
+    },
+    Bound {
+        quantity: Quantity::InvertedCells,
+        key: "inverted_cells",
+        text: "cells that are inside out at the end of the run, of all cells",
+        ok: 0.01,
+        stop: Some((0.05, 10)),
+        percent: true,
+        reason: "stress means nothing there; a few soft cells on the path of a tip do no harm; it stops where they do not get fewer",
+    },
+    Bound {
+        quantity: Quantity::HourglassShare,
+        key: "hourglass_share",
+        text: "hourglass over internal energy, sums over all frames so far",
+        ok: 0.25,
+        stop: None,
+        percent: true,
+        reason: "a tip that is as thin as a cell always bends it; beyond a quarter cells answer with their stabilisation",
+    },
+    Bound {
+        quantity: Quantity::InertiaShare,
+        key: "inertia_share",
+        text: "kinetic energy of the mass that mass_scaling added, over internal energy, sums over all frames so far",
+        ok: 0.2,
+        stop: None,
+        percent: true,
+        reason: "mass scaling shows in the force",
+    },
+    Bound {
+        quantity: Quantity::ClippedReturns,
+        key: "clipped_returns",
+        text: "cell steps so far whose return mapping missed the yield condition",
+        ok: 1e-5,
+        stop: Some((1e-3, 1)),
+        percent: true,
+        reason: "stress and dissipation are wrong there",
+    },
+    Bound {
+        quantity: Quantity::UnbalancedNeedle,
+        key: "unbalanced_needle",
+        text: "frames so far in which the flexible needle did not find its balance",
+        ok: 0.01,
+        stop: None,
+        percent: true,
+        reason: "its shape there is the best one found, not the right one",
+    },
+];
+
+impl Quantity {
+    /// Its row of the table.
+    pub fn bound(self) -> &'static Bound {
+        BOUNDS.iter().find(|b| b.quantity == self).expect("every quantity has a row")
+    }
+
+    /// True for what is judged by its value at the end of the run: inverted cells, and shares of all frames so far.
+    pub fn is_of_the_end(self) -> bool {
+        use Quantity::*;
+        matches!(self, RaisedShare | InvertedCells | HourglassShare | InertiaShare | ClippedReturns | UnbalancedNeedle)
+    }
+}
+
+impl Bound {
+    /// A value of this quantity in words.
+    pub fn show(&self, value: f64) -> String {
+        match self.percent {
+            true => format!("{} %", crate::material::four_digits(100.0 * value)),
+            false => format!("{value}"),
+        }
+    }
+}
+
+/// Something that makes a run doubtful.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Doubt {
+    pub quantity: Quantity,
+    /// Largest value so far (at the end, where [`Quantity::is_of_the_end`]), and the bound that it left.
+    pub value: f64,
+    pub bound: f64,
+    /// Frame and time [s] at which it began.
+    pub frame: u64,
+    pub time_s: f64,
+    /// Where: the fastest node or the worst cell when it began.
+    pub place: Option<String>,
+}
+
+impl Doubt {
+    /// As one sentence.
+    pub fn sentence(&self) -> String {
+        let row = self.quantity.bound();
+        let place = self.place.as_ref().map_or(String::new(), |p| format!("; {p}"));
+        format!(
+            "{}: {} (at most {}), from frame {} at {:.4} s{place}",
+            row.text,
+            row.show(self.value),
+            row.show(self.bound),
+            self.frame,
+            self.time_s
+        )
+    }
+}
+
+/// The verdict on a run so far: ok without doubts. Runs that are stopped end with an error that says why.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Verdict {
+    /// In the order of the table.
+    pub doubts: Vec<Doubt>,
+    /// Largest imbalance so far, over the work then or the floor.
+    pub worst_imbalance: f64,
+}
+
+impl Verdict {
+    pub fn is_ok(&self) -> bool {
+        self.doubts.is_empty()
+    }
+
+    /// All doubts in one line; `None` where there are none.
+    pub fn sentence(&self) -> Option<String> {
+        (!self.is_ok()).then(|| self.doubts.iter().map(Doubt::sentence).collect::<Vec<_>>().join("; "))
+    }
+}
+
+/// The table as `stylet run --explain` prints it.
+pub fn explain() -> String {
+    let mut text = String::from(
+        "Every run ends as ok, doubtful or stopped. A doubtful run exits with 0 (--strict: with 3) and is neither scored nor taken as a \
+         reference; a stopped run exits with 3 and leaves forensics.\n\n",
+    );
+    for bound in BOUNDS {
+        let stop = match bound.stop {
+            Some((0.0, _)) => "stops at once".to_string(),
+            Some((value, 1)) => {
+                format!("stops beyond {}", crate::material::four_digits(100.0 * value).to_string() + " %")
+            }
+            Some((value, frames)) => {
+                format!("stops beyond {} % in {frames} frames on end", crate::material::four_digits(100.0 * value))
+            }
+            None => "never stops".into(),
+        };
+        let ok = match bound.stop {
+            Some((0.0, _)) => "-".into(),
+            _ => bound.show(bound.ok),
+        };
+        text += &format!("{:<18} ok up to {ok:<7} {stop}\n    {}\n    {}\n", bound.key, bound.text, bound.reason);
+    }
+    text += &format!(
+        "\nThe imbalance is measured against the largest external work so far, at least against the energy of a strain of {FLOOR_STRAIN:e} in \
+         the whole tissue , the work of {FLOOR_STEPS} steps at the rate of the frame and {FLOOR_KINETIC} times its kinetic energy. Energy that was created beyond half of the work stops a run after {PATIENCE} frames.\n"
+    );
+    text
+}
+
+/// Energy that was created, over what was put in, beyond which a run stops after [`PATIENCE`] frames: it grows exponentially.
+pub const CREATED_PART: f64 = 0.5;
+pub const PATIENCE: u32 = 3;
+
+/// What stops a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trouble {
+    pub quantity: Quantity,
+    pub value: f64,
+    /// Bound that it left, and for how many frames.
+    pub bound: f64,
+    pub frames: u32,
+    /// Energy that is missing (negative: that was created) and the work that it is measured by [J]; of an imbalance only.
+    pub energy: Option<(f64, f64)>,
+}
+
+/// What a run is measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Sizes {
+    pub nodes: usize,
+    pub cells: usize,
+    /// Floor of the imbalance [J].
+    pub floor: f64,
+    /// Uniform mass scaling S.
+    pub mass_scaling: f64,
+}
+
+/// What the judge remembers from frame to frame.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Judge {
+    sizes: Sizes,
+    /// What was stored before the first frame [J].
+    stored: Option<f64>,
+    /// External work and stored energy at the end of the last frame [J].
+    last: (f64, f64),
+    /// Sums over the frames so far: internal, hourglass and added kinetic energy [J].
+    internal: f64,
+    hourglass: f64,
+    added_kinetic: f64,
+    clamped: u64,
+    raised: u64,
+    clipped: u64,
+    unbalanced: u64,
+    frames: u64,
+    inverted: u32,
+    creating: u32,
+    /// Frames on end beyond the second bound, per row of the table.
+    beyond: [u32; BOUNDS.len()],
+    verdict: Verdict,
+}
+
+impl Judge {
+    /// For a tissue of these sizes.
+    pub fn new(sizes: Sizes) -> Self {
+        Judge { sizes, ..Judge::default() }
+    }
+
+    /// The sizes after a change of the scene.
+    pub fn change(&mut self, sizes: Sizes) {
+        self.sizes = sizes;
+    }
+
+    pub fn verdict(&self) -> &Verdict {
+        &self.verdict
+    }
+
+    /// Tells where a doubt that began with the last frame is.
+    pub fn place(&mut self, frame: u64, place: &str) {
+        self.verdict.doubts.iter_mut().filter(|d| d.frame == frame).for_each(|d| {
+            d.place.get_or_insert_with(|| place.to_string());
+        });
+    }
+
+    /// Looks at a frame of `steps` steps. The trouble that stops the run, if any.
+    pub fn check(&mut self, record: &FrameRecord, steps: u32) -> Option<Trouble> {
+        let (health, energy) = (&record.health, &record.energy);
+        self.frames += 1;
+        let node_steps = f64::from(steps.max(1)) * self.sizes.nodes as f64;
+        let all_node_steps = (record.step.max(1) * self.sizes.nodes as u64) as f64;
+        let all_cell_steps = (record.step.max(1) * self.sizes.cells as u64) as f64;
+        self.clamped += u64::from(health.clamped_nodes);
+        self.raised += u64::from(health.raised_mass);
+        self.clipped += u64::from(health.return_failures);
+        self.unbalanced += u64::from(record.needle.unbalanced);
+        let missing = energy.external - energy.accounted();
+        // A state that was given to the run holds energy that nobody put in during it.
+        let given = -missing > 2.0 * energy.external_max && -missing > self.sizes.floor;
+        let stored = *self.stored.get_or_insert(if given { -missing } else { 0.0 });
+        let missing = missing + stored;
+        let now = (energy.external, energy.internal());
+        let changed = (now.0 - self.last.0).abs().max((now.1 - self.last.1).abs());
+        self.last = now;
+        let per_step = changed / f64::from(steps.max(1));
+        // What was put in bounds what can move: energy that a step creates is no reason to look away.
+        let put_in = energy.external_max.max(stored).max(self.sizes.floor).max(f64::MIN_POSITIVE);
+        let unknown = (FLOOR_STEPS * per_step).max(FLOOR_KINETIC * energy.kinetic.min(put_in));
+        let scale = put_in.max(unknown);
+        // `f64::max` would drop NaN.
+        let (worst, now) = (self.verdict.worst_imbalance, (missing / scale).abs());
+        self.verdict.worst_imbalance = if now.is_nan() { now } else { worst.max(now) };
+        self.internal += energy.internal();
+        self.hourglass += energy.hourglass;
+        self.added_kinetic += (1.0 - 1.0 / self.sizes.mass_scaling.max(1.0)) * energy.kinetic;
+        let whole = self.internal.max(self.frames as f64 * self.sizes.floor).max(f64::MIN_POSITIVE);
+        let fewer = health.inverted_cells < self.inverted;
+        self.inverted = health.inverted_cells;
+        let inverted_part = f64::from(health.inverted_cells) / self.sizes.cells.max(1) as f64;
+        // Value beside the first bound, and beside the second one.
+        let both = |value: f64| (value, value);
+        let values = BOUNDS.map(|bound| match bound.quantity {
+            Quantity::NotFinite => both(if health.not_finite { 1.0 } else { 0.0 }),
+            Quantity::EnergyImbalance => ((missing / scale).abs(), (missing / put_in).abs()),
+            Quantity::CuredEnergy => both((energy.raised_mass.abs() + energy.speed_limit.abs()) / scale),
+            Quantity::ClampedShare => both(f64::from(health.clamped_nodes) / node_steps),
+            Quantity::RaisedShare => both(self.raised as f64 / all_node_steps),
+            Quantity::InvertedCells => (inverted_part, if fewer { 0.0 } else { inverted_part }),
+            Quantity::HourglassShare => both(self.hourglass / whole),
+            Quantity::InertiaShare => both(self.added_kinetic / whole),
+            Quantity::ClippedReturns => both(self.clipped as f64 / all_cell_steps),
+            Quantity::UnbalancedNeedle => both(self.unbalanced as f64 / self.frames as f64),
+        });
+        for (bound, (value, _)) in BOUNDS.iter().zip(values) {
+            // Cells may recover, and what is a share of the whole run is judged by the whole run.
+            if bound.quantity.is_of_the_end() && value <= bound.ok {
+                self.verdict.doubts.retain(|d| d.quantity != bound.quantity);
+            }
+            self.note(record, bound, value);
+        }
+        let trouble = |bound: &Bound, value: f64, limit: f64, frames: u32| Trouble {
+            quantity: bound.quantity,
+            value,
+            bound: limit,
+            frames,
+            energy: (bound.quantity == Quantity::EnergyImbalance).then_some((missing, put_in)),
+        };
+        let created = -missing / put_in;
+        self.creating = if created > CREATED_PART { self.creating + 1 } else { 0 };
+        if self.creating >= PATIENCE {
+            return Some(trouble(Quantity::EnergyImbalance.bound(), created, CREATED_PART, PATIENCE));
+        }
+        for ((bound, beyond), (_, value)) in BOUNDS.iter().zip(&mut self.beyond).zip(values) {
+            let Some((limit, frames)) = bound.stop else { continue };
+            // Nothing is beyond a bound before the frames of a whole one: the first frame is a single step.
+            let is_beyond = value > limit || value.is_nan();
+            *beyond = if is_beyond { *beyond + 1 } else { 0 };
+            if *beyond >= frames && (bound.quantity != Quantity::ClippedReturns || self.frames > 1) {
+                return Some(trouble(bound, value, limit, frames));
+            }
+        }
+        None
+    }
+
+    /// Keeps the largest value of what is beyond its first bound.
+    fn note(&mut self, record: &FrameRecord, bound: &Bound, value: f64) {
+        if !(value > bound.ok || value.is_nan()) {
+            return;
+        }
+        match self.verdict.doubts.iter_mut().find(|d| d.quantity == bound.quantity) {
+            Some(doubt) if bound.quantity.is_of_the_end() => doubt.value = value,
+            Some(doubt) => doubt.value = if value.is_nan() { value } else { doubt.value.max(value) },
+            None => {
+                self.verdict.doubts.push(Doubt {
+                    quantity: bound.quantity,
+                    value,
+                    bound: bound.ok,
+                    frame: record.frame,
+                    time_s: record.time,
+                    place: None,
+                });
+                let order = |d: &Doubt| BOUNDS.iter().position(|b| b.quantity == d.quantity);
+                self.verdict.doubts.sort_by_key(order);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judge() -> Judge {
+        Judge::new(Sizes { nodes: 1000, cells: 800, floor: 1e-9, mass_scaling: 100.0 })
+    }
+
+    fn frame(number: u64, external: f64, elastic: f64) -> FrameRecord {
+        let mut record = FrameRecord { frame: number, step: 100_000 * number + 1, ..FrameRecord::default() };
+        record.energy.external = external;
+        record.energy.external_max = external.abs();
+        record.energy.elastic = elastic;
+        record
+    }
+
+    #[test]
+    fn energy_out_of_nothing_is_trouble_after_three_frames() {
+        let mut judge = judge();
+        assert_eq!(judge.check(&frame(0, 0.0, 0.0), 1), None);
+        for n in 1..4 {
+            assert_eq!(judge.check(&frame(n, 1e-3 * n as f64, 1e-3 * n as f64), 100_000), None);
+        }
+        let found: Vec<bool> = (4..7).map(|n| judge.check(&frame(n, 4e-3, 7e-3), 100_000).is_some()).collect();
+        assert_eq!(found, [false, false, true]);
+    }
+
+    #[test]
+    fn a_loss_is_a_doubt_with_its_frame_and_stops_after_ten_frames() {
+        let mut judge = judge();
+        judge.check(&frame(0, 0.0, 0.0), 1);
+        assert_eq!(judge.check(&frame(1, 1e-3, 0.985e-3), 100_000), None);
+        assert!(judge.verdict().is_ok());
+        judge.check(&frame(2, 1e-3, 0.97e-3), 100_000);
+        judge.check(&frame(3, 1e-3, 0.95e-3), 100_000);
+        judge.check(&frame(4, 1e-3, 0.99e-3), 100_000);
+        let doubt = &judge.verdict().doubts[0];
+        assert_eq!((doubt.quantity, doubt.frame), (Quantity::EnergyImbalance, 2));
+        assert!((doubt.value - 0.05).abs() < 1e-9, "{doubt:?}");
+        let stops: Vec<bool> = (5..16).map(|n| judge.check(&frame(n, 1e-3, 0.7e-3), 100_000).is_some()).collect();
+        assert_eq!(stops.iter().position(|s| *s), Some(9));
+    }
+
+    #[test]
+    fn the_work_so_far_is_the_scale_not_that_of_the_whole_run() {
+        let mut judge = judge();
+        judge.check(&frame(0, 0.0, 0.0), 1);
+        // A loss of 5 % early on, of 0.05 % in the end.
+        judge.check(&frame(1, 1e-5, 0.95e-5), 100_000);
+        judge.check(&frame(2, 1e-3, 0.9995e-3), 100_000);
+        assert_eq!(judge.verdict().doubts.len(), 1);
+        // Below the floor nothing is said.
+        let mut still = self::judge();
+        assert!((0..20).all(|n| still.check(&frame(n, 1e-13 * n as f64, 0.0), 100_000).is_none()));
+        assert!(still.verdict().is_ok());
+    }
+
+    #[test]
+    fn what_was_stored_before_the_run_is_not_created() {
+        let mut judge = judge();
+        assert!((0..20).all(|n| judge.check(&frame(n, 0.0, 5e-3), 100_000).is_none()));
+        assert!(judge.verdict().is_ok());
+    }
+
+    #[test]
+    fn inverted_cells_may_recover() {
+        let inverted = |n: u64, count: u32| {
+            let mut record = frame(n, 1e-3, 1e-3);
+            record.health.inverted_cells = count;
+            record
+        };
+        let mut falling = judge();
+        assert!((0..81).all(|n| falling.check(&inverted(n, 800 - 10 * n as u32), 30).is_none()));
+        assert!(falling.verdict().is_ok());
+        let mut staying = judge();
+        let first = (0..20).position(|n| staying.check(&inverted(n, 60), 30).is_some());
+        assert_eq!(first, Some(9));
+        let mut few = judge();
+        assert!((0..50).all(|n| few.check(&inverted(n, 20), 30).is_none()));
+        assert_eq!(few.verdict().doubts[0].quantity, Quantity::InvertedCells);
+        let mut single = self::judge();
+        assert!((0..50).all(|n| single.check(&inverted(n, 3), 30).is_none()));
+        assert!(single.verdict().is_ok());
+    }
+
+    #[test]
+    fn clamped_nodes_are_counted_against_the_steps_of_the_frame() {
+        let mut record = frame(1, 1e-3, 1e-3);
+        record.health.clamped_nodes = 1600;
+        assert_eq!(judge().check(&record, 100), None);
+        let trouble = judge().check(&record, 30);
+        assert!(trouble.is_some_and(|t| t.quantity == Quantity::ClampedShare && t.value > 0.05));
+    }
+
+    #[test]
+    fn the_table_names_every_quantity_once() {
+        let text = explain();
+        assert!(BOUNDS.iter().all(|b| text.matches(&format!("{} ", b.key)).count() >= 1));
+        assert!(BOUNDS.iter().all(|b| b.quantity.bound().key == b.key));
+    }
+}
