@@ -73,7 +73,8 @@ struct Memory {
 
 // Sums over the steps of a frame; forces on the tissue.
 struct ContactSums {
-    // Whole impulse [N s] and angular impulse about the tip [N m s], w unused.
+    // Whole impulse [N s] and angular impulse about the tip [N m s]. In the record of a node, w: work of the tool in the step that was booked
+    // last [J], and that step, modulo 65536. In the sums, w of the impulse: work in the last step of the frame [J].
     impulse: vec4<f32>,
     angular_impulse: vec4<f32>,
     // Parts along the insertion direction [N s]: cutting, spreading, sliding, and the part of spreading on the shaft of a needle.
@@ -132,6 +133,11 @@ fn held_by(index: u32) -> f32 {
     return contact_records[index].energies.w;
 }
 
+// The present step as a float that holds it.
+fn step_mark() -> f32 {
+    return f32(step_input.step & 0xffffu);
+}
+
 // Books one step of contact node `index`: tip, normal and tangential force, lever about the tip, and what else there is.
 fn book_contact(
     index: u32,
@@ -148,10 +154,13 @@ fn book_contact(
 #ifdef FREE_PATH
     power += dot(torque, angular_velocity());
 #endif
-    contact_records[index].impulse += vec4<f32>(total * params.dt, 0.0);
-    contact_records[index].angular_impulse += vec4<f32>(torque * params.dt + more.angular_impulse, 0.0);
+    let work = power * params.dt + more.work;
+    let impulse = contact_records[index].impulse.xyz + total * params.dt;
+    contact_records[index].impulse = vec4<f32>(impulse, work);
+    let angular_impulse = contact_records[index].angular_impulse.xyz + torque * params.dt + more.angular_impulse;
+    contact_records[index].angular_impulse = vec4<f32>(angular_impulse, step_mark());
     contact_records[index].parts += vec4<f32>(dot(tip, d), dot(normal, d), dot(tangential, d), more.shaft);
     let before = contact_records[index].energies.xyz;
-    let taken = vec3<f32>(power * params.dt + more.work, more.sliding_dissipation, more.damping_dissipation);
+    let taken = vec3<f32>(work, more.sliding_dissipation, more.damping_dissipation);
     contact_records[index].energies = vec4<f32>(before + taken, more.stored);
 }

@@ -17,9 +17,10 @@ struct NodeSums {
     raised_energy: f32,
     clamped_energy: f32,
     step_ratio: f32,
+    // What the stored energy of the last forces, half a step before the velocities, loses until then [J].
+    half_step: f32,
     _pad0: u32,
     _pad1: u32,
-    _pad2: u32,
 }
 
 @group(2) @binding(6) var<storage, read_write> node_sums: array<NodeSums>;

@@ -40,7 +40,8 @@ fn measure_contact(@builtin(local_invocation_index) lane: u32) {
     var total: ContactSums;
     for (var index = lane; index < CONTACT_COUNT; index += 64u) {
         let record = contact_records[index];
-        total.impulse += record.impulse;
+        let booked_now = record.angular_impulse.w == step_mark();
+        total.impulse += vec4<f32>(record.impulse.xyz, select(0.0, record.impulse.w, booked_now));
         total.angular_impulse += record.angular_impulse;
         total.parts += record.parts;
         total.energies += record.energies;

@@ -1,9 +1,14 @@
 // Stage measure_nodes: kinetic energy, dissipation, speeds and counters; resets what is summed per frame.
+//
+// Velocities belong to the middle of the last step, stored energies to its beginning, where the other measuring stages ran. With the
+// forces f there, the trapezoidal rule has stored energies at the middle: E - dt/2 f v. The sum of kinetic energy, this and work is exact
+// for linear tissue, whatever moves within a step.
 #import shared/params
 #import shared/thread_index
 #import shared/displacement
 #import shared/node_sums
 #import shared/node_cures
+#import shared/gathered_force
 #ifdef NODE_WORK
 #import shared/node_work
 #endif
@@ -29,6 +34,7 @@ fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         let v = node_velocity[node];
         let mass = node_mass[node];
         sums.kinetic += 0.5 * mass * dot(v.xyz, v.xyz);
+        sums.half_step -= 0.5 * params.dt * dot(gathered_force(node_place(node)).xyz, v.xyz);
         sums.damping += v.w;
         // Half a step ago, as the work of every other load is booked with the mean of the old and the new velocity.
         let moment = (vec3<f32>(u.xyz) * DISPLACEMENT_UNIT - v.xyz * (0.5 * params.dt)) * mass;

@@ -412,6 +412,7 @@ impl GpuEngine {
             min_corner_j: f64::INFINITY,
             ..Default::default()
         };
+        let has_steps = if done.steps > 0 { 1.0 } else { 0.0 };
         let mut weighted = DVec3::ZERO;
         let mut corners = Vec::new();
         for range in &self.results {
@@ -439,6 +440,7 @@ impl GpuEngine {
                 "node_sums" => {
                     for s in read_all::<NodeSums>(bytes) {
                         sums.kinetic += f64::from(s.kinetic);
+                        sums.half_step += has_steps * f64::from(s.half_step);
                         sums.damping_dissipation += f64::from(s.damping);
                         sums.load_work += f64::from(s.work);
                         weighted += DVec3::new(s.moment_x.into(), s.moment_y.into(), s.moment_z.into());
@@ -475,6 +477,8 @@ impl GpuEngine {
                     for s in read_all::<ContactSums>(bytes) {
                         let vector = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
                         sums.impulse += vector(s.impulse);
+                        // Tools do work with the force at the beginning of a step: half of the last one is to come.
+                        sums.half_step += has_steps * 0.5 * f64::from(s.impulse[3]);
                         sums.angular_impulse += vector(s.angular_impulse);
                         let [cutting, spreading, sliding, shaft] = s.parts.map(f64::from);
                         sums.cutting_impulse += cutting;
@@ -559,6 +563,23 @@ impl GpuEngine {
             self.encode_step(&mut pass, step);
         }
         Ok(())
+    }
+
+    /// The last step of a frame: what it measures belongs to the displacement of its forces, but for velocities, which belong to its
+    /// middle.
+    fn encode_measured_step(&self, encoder: &mut wgpu::CommandEncoder, step: usize) {
+        let moves = |stage| matches!(stage, Stage::IntegrateNodes | Stage::MeasureNodes);
+        self.encode_selected(encoder, step, |stage| !stage.once_per_frame() && !stage.draws() && !moves(stage));
+        self.encode_selected(encoder, step, |stage| stage.once_per_frame() && !moves(stage));
+        self.encode_selected(encoder, step, moves);
+    }
+
+    /// Some of the stages as one compute pass, with the input of a step.
+    fn encode_selected(&self, encoder: &mut wgpu::CommandEncoder, step: usize, wanted: impl Fn(Stage) -> bool) {
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        for kernel in self.kernels.iter().filter(|k| wanted(k.stage)) {
+            kernel.encode(&mut pass, (step * size_of::<StepInput>()) as u32);
+        }
     }
 
     fn encode_step(&self, pass: &mut wgpu::ComputePass<'_>, step: usize) {
@@ -1379,13 +1400,12 @@ impl Engine for GpuEngine {
             let submission = self.gpu.queue.submit([std::mem::replace(&mut encoder, next).finish()]);
             self.wait_for(&submission)?;
         }
-        self.encode_steps(&mut encoder, whole..plan.steps.len())?;
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            let last = (plan.steps.len().saturating_sub(1) * size_of::<StepInput>()) as u32;
-            for kernel in self.kernels.iter().filter(|k| k.stage.averages() || k.stage.once_per_frame()) {
-                kernel.encode(&mut pass, last);
+        match plan.steps.len().checked_sub(1) {
+            Some(last) => {
+                self.encode_steps(&mut encoder, whole..last)?;
+                self.encode_measured_step(&mut encoder, last);
             }
+            None => self.encode_selected(&mut encoder, 0, |stage| stage.averages() || stage.once_per_frame()),
         }
         let slot = (0..RING).find(|s| self.in_flight.iter().all(|f| f.slot != *s)).unwrap_or(0);
         for range in &self.results {

@@ -383,9 +383,9 @@ shared_structs! {
         raised_energy: f32,
         clamped_energy: f32,
         step_ratio: f32,
+        half_step: f32,
         _pad0: u32,
         _pad1: u32,
-        _pad2: u32,
     }
     /// shaders/shared/node_cures.wgsl
     struct NodeCures {

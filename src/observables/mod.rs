@@ -85,9 +85,13 @@ pub struct EnergyPart {
 pub struct EnergyAccount {
     /// Work of tool, moved faces, tractions and gravity.
     pub external: f64,
-    /// Elastic strain energy.
+    /// Elastic strain energy at the beginning of the last step.
     pub elastic: f64,
+    /// In the middle of the last step, where velocities belong.
     pub kinetic: f64,
+    /// What stored energies gained from the beginning of the last step to its middle: with it the account is exact wherever the energy
+    /// swings between motion and strain.
+    pub half_step: f64,
     /// Hourglass energy (stored).
     pub hourglass: f64,
     /// Dissipated by mass damping.
@@ -124,9 +128,10 @@ pub struct EnergyAccount {
 impl EnergyAccount {
     /// Where external work goes, in the order of the columns of `energy.csv`. A new part is one line here: the account and the
     /// columns follow this list.
-    pub const PARTS: [EnergyPart; 17] = [
+    pub const PARTS: [EnergyPart; 18] = [
         EnergyPart { column: "elastic_j", of: |e| e.elastic, sign: 1.0 },
         EnergyPart { column: "kinetic_j", of: |e| e.kinetic, sign: 1.0 },
+        EnergyPart { column: "half_step_j", of: |e| e.half_step, sign: 1.0 },
         EnergyPart { column: "hourglass_j", of: |e| e.hourglass, sign: 1.0 },
         EnergyPart { column: "damping_j", of: |e| e.damping, sign: 1.0 },
         EnergyPart { column: "friction_j", of: |e| e.friction, sign: 1.0 },

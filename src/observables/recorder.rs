@@ -19,13 +19,11 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Books what the state at the end of the last frame stores more after a change of constants; `sums` are those of a frame without
+    /// Books what the state at the end of the last frame stores more after a change of constants; both sums are those of frames without
     /// a step. Springs of contact are not seen there: what they hold more shows in the balance.
-    pub fn book_change(&mut self, sums: &FrameSums) {
-        let before = &self.totals;
-        let stored = before.elastic + before.kinetic + before.hourglass + before.viscous + before.cohesive;
-        let now = sums.elastic + sums.kinetic + sums.hourglass + sums.viscous_dissipation + sums.cohesive_energy;
-        self.totals.changes += now + self.cohesive_dissipation - stored;
+    pub fn book_change(&mut self, before: &FrameSums, after: &FrameSums) {
+        let stored = |s: &FrameSums| s.elastic + s.kinetic + s.hourglass + s.viscous_dissipation + s.cohesive_energy;
+        self.totals.changes += stored(after) - stored(before);
     }
 
     /// Books the frame whose steps begin with number `first` and returns its record.
@@ -45,6 +43,7 @@ impl Recorder {
         e.external_max = e.external_max.max(e.external.abs());
         e.elastic = sums.elastic;
         e.kinetic = sums.kinetic;
+        e.half_step = sums.half_step;
         e.hourglass = sums.hourglass;
         e.damping += sums.damping_dissipation;
         e.friction += sums.friction_dissipation;

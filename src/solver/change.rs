@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use super::engine::{ContactState, Engine, FramePlan, State, StepInput};
+use super::engine::{ContactState, Engine, FramePlan, FrameSums, State, StepInput};
 use super::simulation::{Purpose, Simulation, choose_step};
 use super::stable_dt::wave_speed_bound;
 use crate::error::{Error, Result};
@@ -145,12 +145,14 @@ impl Simulation {
     /// `Error::Device`; `Error::Input` in the middle of frames whose results nobody has collected.
     pub fn retune(&mut self, change: &Change) -> Result<bool> {
         self.between_frames()?;
-        if change.reach != Reach::Constants
-            || !self.engine.retune(change.model.clone(), change.dt, change.steps_per_frame as usize)?
-        {
+        if change.reach != Reach::Constants {
             return Ok(false);
         }
-        self.adopted(change)?;
+        let before = self.measured()?;
+        if !self.engine.retune(change.model.clone(), change.dt, change.steps_per_frame as usize)? {
+            return Ok(false);
+        }
+        self.adopted(change, before)?;
         Ok(true)
     }
 
@@ -160,10 +162,11 @@ impl Simulation {
     /// As [`Simulation::retune`].
     pub fn adopt(&mut self, change: &Change, mut engine: Box<dyn Engine>) -> Result<()> {
         self.between_frames()?;
+        let before = self.measured()?;
         let state = self.engine.read_state()?;
         engine.write_state(&carried(&state, &self.model, &change.model))?;
         self.engine = engine;
-        self.adopted(change)
+        self.adopted(change, before)
     }
 
     /// A change at once, whatever it takes; false where the run has to begin anew, and goes on unchanged.
@@ -189,7 +192,7 @@ impl Simulation {
     }
 
     /// The engine has the change; the rest of the simulation follows.
-    fn adopted(&mut self, change: &Change) -> Result<()> {
+    fn adopted(&mut self, change: &Change, before: Option<FrameSums>) -> Result<()> {
         if (change.dt, change.steps_per_frame) != (self.clock.dt, self.clock.steps_per_frame) {
             self.clock = match self.collected {
                 0 => super::clock::Clock::new(change.dt, change.steps_per_frame),
@@ -214,14 +217,21 @@ impl Simulation {
                 needle.restore(&image);
             }
         }
-        if self.collected > 0 {
-            // A frame without a step measures the state with the new constants.
-            let (frame, first_step) = (self.collected, self.clock.first_step(self.collected));
-            self.engine.start_frame(&FramePlan { frame, first_step, steps: Vec::new(), centre_line: None })?;
-            let sums = self.engine.collect(true)?.ok_or_else(|| Error::Device("the engine lost a frame".into()))?;
-            self.recorder.book_change(&sums);
+        if let (Some(before), Some(after)) = (before, self.measured()?) {
+            self.recorder.book_change(&before, &after);
         }
         Ok(())
+    }
+
+    /// The state as a frame without a step measures it; nothing before the first frame.
+    fn measured(&mut self) -> Result<Option<FrameSums>> {
+        if self.collected == 0 {
+            return Ok(None);
+        }
+        let (frame, first_step) = (self.collected, self.clock.first_step(self.collected));
+        self.engine.start_frame(&FramePlan { frame, first_step, steps: Vec::new(), centre_line: None })?;
+        let sums = self.engine.collect(true)?;
+        Ok(Some(sums.ok_or_else(|| Error::Device("the engine lost a frame".into()))?))
     }
 }
 

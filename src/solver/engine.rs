@@ -143,11 +143,13 @@ pub struct FrameSums {
     pub contact_energy: f64,
     /// Total: material coordinate a of the tip [m].
     pub tip_coordinate: f64,
-    /// Total: elastic and hourglass energy [J].
+    /// Total: elastic and hourglass energy at the beginning of the last step [J], where its forces belong.
     pub elastic: f64,
     pub hourglass: f64,
-    /// Total: kinetic energy [J].
+    /// Total: kinetic energy [J], of the velocities in the middle of the last step.
     pub kinetic: f64,
+    /// Total: what stored energies gained from the beginning to the middle of the last step, `-dt/2 sum f v`, and half of the tool's work in it [J]; zero without a step.
+    pub half_step: f64,
     /// Dissipated by mass damping [J].
     pub damping_dissipation: f64,
     /// Work of driven faces, tractions and gravity [J].

@@ -97,8 +97,7 @@ impl Stage {
         self.averages() || matches!(self, Stage::TetrahedronForces | Stage::ElementForces)
     }
 
-    /// True for the stages that average the pressure of tetrahedra. They run once more at the end of a frame: energies
-    /// belong to the displacement after its last step.
+    /// True for the stages that average the pressure of tetrahedra. A frame without a step has them all the same: its energies need them.
     pub fn averages(self) -> bool {
         matches!(self, Stage::MeasureDilatation | Stage::AveragePressure)
     }
@@ -108,7 +107,8 @@ impl Stage {
         matches!(self, Stage::CellFields | Stage::NodeFields)
     }
 
-    /// True for the stages that run once per frame, after its last step.
+    /// True for the stages that run once per frame, in its last step: [`Stage::MeasureNodes`] after it, all others between its forces and
+    /// [`Stage::IntegrateNodes`], so that stored energies belong to the same displacement as the forces.
     pub fn once_per_frame(self) -> bool {
         matches!(
             self,

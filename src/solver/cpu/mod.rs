@@ -135,12 +135,6 @@ impl CpuEngine {
         }
     }
 
-    /// One step: the list of stages.
-    fn step(&mut self, input: &StepInput) {
-        self.forces(input);
-        self.integrate_nodes(input);
-    }
-
     /// Force [N] and stiffness bound [N/m] of every node at the present state, as a step with this input would find them; tied
     /// copies have those of all of them. Nothing changes: a look at one step, for tests and bisecting.
     pub fn forces_and_bounds(&mut self, input: &StepInput) -> (Vec<DVec3>, Vec<f64>) {
@@ -328,8 +322,9 @@ impl CpuEngine {
         })
     }
 
-    /// Stages `measure_cells`, `measure_nodes`, `measure_contact`.
-    fn measure(&mut self) {
+    /// Stages `measure_cells`, `measure_contact`, `measure_faces`, `measure_separation`: stored energies and health, between the forces of
+    /// the last step and its motion.
+    fn measure_stored(&mut self) {
         let (model, elements, state) = (&self.model, &self.elements, &self.state);
         let states = CellStates { points: &state.points, stiffness: &state.stiffness };
         let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
@@ -364,11 +359,23 @@ impl CpuEngine {
         }
         let torn = state.pairs.iter().zip(&model.separation.pairs).map(|(d, p)| d * p.area);
         sums.torn_area = torn.sum();
+        sums.contact_energy = self.contact_energy;
+        sums.tip_coordinate = state.tip_coordinate;
+    }
+
+    /// Stage `measure_nodes`: velocities of the middle of the last step, and what its forces make of the stored energies until then:
+    /// E - dt/2 f v by the trapezoidal rule.
+    fn measure_nodes(&mut self) {
+        let (model, state) = (&self.model, &self.state);
+        let sums = &mut self.sums;
+        if sums.steps > 0 {
+            let force = |node: usize| self.elements.gather(&model.mesh, &self.cells, node).0 + self.external[node];
+            let power = state.velocity.iter().enumerate().map(|(node, v)| force(node).dot(*v)).sum::<f64>();
+            sums.half_step -= 0.5 * self.dt * power;
+        }
         sums.kinetic = state.velocity.iter().zip(&model.node_mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
         sums.max_speed = state.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
         sums.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
-        sums.contact_energy = self.contact_energy;
-        sums.tip_coordinate = state.tip_coordinate;
         sums.targets = model.targets.iter().map(|target| target.value(&state.displacement)).collect();
     }
 }
@@ -442,16 +449,26 @@ impl Engine for CpuEngine {
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {
         self.sums = FrameSums { frame: plan.frame, steps: plan.steps.len() as u32, ..Default::default() };
         self.centre_line = plan.centre_line;
-        for input in &plan.steps {
+        for (index, input) in plan.steps.iter().enumerate() {
             if crate::ending::is_overdue() {
                 return Err(Error::Ended(crate::ending::reason()));
             }
-            self.step(input);
+            let worked = self.sums.tool_work;
+            self.forces(input);
+            if index + 1 == plan.steps.len() {
+                // Tools do work with the force at the beginning of a step: half of the last one is to come.
+                self.sums.half_step = 0.5 * (self.sums.tool_work - worked);
+                self.measure_stored();
+            }
+            self.integrate_nodes(input);
+        }
+        if plan.steps.is_empty() {
+            self.measure_stored();
         }
         if let Some(pose) = plan.steps.last().and_then(|s| s.pose) {
             self.share_needle_loads(&pose);
         }
-        self.measure();
+        self.measure_nodes();
         self.finished.push_back(std::mem::take(&mut self.sums));
         Ok(())
     }
