@@ -45,10 +45,11 @@ struct Contact {
 
 // What a contact node remembers, as it lies in the buffer, see `Memory`; and what it sums over the steps of a frame, see `ContactSums`.
 struct ContactRecord {
+    // w: damping.x
     stick: vec4<f32>,
     // overlap, axial_on, touching, on_shaft
     touch: vec4<f32>,
-    // passed, rest_radius; z, w unused
+    // passed, rest_radius, damping.y, damping.z
     path: vec4<f32>,
     impulse: vec4<f32>,
     angular_impulse: vec4<f32>,
@@ -69,6 +70,8 @@ struct Memory {
     // On a free path: 1 where the tip has passed, and the distance from the axis there [m].
     passed: f32,
     rest_radius: f32,
+    // Force of the contact damping [N].
+    damping: vec3<f32>,
 }
 
 // Sums over the steps of a frame; forces on the tissue.
@@ -119,18 +122,19 @@ fn contact_at(index: u32) -> Contact {
 
 fn remembered(index: u32) -> Memory {
     let m = contact_records[index];
-    return Memory(m.stick.xyz, m.touch.x, m.touch.y, m.touch.z, m.touch.w, m.path.x, m.path.y);
+    let damping = vec3<f32>(m.stick.w, m.path.zw);
+    return Memory(m.stick.xyz, m.touch.x, m.touch.y, m.touch.z, m.touch.w, m.path.x, m.path.y, damping);
 }
 
 fn remember(index: u32, m: Memory) {
-    contact_records[index].stick = vec4<f32>(m.stick, 0.0);
+    contact_records[index].stick = vec4<f32>(m.stick, m.damping.x);
     contact_records[index].touch = vec4<f32>(m.overlap, m.axial_on, m.touching, m.on_shaft);
-    contact_records[index].path = vec4<f32>(m.passed, m.rest_radius, 0.0, 0.0);
+    contact_records[index].path = vec4<f32>(m.passed, m.rest_radius, m.damping.yz);
 }
 
-// Held by the springs of contact node `index` at its last step [J].
-fn held_by(index: u32) -> f32 {
-    return contact_records[index].energies.w;
+// Dissipated by contact damping in the last step [J]: mean of its forces before and after, times the velocity `v` past the tool between.
+fn damped(before: vec3<f32>, after: vec3<f32>, v: vec3<f32>) -> f32 {
+    return -0.5 * params.dt * dot(before + after, v);
 }
 
 // The present step as a float that holds it.

@@ -16,9 +16,10 @@ struct SlitForce {
     torque: vec3<f32>,
     // Sum of the normal forces, each times the part of the friction that is there [N].
     rubbing: f32,
-    // Stored [J]; dissipated power and power of the bending needle [W].
+    // Force of the contact damping in it [N].
+    damping: vec3<f32>,
+    // Stored [J]; power of the bending needle [W].
     stored: f32,
-    damping_power: f32,
     bend_power: f32,
     // Bound of the stiffness at the node [N/m].
     bound: f32,
@@ -85,7 +86,7 @@ fn slit_force(index: u32) -> SlitForce {
             sum.rubbing += w.x * normal * clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);
 #endif
             sum.stored += w.x * 0.5 * k * depth * depth;
-            sum.damping_power += w.x * (elastic - normal) * vn;
+            sum.damping += select(vec3<f32>(0.0), n * (w.x * (normal - elastic)), touches);
 #ifdef FLEXIBLE_NEEDLE
             sum.bend_power += dot(force, bend.rate);
 #endif

@@ -20,10 +20,11 @@ struct PointForce {
     // Normal force [N] and its torque about the tip [N m].
     normal: vec3<f32>,
     torque: vec3<f32>,
-    // Sum of the normal forces of the points [N]; stored [J]; dissipated power [W].
+    // The part of the damping in it [N].
+    damping: vec3<f32>,
+    // Sum of the normal forces of the points [N]; stored [J].
     pressing: f32,
     stored: f32,
-    damping_power: f32,
 }
 
 fn pressed_points(index: u32) -> PointForce {
@@ -64,7 +65,7 @@ fn pressed_points(index: u32) -> PointForce {
             sum.torque += cross(lever, force);
             sum.pressing += w.x * normal;
             sum.stored += w.x * 0.5 * k * depth * depth;
-            sum.damping_power += w.x * (elastic - normal) * vn;
+            sum.damping += n * (w.x * (normal - elastic));
         }
     }
     return sum;
@@ -90,30 +91,30 @@ fn indenter_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
         let depth = penetration.w;
         memory.touching = select(memory.touching, 1.0, depth > 0.0);
         if (memory.touching == 1.0) {
-            let damping = indentation.face_damping * k;
+            let damping = v * (-indentation.face_damping * k);
             memory.stick += (v - n * dot(v, n)) * params.dt;
-            normal = n * (k * depth) - v * damping - memory.stick * k;
-            sums.damping_dissipation = damping * dot(v, v) * params.dt;
+            normal = n * (k * depth) + damping - memory.stick * k;
+            sums.damping_dissipation = damped(memory.damping, damping, v);
+            memory.damping = damping;
             sums.stored = 0.5 * k * (depth * depth + dot(memory.stick, memory.stick));
         }
     } else {
         let points = pressed_points(index);
         normal = points.normal;
         sums.angular_impulse = (points.torque - cross(lever, normal)) * params.dt;
-        sums.damping_dissipation = points.damping_power * params.dt;
+        sums.damping_dissipation = damped(memory.damping, points.damping, v);
+        memory.damping = points.damping;
         sums.stored = points.stored;
         let touches = points.pressing > 0.0;
-        // What its springs held goes with a contact that ends.
-        sums.damping_dissipation += select(0.0, held_by(index), memory.touching == 1.0 && !touches);
         memory.touching = select(0.0, 1.0, touches);
 #ifdef FRICTION
         let n = normal * select(0.0, 1.0 / length(normal), touches);
         let kt = friction.stiffness_ratio * k;
         let trial = stick_trial(memory.stick, (v - n * dot(v, n)) * params.dt, n);
         let stretch = stick_return(trial, friction.coefficient * points.pressing / kt) * memory.touching;
+        sums.sliding_dissipation = 0.5 * kt * dot(memory.stick + stretch, trial - stretch);
         memory.stick = stretch;
         tangential = stretch * -kt;
-        sums.sliding_dissipation = kt * dot(stretch, trial - stretch);
         sums.stored += 0.5 * kt * dot(stretch, stretch);
 #endif
     }

@@ -169,7 +169,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         sums.stored = points.stored;
         sums.angular_impulse = (points.torque - cross(lever, normal)) * params.dt;
         sums.shaft = dot(points.on_shaft, step_input.direction.xyz) * params.dt;
-        sums.damping_dissipation = points.damping_power * params.dt;
+        let damping_force = points.damping;
 #ifdef FLEXIBLE_NEEDLE
         sums.work = (points.bend_power - dot(normal, bend.rate)) * params.dt;
 #endif
@@ -220,7 +220,7 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         normal = n * pressure;
         sums.stored = select(0.0, 0.5 * k * depth * depth, depth > 0.0);
         sums.shaft = select(0.0, dot(normal, step_input.direction.xyz) * params.dt, s >= puncture.tip_length);
-        sums.damping_dissipation = select(0.0, (elastic - pressure) * vn * params.dt, depth > 0.0);
+        let damping_force = select(vec3<f32>(0.0), n * (pressure - elastic), depth > 0.0);
         // Whether it touches or not: a mass that came and went with the contact would make the node chatter.
         bound = 2.0 * k * steep * steep;
 #ifdef FREE_PATH
@@ -233,6 +233,8 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let rubbing = pressure * clamp((s - puncture.tip_length) / friction.fade_length, 0.0, 1.0);
 #endif
 #endif
+        sums.damping_dissipation = damped(memory.damping, damping_force, v);
+        memory.damping = damping_force;
 #ifdef FRICTION
         let kt = friction.stiffness_ratio * k;
         var coefficient = friction.coefficient;
@@ -242,9 +244,9 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let allowed = coefficient * rubbing / kt;
         let trial = stick_trial(memory.stick, (v - n * vn) * params.dt, n);
         let stretch = stick_return(trial, allowed);
+        sums.sliding_dissipation = 0.5 * kt * dot(memory.stick + stretch, trial - stretch);
         memory.stick = stretch;
         tangential = stretch * -kt;
-        sums.sliding_dissipation = kt * dot(stretch, trial - stretch);
         sums.stored += 0.5 * kt * dot(stretch, stretch);
 #endif
         remember(index, memory);

@@ -1533,7 +1533,7 @@ impl Engine for GpuEngine {
                     state.contact = read_all::<ContactRecord>(bytes)
                         .map(|m| {
                             let [overlap, axial_on, touching, on_shaft] = m.touch;
-                            let [passed, rest_radius, ..] = m.path;
+                            let [passed, rest_radius, damping_y, damping_z] = m.path;
                             ContactState {
                                 stick: vector(m.stick),
                                 overlap: overlap.into(),
@@ -1542,6 +1542,7 @@ impl Engine for GpuEngine {
                                 on_shaft: on_shaft != 0.0,
                                 rest_radius: rest_radius.into(),
                                 passed: passed != 0.0,
+                                damping: DVec3::new(m.stick[3].into(), damping_y.into(), damping_z.into()),
                                 stored: m.energies[3].into(),
                             }
                         })
@@ -1608,10 +1609,10 @@ impl Engine for GpuEngine {
             .map(|c| {
                 let one = |yes: bool| if yes { 1.0 } else { 0.0 };
                 ContactRecord {
-                    stick: vec4(c.stick),
+                    stick: [c.stick.x as f32, c.stick.y as f32, c.stick.z as f32, c.damping.x as f32],
                     touch: [c.overlap as f32, c.axial_on as f32, one(c.touching), one(c.on_shaft)],
                     energies: [0.0, 0.0, 0.0, c.stored as f32],
-                    path: [one(c.passed), c.rest_radius as f32, 0.0, 0.0],
+                    path: [one(c.passed), c.rest_radius as f32, c.damping.y as f32, c.damping.z as f32],
                     ..Zeroable::zeroed()
                 }
             })

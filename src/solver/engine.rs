@@ -229,6 +229,17 @@ pub struct ContactState {
     pub passed: bool,
     /// Held by its springs at the last step [J].
     pub stored: f64,
+    /// Force of the contact damping at the last step [N].
+    pub damping: DVec3,
+}
+
+impl ContactState {
+    /// Takes the damping force of a step; dissipated in the last step of `dt` [J], in which the node moved with `v` past the tool: its
+    /// mean force times the way. Forces belong to the beginnings of steps, velocities to their middles.
+    pub fn damped(&mut self, force: DVec3, v: DVec3, dt: f64) -> f64 {
+        let before = std::mem::replace(&mut self.damping, force);
+        -0.5 * dt * (before + force).dot(v)
+    }
 }
 
 /// What an engine tells about itself.

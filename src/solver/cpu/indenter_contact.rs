@@ -8,7 +8,7 @@ use crate::model::{ContactNode, Model};
 use crate::needle::ToolPose;
 use crate::needle::slit::{POINTS, weights};
 use crate::scene::Tool;
-use crate::solver::engine::{ContactState, State};
+use crate::solver::engine::State;
 
 impl CpuEngine {
     /// Stage `indenter_contact`: penalty contact of the top face with a sphere or a flat punch.
@@ -32,33 +32,35 @@ impl CpuEngine {
                 };
                 memory.touching |= depth > 0.0;
                 if memory.touching {
-                    let damping = plan.face_damping * k;
+                    let damping = v * (-plan.face_damping * k);
                     memory.stick += (v - n * v.dot(n)) * dt;
-                    sums.normal = n * (k * depth) - v * damping - memory.stick * k;
-                    sums.damping_power = damping * v.length_squared();
+                    sums.normal = n * (k * depth) + damping - memory.stick * k;
+                    sums.damping = memory.damped(damping, v, dt);
                     sums.stored = 0.5 * k * (depth * depth + memory.stick.length_squared());
                 }
                 sums.torque = (x - pose.tip).cross(sums.normal);
             } else {
-                let pressing = press_at_points(&model, plan, tool, pose, contact, displacement, velocity, &mut sums);
-                if pressing > 0.0 {
-                    memory.touching = true;
+                let nodes = (displacement.as_slice(), velocity.as_slice());
+                let points = pressed_points(&model, plan, tool, pose, contact, nodes);
+                sums.normal = points.normal;
+                sums.torque = points.torque;
+                sums.stored = points.stored;
+                sums.damping = memory.damped(points.damping, v, dt);
+                memory.touching = points.pressing > 0.0;
+                if memory.touching || memory.stick != DVec3::ZERO {
                     if let Some(friction) = model.effects.friction {
                         let n = sums.normal.normalize_or_zero();
                         let kt = friction.stiffness_ratio * k;
                         let trial = memory.stick + (v - n * v.dot(n)) * dt;
                         let trial = trial - n * trial.dot(n);
                         let length = trial.length();
-                        let allowed = friction.coefficient * pressing / kt;
-                        memory.stick = if length > allowed { trial * (allowed / length) } else { trial };
-                        sums.friction = memory.stick * -kt;
-                        sums.friction_work = kt * memory.stick.dot(trial - memory.stick);
+                        let allowed = friction.coefficient * points.pressing / kt;
+                        let stick = if length > allowed { trial * (allowed / length) } else { trial };
+                        sums.friction_work = 0.5 * kt * (memory.stick + stick).dot(trial - stick);
+                        memory.stick = stick;
+                        sums.friction = stick * -kt;
                         sums.stored += 0.5 * kt * memory.stick.length_squared();
                     }
-                } else if memory.touching {
-                    // What its springs held goes with the contact.
-                    sums.released = memory.stored;
-                    *memory = ContactState::default();
                 }
                 sums.torque += (x - pose.tip).cross(sums.friction);
             }
@@ -71,20 +73,29 @@ impl CpuEngine {
     }
 }
 
-/// Adds what falls on a node of the points of all faces around it; the sum of the normal forces [N], each with its weight.
-#[allow(clippy::too_many_arguments)]
-fn press_at_points(
+/// What the points of all faces around a node do to the node.
+#[derive(Debug, Clone, Copy, Default)]
+struct PointForce {
+    /// Normal force [N], the part of the damping in it, and its torque about the tip [N m].
+    normal: DVec3,
+    damping: DVec3,
+    torque: DVec3,
+    /// Sum of the normal forces of the points [N], each with its weight; stored [J].
+    pressing: f64,
+    stored: f64,
+}
+
+/// `displacement` [m] and `velocity` [m/s] of all nodes.
+fn pressed_points(
     model: &Model,
     plan: &Plan,
     tool: &Tool,
     pose: &ToolPose,
     contact: &ContactNode,
-    displacement: &[DVec3],
-    velocity: &[DVec3],
-    sums: &mut ContactSums,
-) -> f64 {
-    let Some(faces) = &contact.faces else { return 0.0 };
-    let mut pressing = 0.0;
+    (displacement, velocity): (&[DVec3], &[DVec3]),
+) -> PointForce {
+    let mut sum = PointForce::default();
+    let Some(faces) = &contact.faces else { return sum };
     for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
         if faces.present & (1 << (i + 2 * j)) == 0 {
             continue;
@@ -106,12 +117,12 @@ fn press_at_points(
             let elastic = k * depth;
             let normal = (elastic - plan.face_damping * k * vn).max(0.0);
             let force = n * (w[0] * normal);
-            pressing += w[0] * normal;
-            sums.normal += force;
-            sums.torque += lever.cross(force);
-            sums.stored += w[0] * 0.5 * k * depth * depth;
-            sums.damping_power += w[0] * (elastic - normal) * vn;
+            sum.pressing += w[0] * normal;
+            sum.normal += force;
+            sum.torque += lever.cross(force);
+            sum.stored += w[0] * 0.5 * k * depth * depth;
+            sum.damping += n * (w[0] * (normal - elastic));
         }
     }
-    pressing
+    sum
 }

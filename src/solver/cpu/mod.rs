@@ -36,8 +36,9 @@ struct ContactSums {
     on_shaft: DVec3,
     /// Torque about the tip [N m].
     torque: DVec3,
+    /// Dissipated by friction and by contact damping [J].
     friction_work: f64,
-    damping_power: f64,
+    damping: f64,
     stored: f64,
     /// Held by the springs of a contact that has ended [J].
     released: f64,
@@ -391,7 +392,7 @@ impl FrameSums {
         self.angular_impulse += c.torque * dt;
         self.tool_work += (total.dot(pose.velocity) + c.torque.dot(pose.angular_velocity)) * dt;
         self.friction_dissipation += c.friction_work;
-        self.contact_dissipation += c.damping_power * dt + c.released;
+        self.contact_dissipation += c.damping + c.released;
     }
 }
 

@@ -86,14 +86,14 @@ impl CpuEngine {
                 sums.normal = force.normal;
                 sums.on_shaft = force.on_shaft;
                 sums.stored = force.stored;
-                sums.damping_power = force.damping_power;
+                let v = velocity[node] - pose.velocity - bend.rate;
+                sums.damping = memory.damped(force.damping, v, self.dt);
                 sums.torque = force.torque;
                 bend_power += force.bend_power;
                 self.added_bound[node] += force.bound;
                 memory.touching = force.normal != DVec3::ZERO;
                 memory.on_shaft = force.on_shaft != DVec3::ZERO && s >= cone;
                 let n = force.normal.normalize_or_zero();
-                let v = velocity[node] - pose.velocity - bend.rate;
                 grip = Some((n, v, coefficient * force.rubbing, plan.face_stiffness() * contact.share));
             } else if !touches {
                 // What the springs of a contact held goes with it.
@@ -135,10 +135,12 @@ impl CpuEngine {
                 if s >= cone {
                     sums.on_shaft = sums.normal;
                 }
+                let mut damping_force = DVec3::ZERO;
                 if depth > 0.0 {
                     sums.stored = 0.5 * k * depth * depth;
-                    sums.damping_power = (elastic - normal) * vn;
+                    damping_force = n * (normal - elastic);
                 }
+                sums.damping = memory.damped(damping_force, v, self.dt);
                 // On a fine mesh, and where a separated face has half the mass of other nodes, contact limits the step. This
                 // counts whether the node touches or not: a mass that came and went with the contact would make it chatter,
                 // heavy on its way in and light on its way out.
@@ -156,10 +158,11 @@ impl CpuEngine {
                 let trial = trial - n * trial.dot(n);
                 let length = trial.length();
                 let allowed = limit / kt;
-                memory.stick = if length > allowed { trial * (allowed / length) } else { trial };
-                sums.friction = memory.stick * -kt;
-                // Friction force times slip.
-                sums.friction_work = kt * memory.stick.dot(trial - memory.stick);
+                let stick = if length > allowed { trial * (allowed / length) } else { trial };
+                // Mean friction force of the last step times slip.
+                sums.friction_work = 0.5 * kt * (memory.stick + stick).dot(trial - stick);
+                memory.stick = stick;
+                sums.friction = stick * -kt;
                 sums.stored += 0.5 * kt * memory.stick.length_squared();
             }
             memory.stored = sums.stored;

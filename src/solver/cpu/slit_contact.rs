@@ -16,9 +16,10 @@ pub(super) struct SlitForce {
     pub on_shaft: DVec3,
     /// Sum of the normal forces where the shaft rubs, each times the part of the friction that is there [N].
     pub rubbing: f64,
-    /// Stored energy [J], dissipated power and power of the bending needle [W].
+    /// Force of the contact damping in it [N].
+    pub damping: DVec3,
+    /// Stored energy [J] and power of the bending needle [W].
     pub stored: f64,
-    pub damping_power: f64,
     pub bend_power: f64,
     /// Torque about the tip [N m].
     pub torque: DVec3,
@@ -87,7 +88,7 @@ impl SlitContact<'_> {
                 }
                 sum.rubbing += w[0] * normal * ((s - self.profile.tip_length) / fade).clamp(0.0, 1.0);
                 sum.stored += w[0] * 0.5 * k * overlap.value * overlap.value;
-                sum.damping_power += w[0] * (elastic - normal) * vn;
+                sum.damping += n * (w[0] * (normal - elastic));
                 sum.bend_power += force.dot(bend.rate);
                 sum.torque += relative.cross(force);
                 sum.bound += 2.0 * w[0] * k * steep * steep;
