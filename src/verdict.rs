@@ -32,6 +32,7 @@ pub enum Quantity {
     ClampedShare,
     RaisedShare,
     InvertedCells,
+    FoldedCells,
     HourglassShare,
     InertiaShare,
     ClippedReturns,
@@ -58,7 +59,7 @@ pub struct Bound {
 }
 
 /// The bounds, in the order in which they are told.
-pub const BOUNDS: [Bound; 10] = [
+pub const BOUNDS: [Bound; 11] = [
     Bound {
         quantity: Quantity::NotFinite,
         key: "not_finite",
@@ -80,7 +81,7 @@ pub const BOUNDS: [Bound; 10] = [
     Bound {
         quantity: Quantity::CuredEnergy,
         key: "cured_energy",
-        text: "energy taken by raised masses and the speed limit, over the largest external work so far",
+        text: "energy taken by raised masses and the speed limit until the end of the run, over the largest external work",
         ok: 0.05,
         stop: Some((0.5, 10)),
         percent: true,
@@ -107,11 +108,20 @@ pub const BOUNDS: [Bound; 10] = [
     Bound {
         quantity: Quantity::InvertedCells,
         key: "inverted_cells",
-        text: "cells that are inside out at the end of the run, of all cells",
+        text: "cells that are inside out at their centre at the end of the run, of all cells",
         ok: 0.0,
         stop: Some((0.05, 10)),
         percent: true,
-        reason: "stress means nothing there; it stops where they do not get fewer",
+        reason: "the law is evaluated at the centre: stress means nothing there; it stops where they do not get fewer",
+    },
+    Bound {
+        quantity: Quantity::FoldedCells,
+        key: "folded_cells",
+        text: "cells with a corner folded over at the end of the run, of all cells",
+        ok: 5e-3,
+        stop: Some((0.05, 10)),
+        percent: true,
+        reason: "the law does not see the corner, its stabilisation does; pictures and fields are wrong there",
     },
     Bound {
         quantity: Quantity::HourglassShare,
@@ -157,10 +167,10 @@ impl Quantity {
         BOUNDS.iter().find(|b| b.quantity == self).expect("every quantity has a row")
     }
 
-    /// True for what is judged by its value at the end of the run: inverted cells, and shares of all frames so far.
+    /// True for what is judged by its value at the end of the run: inverted cells, and totals over all frames so far.
     pub fn is_of_the_end(self) -> bool {
         use Quantity::*;
-        matches!(self, RaisedShare | InvertedCells | HourglassShare | InertiaShare | ClippedReturns | UnbalancedNeedle)
+        matches!(self, CuredEnergy | RaisedShare | InvertedCells | FoldedCells | HourglassShare | InertiaShare | ClippedReturns | UnbalancedNeedle)
     }
 }
 
@@ -357,7 +367,9 @@ impl Judge {
         let whole = self.internal.max(self.frames as f64 * self.sizes.floor).max(f64::MIN_POSITIVE);
         let fewer = health.inverted_cells < self.inverted;
         self.inverted = health.inverted_cells;
-        let inverted_part = f64::from(health.inverted_cells) / self.sizes.cells.max(1) as f64;
+        let of_all = |cells: u32| f64::from(cells) / self.sizes.cells.max(1) as f64;
+        let inverted = of_all(health.inverted_cells.saturating_sub(health.folded_cells));
+        let folded = of_all(health.folded_cells);
         // Value beside the first bound, and beside the second one.
         let both = |value: f64| (value, value);
         let values = BOUNDS.map(|bound| match bound.quantity {
@@ -366,7 +378,8 @@ impl Judge {
             Quantity::CuredEnergy => both((energy.raised_mass.abs() + energy.speed_limit.abs()) / scale),
             Quantity::ClampedShare => both(f64::from(health.clamped_nodes) / node_steps),
             Quantity::RaisedShare => both(self.raised as f64 / all_node_steps),
-            Quantity::InvertedCells => (inverted_part, if fewer { 0.0 } else { inverted_part }),
+            Quantity::InvertedCells => (inverted, if fewer { 0.0 } else { inverted }),
+            Quantity::FoldedCells => (folded, if fewer { 0.0 } else { folded }),
             Quantity::HourglassShare => both(self.hourglass / whole),
             Quantity::InertiaShare => both(self.added_kinetic / whole),
             Quantity::ClippedReturns => both(self.clipped as f64 / all_cell_steps),

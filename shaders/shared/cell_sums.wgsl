@@ -19,9 +19,10 @@ struct CellSums {
     // Smallest part of the stiffness that a material left; failures of the flow in this frame.
     least_intact: f32,
     failures: f32,
+    // Of the inverted cells those with J > 0 at the centre, where the law is evaluated.
+    folded_cells: u32,
     _pad0: u32,
     _pad1: u32,
-    _pad2: u32,
 }
 
 @group(2) @binding(5) var<storage, read_write> cell_sums: array<CellSums>;

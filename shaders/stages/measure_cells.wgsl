@@ -53,6 +53,7 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         sums.min_corner_jacobian = select(sums.min_corner_jacobian, smallest, present);
         if (present && !(energy.jacobian > 0.0 && energy.corner_jacobian > 0.0)) {
             sums.inverted_cells += 1u;
+            sums.folded_cells += select(0u, 1u, energy.jacobian > 0.0);
             sums.inverted_cell = index;
         }
     }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use super::report::moment;
-use crate::effects::mass_scaling::AUTO_MACH;
+use crate::effects::mass_scaling::{AUTO_MACH, Loading};
 use crate::error::{Error, Result};
 use crate::output::folder::safe_name;
 use crate::solver::simulation::EngineChoice;
@@ -222,7 +222,7 @@ fn of_study(
 fn by_rule(subject: &Subject, cost: &UnitCost, rate: f64) -> std::result::Result<Proposal, String> {
     let scene = &subject.scene;
     let wave = (scene.material.law.shear_modulus() / scene.material.density).sqrt();
-    let by_speed = crate::effects::mass_scaling::auto_factor(scene.motion.largest_speed(), wave);
+    let by_speed = Loading::of(Some(&scene.motion), &scene.faces, scene.tissue.size).auto_factor(wave).unwrap_or(1.0);
     // As many digits as the rule has.
     let by_speed = 100.0 * (by_speed / 100.0).floor();
     let mass_scaling = by_speed.max(subject.base.mass_scaling);

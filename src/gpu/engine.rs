@@ -425,6 +425,7 @@ impl GpuEngine {
                         sums.min_j = sums.min_j.min(f64::from(s.min_jacobian));
                         sums.min_corner_j = sums.min_corner_j.min(f64::from(s.min_corner_jacobian));
                         sums.inverted_cells += s.inverted_cells;
+                        sums.folded_cells += s.folded_cells;
                         sums.not_finite |= s.overstretched_cells > 0;
                         sums.plastic_dissipation += f64::from(s.flow);
                         sums.damage_dissipation += f64::from(s.degradation);

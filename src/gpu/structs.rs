@@ -364,9 +364,9 @@ shared_structs! {
         relaxation: f32,
         least_intact: f32,
         failures: f32,
+        folded_cells: u32,
         _pad0: u32,
         _pad1: u32,
-        _pad2: u32,
     }
     /// shaders/shared/node_sums.wgsl
     struct NodeSums {

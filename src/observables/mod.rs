@@ -174,6 +174,8 @@ pub struct Health {
     pub min_corner_j: f64,
     /// Cells with J <= 0 at the centre or a corner.
     pub inverted_cells: u32,
+    /// Of these the ones with J > 0 at the centre: only a corner is folded over, and the law is evaluated at the centre.
+    pub folded_cells: u32,
     /// Index of one of them.
     pub inverted_cell: Option<u32>,
     /// Largest damage d; cells deleted so far; cell steps whose return mapping did not meet the yield condition.

@@ -96,6 +96,7 @@ impl Recorder {
                 min_j: sums.min_j,
                 min_corner_j: sums.min_corner_j,
                 inverted_cells: sums.inverted_cells,
+                folded_cells: sums.folded_cells,
                 inverted_cell: sums.inverted_cell,
                 largest_damage: sums.largest_damage,
                 deleted_cells: sums.deleted_cells,

@@ -158,6 +158,8 @@ pub struct FrameSums {
     pub min_j: f64,
     pub min_corner_j: f64,
     pub inverted_cells: u32,
+    /// Of these the ones with J > 0 at the centre, where the law is evaluated.
+    pub folded_cells: u32,
     pub inverted_cell: Option<u32>,
     /// Largest d; cells that were deleted; cell steps whose return mapping did not meet the yield condition.
     pub largest_damage: f64,

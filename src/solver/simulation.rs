@@ -10,6 +10,7 @@ use super::elements::{CellShape, CellStates, Elements};
 use super::engine::{Engine, FramePlan, FrameSums, State, StepInput};
 use super::stable_dt::{power_iteration, wave_speed_bound};
 use super::stiffening::DueStep;
+use crate::effects::mass_scaling::{AUTO_MACH, AUTO_PASSAGES, FEWEST_PASSAGES, Loading, MOST_MACH};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::material::{Verdict, von_mises};
@@ -137,6 +138,24 @@ pub fn tool_mach(model: &Model) -> Option<f64> {
     model.kinematics.is_some().then(|| model.scene.motion.largest_speed() / wave)
 }
 
+/// What will make the scaled inertia show in the force, if anything.
+fn inertia_that_shows(model: &Model) -> Option<String> {
+    let scene = &model.scene;
+    let loading = Loading::of(model.kinematics.is_some().then_some(&scene.motion), &scene.faces, scene.tissue.size);
+    let wave = (scene.material.law.shear_modulus() / model.scaled_density()).sqrt();
+    let (mach, passages) = (loading.mach(wave), loading.passages(wave));
+    let what = match (mach > MOST_MACH, passages < FEWEST_PASSAGES && model.mass_scaling() > 1.0) {
+        (true, _) => format!("the tool moves at {mach:.2} of the scaled shear wave speed"),
+        (false, true) => {
+            format!("a face moves or a load grows within {passages:.1} passages of a scaled shear wave through the tissue")
+        }
+        (false, false) => return None,
+    };
+    Some(format!(
+        "{what}: inertia will show in the force; lower solver.mass_scaling (\"auto\" keeps to {AUTO_MACH} and {AUTO_PASSAGES} passages)"
+    ))
+}
+
 impl Simulation {
     /// Prepares a scene: mesh, model, stable step, engine.
     ///
@@ -250,12 +269,7 @@ impl Simulation {
                     .into(),
             );
         }
-        if let Some(mach) = tool_mach(&model).filter(|m| *m > 0.1) {
-            notices.push(format!(
-                "the tool moves at {mach:.2} of the scaled shear wave speed: inertia will show in the force; lower \
-                 solver.mass_scaling (\"auto\" keeps it below 0.03)"
-            ));
-        }
+        notices.extend(inertia_that_shows(&model));
         let most = purpose.most_steps(steps_per_frame);
         let engine = super::change::engine(&model, device.as_ref(), dt, most, purpose.drawn)?;
         let kinematics = match purpose.led {

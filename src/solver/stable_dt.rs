@@ -8,7 +8,8 @@ use crate::mesh::Mesh;
 use crate::model::{ContactSurface, Model};
 
 /// Most by which mass scaling may raise the mass of a node that contact makes stiff. In tissue that is soft beside its tip springs
-/// masses raised tenfold took half of the first work.
+/// masses raised tenfold took half of the first work. Tip springs that are stiffer than the tissue count in full: the tip strikes tissue that
+/// bounces, and with raised masses up to 5.6 % of the first work was created where they are 10 to 46 times stiffer (1.1 % so).
 const RAISED_AT_REST: f64 = 4.0;
 
 /// Wave-speed bound of the undamped central difference at rest [s]: the shortest `2 sqrt(m / k)` of all nodes with the
@@ -38,7 +39,10 @@ pub fn wave_speed_bound(model: &Model) -> f64 {
     // Contact and tip springs: with mass scaling the mass follows them, but may not be raised by much before anything is
     // squeezed; without, the step has room for all of them from the start.
     let raised = if model.effects.mass_scaling.is_some() { RAISED_AT_REST } else { 1.0 };
-    bound.iter_mut().zip(contact_bounds(model)).for_each(|(k, contact)| *k = k.max((*k + contact) / raised));
+    let springs = model.puncture.as_ref().map_or(0.0, |plan| plan.params.tip_stiffness * model.largest_spring_share());
+    bound.iter_mut().zip(contact_bounds(model)).filter(|(_, contact)| *contact > 0.0).for_each(|(k, contact)| {
+        *k = k.max((*k + contact) / raised).max(springs);
+    });
     let steps = bound.iter().zip(&mass).map(|(k, m)| 2.0 * (m / k).sqrt());
     steps.fold(f64::INFINITY, f64::min)
 }

@@ -29,7 +29,7 @@ impl Simulation {
                     ),
                 )
             }
-            (Quantity::InvertedCells, _) => {
+            (Quantity::InvertedCells | Quantity::FoldedCells, _) => {
                 let cells = record.health.inverted_cells;
                 let place = self.inverted_place(record).map_or(String::new(), |place| format!("; {place}"));
                 self.error(

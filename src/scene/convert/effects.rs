@@ -3,6 +3,7 @@
 use super::super::file::*;
 use super::super::{FaceCondition, Motion, NeedleShape, TissueMaterial, Tool};
 use super::{Check, MM, Within, parameters};
+use crate::effects::mass_scaling::Loading;
 use crate::effects::{self, EFFECTS, EffectSet};
 use crate::material::four_digits;
 use crate::needle::beam::{BeamParams, Section};
@@ -13,7 +14,7 @@ impl Check<'_> {
         file: &SceneFile,
         tool: &Option<Tool>,
         motion: &Motion,
-        faces: &[FaceCondition; 6],
+        (faces, size): (&[FaceCondition; 6], glam::DVec3),
         material: &TissueMaterial,
     ) -> EffectSet {
         let keys: Vec<&str> = EFFECTS.iter().map(|effect| effect.key).collect();
@@ -212,7 +213,9 @@ impl Check<'_> {
             Some(MassScalingEntry::Factor(factor)) => {
                 self.number("solver.mass_scaling", factor, Within::Between(1.0, 1e8))
             }
-            _ if listed("mass_scaling") => self.automatic_mass_scaling(motion, faces, material),
+            _ if listed("mass_scaling") => {
+                self.automatic_mass_scaling(&Loading::of(Some(motion), faces, size), material)
+            }
             _ => 1.0,
         };
         self.own_tables("", file.own_tables());
@@ -299,22 +302,13 @@ impl Check<'_> {
         }
     }
 
-    /// The factor of `mass_scaling = "auto"`, from the largest speed of tool and faces.
-    fn automatic_mass_scaling(
-        &mut self,
-        motion: &Motion,
-        faces: &[FaceCondition; 6],
-        material: &TissueMaterial,
-    ) -> f64 {
-        let driven =
-            faces.iter().filter_map(|face| face.drive).map(|drive| drive.displacement.length() / drive.duration);
-        let speed = driven.fold(motion.largest_speed(), f64::max);
-        let shear_modulus = material.law.shear_modulus();
-        if !(speed > 0.0 && shear_modulus > 0.0) {
+    /// The factor of `mass_scaling = "auto"`, from what moves.
+    fn automatic_mass_scaling(&mut self, loading: &Loading, material: &TissueMaterial) -> f64 {
+        let wave = (material.law.shear_modulus() / material.density).sqrt();
+        loading.auto_factor(wave).unwrap_or_else(|| {
             self.notices.push("solver.mass_scaling \"auto\" is 1: nothing in the scene moves at a known speed.".into());
-            return 1.0;
-        }
-        effects::mass_scaling::auto_factor(speed, (shear_modulus / material.density).sqrt())
+            1.0
+        })
     }
 
     fn puncture(&mut self, t: &PunctureTable) -> effects::puncture::Params {

@@ -162,7 +162,7 @@ impl Check<'_> {
         let faces = self.faces(&file.boundaries, file.tissue.mesh.is_some());
         let tool = self.tool(file);
         let motion = self.motion(file, tool.is_some());
-        let effects = self.effects(file, &tool, &motion, &faces, &material);
+        let effects = self.effects(file, &tool, &motion, (&faces, tissue.size), &material);
         parameters::settle(
             &mut material,
             &[parameters::of_preset(preset.as_ref()), file.own_tables()],

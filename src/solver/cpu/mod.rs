@@ -348,6 +348,9 @@ impl CpuEngine {
         let inverted = |m: &CellMeasure| m.damage < 1.0 && (m.jacobian <= 0.0 || m.corner_jacobian <= 0.0);
         let mut broken =
             measures.iter().enumerate().filter(|(c, m)| inverted(m) && !is_severed(*c)).map(|(c, _)| c as u32);
+        let folded = |m: &CellMeasure| inverted(m) && m.jacobian > 0.0;
+        sums.folded_cells =
+            measures.iter().enumerate().filter(|(c, m)| folded(m) && !is_severed(*c)).count() as u32;
         sums.inverted_cell = broken.next();
         sums.inverted_cells = u32::from(sums.inverted_cell.is_some()) + broken.count() as u32;
         sums.plastic_dissipation = dissipated.0 - self.booked.0;

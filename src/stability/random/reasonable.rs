@@ -3,12 +3,11 @@
 use std::f64::consts::PI;
 
 use crate::effects::cohesive::Law;
+use crate::effects::mass_scaling::{FEWEST_PASSAGES, Loading, MOST_MACH};
 use crate::material::{Isochoric, Verdict};
 use crate::model::Model;
 use crate::scene::{Face, RegionShape, Scene, TissueMaterial, Tool};
 
-/// Largest speed of what moves over the shear wave speed of the softest material at its scaled density.
-pub const MOST_MACH: f64 = 0.1;
 /// Largest speed of a tool [m/s].
 const MOST_SPEED: f64 = 0.2;
 /// Largest Poisson's ratio.
@@ -38,9 +37,13 @@ pub fn beyond(model: &Model, stable_dt: f64) -> Vec<String> {
     let scaling = model.mass_scaling();
     let wave =
         materials.iter().map(|m| (m.law.shear_modulus() / (m.density * scaling)).sqrt()).fold(f64::INFINITY, f64::min);
-    let speed = largest_speed(scene);
-    not(speed <= MOST_MACH * wave, format!("moves at {:.3} of the scaled shear wave speed", speed / wave));
-    not(scene.tool.is_none() || speed <= MOST_SPEED, format!("tool at {speed:.2} m/s"));
+    let tool = scene.tool.is_some().then_some(&scene.motion);
+    let loading = Loading::of(tool, &scene.faces, scene.tissue.size);
+    let (mach, passages) = (loading.mach(wave), loading.passages(wave));
+    // What a scene is told before it runs, here with its softest material.
+    not(mach <= MOST_MACH, format!("moves at {mach:.3} of the scaled shear wave speed"));
+    not(passages >= FEWEST_PASSAGES, format!("moves or loads a face within {passages:.1} passages of a scaled shear wave"));
+    not(loading.tool_speed <= MOST_SPEED, format!("tool at {:.2} m/s", loading.tool_speed));
     let youngs: Vec<f64> = materials.iter().map(|m| m.law.youngs_modulus()).collect();
     let (softest, stiffest) = youngs.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), e| (a.min(*e), b.max(*e)));
     not(stiffest <= MOST_CONTRAST * softest, format!("moduli 1 : {:.0}", stiffest / softest));
@@ -70,16 +73,6 @@ pub fn beyond(model: &Model, stable_dt: f64) -> Vec<String> {
     not(solver.mass_damping <= 200.0, format!("damping {:.0} 1/s", solver.mass_damping));
     not((0.03..=1.0).contains(&solver.hourglass_stiffness), format!("hourglass {:.2}", solver.hourglass_stiffness));
     why
-}
-
-/// Of tool and faces [m/s].
-fn largest_speed(scene: &Scene) -> f64 {
-    let half = 0.5 * scene.tissue.size.max_element();
-    let face = |face: &crate::scene::FaceCondition| {
-        face.drive.map_or(0.0, |drive| (drive.displacement.length() + drive.rotation.abs() * half) / drive.duration)
-    };
-    let faces = scene.faces.iter().map(face).fold(0.0, f64::max);
-    if scene.tool.is_some() { faces.max(scene.motion.largest_speed()) } else { faces }
 }
 
 fn cells(model: &Model, not: &mut impl FnMut(bool, String)) {
@@ -190,7 +183,6 @@ fn indenter(scene: &Scene, not: &mut impl FnMut(bool, String)) {
 
 fn faces(model: &Model, softest: f64, not: &mut impl FnMut(bool, String)) {
     let scene = &model.scene;
-    let wave = model.scaled_wave_speed();
     for (face, condition) in Face::ALL.iter().zip(&scene.faces) {
         let length = scene.tissue.size[face.axis()];
         if let Some(drive) = condition.drive {
@@ -204,8 +196,7 @@ fn faces(model: &Model, softest: f64, not: &mut impl FnMut(bool, String)) {
         }
         if let Some(traction) = condition.traction {
             not(traction.length() <= MOST_LOAD * softest, format!("load of {:.2} E", traction.length() / softest));
-            let ramp = condition.traction_ramp * wave / length;
-            not(ramp >= 1.0, format!("load within {ramp:.1} passages of a wave"));
+            not(condition.traction_ramp > 0.0, "load that comes at once".into());
         }
     }
 }
