@@ -137,6 +137,24 @@ impl Kinematics {
     }
 }
 
+impl Kinematics {
+    /// Pose at the beginning `time` of a step of `dt` [s]. Its velocities are means over the steps before and after, so that a force there
+    /// does the work of both halves, also where a phase begins or ends within them. Before t = 0 the tool stands still.
+    pub fn pose_of_step(&self, time: f64, dt: f64) -> ToolPose {
+        const PARTS: u32 = 16;
+        let mut pose = self.pose(time);
+        let (from, to) = (time - dt * (1.0 - 1e-6), time + dt * (1.0 - 1e-6));
+        let changes = self.legs.iter().map(|(start, _)| *start).chain([self.end]).any(|t| from < t && t < to);
+        if changes {
+            let part = |i: u32| self.pose(time + dt * (2.0 * (f64::from(i) + 0.5) / f64::from(PARTS) - 1.0));
+            let moving = (0..PARTS).filter(|i| time > 0.0 || 2 * i >= PARTS).map(part);
+            let sums = moving.fold((DVec3::ZERO, DVec3::ZERO), |s, p| (s.0 + p.velocity, s.1 + p.angular_velocity));
+            (pose.velocity, pose.angular_velocity) = (sums.0 / f64::from(PARTS), sums.1 / f64::from(PARTS));
+        }
+        pose
+    }
+}
+
 /// The rotation without spin that brings the unit vector `from` to `to`, applied to `v`.
 pub fn swing(from: DVec3, to: DVec3, v: DVec3) -> DVec3 {
     let w = from.cross(to);

@@ -78,7 +78,7 @@ impl StepInput {
             };
         }
         StepInput {
-            pose: kinematics.map(|k| k.pose(time)),
+            pose: kinematics.map(|k| k.pose_of_step(time, dt)),
             load_factor: ramp(time, model.load_ramp),
             drives,
             step: (time / dt).round() as u64,
