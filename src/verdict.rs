@@ -170,7 +170,17 @@ impl Quantity {
     /// True for what is judged by its value at the end of the run: inverted cells, and totals over all frames so far.
     pub fn is_of_the_end(self) -> bool {
         use Quantity::*;
-        matches!(self, CuredEnergy | RaisedShare | InvertedCells | FoldedCells | HourglassShare | InertiaShare | ClippedReturns | UnbalancedNeedle)
+        matches!(
+            self,
+            CuredEnergy
+                | RaisedShare
+                | InvertedCells
+                | FoldedCells
+                | HourglassShare
+                | InertiaShare
+                | ClippedReturns
+                | UnbalancedNeedle
+        )
     }
 }
 

@@ -330,7 +330,8 @@ impl GpuEngine {
     /// Brings the fields that a window draws up to date with the present state.
     pub fn encode_fields(&self, encoder: &mut wgpu::CommandEncoder) {
         let mut pass = encoder.begin_compute_pass(&Default::default());
-        for kernel in self.kernels.iter().filter(|k| k.stage.draws()) {
+        // The fields are those of the displacement after the last step, and so are the pressures that they need.
+        for kernel in self.kernels.iter().filter(|k| k.stage.averages() || k.stage.draws()) {
             kernel.encode(&mut pass, 0);
         }
     }

@@ -138,6 +138,22 @@ pub fn tool_mach(model: &Model) -> Option<f64> {
     model.kinematics.is_some().then(|| model.scene.motion.largest_speed() / wave)
 }
 
+/// Cells over the diameter of a needle beyond which a scene is told that they are coarse: there hourglass shapes held a fifth of the
+/// internal energy.
+pub const COARSEST: f64 = 0.7;
+
+/// Whether the cells are coarse against the needle.
+fn coarse_cells(model: &Model) -> Option<String> {
+    let plan = model.puncture.as_ref()?;
+    let across = model.scene.tissue.cell_size / (2.0 * plan.needle.radius);
+    (across > COARSEST).then(|| {
+        format!(
+            "cells of {across:.2} needle diameters: the tip bends them rather than parting them, and the force depends on the mesh; \
+             tissue.cell_size_mm of half a diameter or less is advised"
+        )
+    })
+}
+
 /// What will make the scaled inertia show in the force, if anything.
 fn inertia_that_shows(model: &Model) -> Option<String> {
     let scene = &model.scene;
@@ -147,7 +163,9 @@ fn inertia_that_shows(model: &Model) -> Option<String> {
     let what = match (mach > MOST_MACH, passages < FEWEST_PASSAGES && model.mass_scaling() > 1.0) {
         (true, _) => format!("the tool moves at {mach:.2} of the scaled shear wave speed"),
         (false, true) => {
-            format!("a face moves or a load grows within {passages:.1} passages of a scaled shear wave through the tissue")
+            format!(
+                "a face moves or a load grows within {passages:.1} passages of a scaled shear wave through the tissue"
+            )
         }
         (false, false) => return None,
     };
@@ -270,6 +288,7 @@ impl Simulation {
             );
         }
         notices.extend(inertia_that_shows(&model));
+        notices.extend(coarse_cells(&model));
         let most = purpose.most_steps(steps_per_frame);
         let engine = super::change::engine(&model, device.as_ref(), dt, most, purpose.drawn)?;
         let kinematics = match purpose.led {

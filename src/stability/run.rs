@@ -43,7 +43,7 @@ impl Trace {
 
     fn drift(&self) -> f64 {
         let tenth = (self.records.len() / 10).max(1);
-        let stored = |r: &FrameRecord| r.energy.elastic + r.energy.hourglass + r.energy.kinetic;
+        let stored = |r: &FrameRecord| r.energy.elastic + r.energy.hourglass + r.energy.kinetic + r.energy.half_step;
         let sum = |records: &[FrameRecord]| records.iter().map(stored).sum::<f64>();
         (sum(&self.records[self.records.len().saturating_sub(tenth)..])
             / sum(&self.records[..tenth.min(self.records.len())])

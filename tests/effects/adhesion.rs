@@ -34,7 +34,9 @@ fn insertion_with(
         *face = held(true, true, true);
     }
     let c_s = (scene.material.law.shear_modulus() / DENSITY).sqrt();
-    scene.effects.mass_scaling = Some(mass_scaling::Params { factor: mass_scaling::auto_factor(speed, c_s) });
+    scene.effects.mass_scaling = Some(mass_scaling::Params {
+        factor: mass_scaling::Loading { tool_speed: speed, slowness: None }.auto_factor(c_s).unwrap(),
+    });
     scene.solver.hourglass_quartic = HOURGLASS_PUNCTURE.1;
     scene.solver.mass_damping = 30.0;
     scene.effects.puncture = Some(puncture::Params::default());
@@ -123,12 +125,15 @@ fn both_engines_see_the_same_and_the_account_closes() {
                 f.damping_dissipation
                     + f.contact_dissipation
                     + f.tip_dissipation
+                    + f.cap_dissipation
                     + f.softening_dissipation
                     + f.adhesion_dissipation
+                    + f.raised_mass_energy
+                    + f.speed_limit_energy
             })
             .sum();
         let end = frames.last().unwrap();
-        let gap = (work - lost - end.elastic - end.hourglass - end.kinetic - end.contact_energy) / work;
+        let gap = (work - lost - end.elastic - end.hourglass - end.kinetic - end.half_step - end.contact_energy) / work;
         let adhesion: f64 = frames.iter().map(|f| f.adhesion_dissipation).sum();
         println!("{name}: work {work:.3e} J, adhesion {adhesion:.3e} J, gap {gap:.4}");
         assert!(adhesion > 0.02 * work);

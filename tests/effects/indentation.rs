@@ -47,7 +47,7 @@ fn force_at_rest(model: &Arc<Model>) -> Vec<(&'static str, f64)> {
             damped += sums.damping_dissipation + sums.contact_dissipation;
         }
         assert!(sums.kinetic < 1e-4 * sums.elastic, "{name}: not at rest");
-        let audit = sums.elastic + sums.hourglass + sums.kinetic + sums.contact_energy + damped;
+        let audit = sums.elastic + sums.hourglass + sums.kinetic + sums.half_step + sums.contact_energy + damped;
         at_most(&format!("{name}, energy gap over the work"), (work - audit).abs() / work, 0.02);
         let force = sums.impulse.z / (steps as f64 * dt);
         at_most(

@@ -47,20 +47,23 @@ impl CpuEngine {
                 sums.stored = points.stored;
                 sums.damping = memory.damped(points.damping, v, dt);
                 memory.touching = points.pressing > 0.0;
-                if memory.touching || memory.stick != DVec3::ZERO {
-                    if let Some(friction) = model.effects.friction {
-                        let n = sums.normal.normalize_or_zero();
-                        let kt = friction.stiffness_ratio * k;
-                        let trial = memory.stick + (v - n * v.dot(n)) * dt;
-                        let trial = trial - n * trial.dot(n);
-                        let length = trial.length();
-                        let allowed = friction.coefficient * points.pressing / kt;
-                        let stick = if length > allowed { trial * (allowed / length) } else { trial };
-                        sums.friction_work = 0.5 * kt * (memory.stick + stick).dot(trial - stick);
-                        memory.stick = stick;
-                        sums.friction = stick * -kt;
-                        sums.stored += 0.5 * kt * memory.stick.length_squared();
-                    }
+                if let Some(friction) = model.effects.friction {
+                    let n = sums.normal.normalize_or_zero();
+                    let kt = friction.stiffness_ratio * k;
+                    let trial = memory.stick + (v - n * v.dot(n)) * dt;
+                    let trial = trial - n * trial.dot(n);
+                    let length = trial.length();
+                    let allowed = friction.coefficient * points.pressing / kt;
+                    // Without contact the spring lets go.
+                    let stick = match memory.touching {
+                        true if length <= allowed => trial,
+                        true => trial * (allowed / length),
+                        false => DVec3::ZERO,
+                    };
+                    sums.friction_work = 0.5 * kt * (memory.stick + stick).dot(trial - stick);
+                    memory.stick = stick;
+                    sums.friction = stick * -kt;
+                    sums.stored += 0.5 * kt * stick.length_squared();
                 }
                 sums.torque += (x - pose.tip).cross(sums.friction);
             }

@@ -349,8 +349,7 @@ impl CpuEngine {
         let mut broken =
             measures.iter().enumerate().filter(|(c, m)| inverted(m) && !is_severed(*c)).map(|(c, _)| c as u32);
         let folded = |m: &CellMeasure| inverted(m) && m.jacobian > 0.0;
-        sums.folded_cells =
-            measures.iter().enumerate().filter(|(c, m)| folded(m) && !is_severed(*c)).count() as u32;
+        sums.folded_cells = measures.iter().enumerate().filter(|(c, m)| folded(m) && !is_severed(*c)).count() as u32;
         sums.inverted_cell = broken.next();
         sums.inverted_cells = u32::from(sums.inverted_cell.is_some()) + broken.count() as u32;
         sums.plastic_dissipation = dissipated.0 - self.booked.0;
@@ -463,14 +462,14 @@ impl Engine for CpuEngine {
                 // Tools do work with the force at the beginning of a step: half of the last one is to come.
                 self.sums.half_step = 0.5 * (self.sums.tool_work - worked);
                 self.measure_stored();
+                if let Some(pose) = &input.pose {
+                    self.share_needle_loads(pose);
+                }
             }
             self.integrate_nodes(input);
         }
         if plan.steps.is_empty() {
             self.measure_stored();
-        }
-        if let Some(pose) = plan.steps.last().and_then(|s| s.pose) {
-            self.share_needle_loads(&pose);
         }
         self.measure_nodes();
         self.finished.push_back(std::mem::take(&mut self.sums));

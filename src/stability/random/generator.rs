@@ -174,7 +174,7 @@ impl Draft {
         let gauge = gauges[n.below(if tame { 7 } else { gauges.len() })];
         let by_gauge = n.chance(0.7);
         let diameter = if by_gauge { gauge.outer_diameter * 1e3 } else { n.between(0.8, 2.2) };
-        let fine = if tame { n.between(0.5, 0.95) } else { n.log(0.45, 1.8) };
+        let fine = if tame { n.between(0.35, 0.7) } else { n.log(0.45, 1.8) };
         self.cell = (fine * diameter).clamp(0.4, 1.3);
         let h = self.cell;
         let radius = 0.5 * diameter;

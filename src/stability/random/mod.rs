@@ -8,20 +8,20 @@
 //! Size: at most [`MOST_CELLS`] cells and [`MOST_CELL_STEPS`] steps times cells: 0.3 to 3 s of CPU time. Pace and cells follow that bound:
 //! a scene that would take longer moves faster.
 //!
-//! A scene may end *ok*, *doubtful*, *refused* or *stopped*, the last two with a way out. Nothing else counts: no panic, no hang, and
+//! A scene may end *ok*, *doubtful*, *refused* or *stopped*, each with its reason, a refusal with a way out. Nothing else counts: no panic, no hang, and
 //! no run that says ok while its energy, measured here on its own, is out of balance by more than [`MOST_IMBALANCE`].
 //!
 //! | reasonable is | bound |
 //! |---|---|
-//! | speed | 0.1 of the shear wave speed of the softest material at its scaled density; a tool 0.2 m/s |
+//! | speed | a tool 0.06 of the shear wave speed of the softest material at its scaled density, and 0.2 m/s; five passages of that wave while a face moves or a load grows (what a scene is told before it runs) |
 //! | materials | stable laws; nu 0 to 0.499; moduli within 1 : 30; Ogden 1 <= abs(alpha) <= 10, Demiray b <= 10, Yeoh c20, c30 <= 3 c10 |
-//! | cells | at most 1.05 needle diameters, an indenter 1.5 cells in radius, a sample 3 across, a region 1 |
+//! | cells | at most 0.7 needle diameters (what a scene is told before it runs), an indenter 1.5 cells in radius, a sample 3 across, a region 1 |
 //! | tip forces | puncture force 0.5 to 25 E over the section of the needle, cutting below it; a membrane up to 2 mm times it |
 //! | path | radius and 2 cells from the sides, 2 cells from the bottom; turns up to 10 degrees in the tissue; at most 4 phases |
 //! | flexible needle | punctures below half of its buckling load |
 //! | tip numbers | tip springs 0.3 to 10 N/mm, contact stiffness 0.5 to 5, damping to 0.6, softening and fade near their defaults |
 //! | indentation | 0.85 radii and a quarter of the height |
-//! | faces | pressed by 0.35, pulled or sheared by 0.5, turned by 90 degrees, loaded by 0.3 E in a passage of a wave or more |
+//! | faces | pressed by 0.35, pulled or sheared by 0.5, turned by 90 degrees, loaded by 0.3 E, not at once |
 //! | gravity | 10 m/s^2 and a tenth of E |
 //! | plasticity, fibres | yields above 0.1 E, hardens below 20 E; k1 up to 5 mu, k2 up to 3 |
 //! | bond | fails at twice its onset or later, strength 0.05 to 6 E |

@@ -7,6 +7,7 @@ use crate::effects::mass_scaling::{FEWEST_PASSAGES, Loading, MOST_MACH};
 use crate::material::{Isochoric, Verdict};
 use crate::model::Model;
 use crate::scene::{Face, RegionShape, Scene, TissueMaterial, Tool};
+use crate::solver::simulation::COARSEST;
 
 /// Largest speed of a tool [m/s].
 const MOST_SPEED: f64 = 0.2;
@@ -42,7 +43,10 @@ pub fn beyond(model: &Model, stable_dt: f64) -> Vec<String> {
     let (mach, passages) = (loading.mach(wave), loading.passages(wave));
     // What a scene is told before it runs, here with its softest material.
     not(mach <= MOST_MACH, format!("moves at {mach:.3} of the scaled shear wave speed"));
-    not(passages >= FEWEST_PASSAGES, format!("moves or loads a face within {passages:.1} passages of a scaled shear wave"));
+    not(
+        passages >= FEWEST_PASSAGES,
+        format!("moves or loads a face within {passages:.1} passages of a scaled shear wave"),
+    );
     not(loading.tool_speed <= MOST_SPEED, format!("tool at {:.2} m/s", loading.tool_speed));
     let youngs: Vec<f64> = materials.iter().map(|m| m.law.youngs_modulus()).collect();
     let (softest, stiffest) = youngs.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), e| (a.min(*e), b.max(*e)));
@@ -81,7 +85,7 @@ fn cells(model: &Model, not: &mut impl FnMut(bool, String)) {
     match &scene.tool {
         Some(Tool::Needle(needle)) => {
             let across = h / (2.0 * needle.radius);
-            not(across <= 1.05, format!("cells of {across:.2} needle diameters"));
+            not(across <= COARSEST, format!("cells of {across:.2} needle diameters"));
             not(h >= 0.25e-3, format!("cells of {:.2} mm", h * 1e3));
         }
         Some(Tool::Sphere { radius } | Tool::FlatPunch { radius, .. }) => {

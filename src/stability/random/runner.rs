@@ -181,7 +181,9 @@ fn contradiction(verdict: &Verdict, records: &[FrameRecord], imbalance: f64) -> 
             Quantity::EnergyImbalance => imbalance.is_nan() || imbalance.abs() >= 0.25 * MOST_IMBALANCE,
             Quantity::ClampedShare => any(|r| r.health.clamped_nodes > 0),
             Quantity::RaisedShare => any(|r| r.health.raised_mass > 0),
-            Quantity::InvertedCells | Quantity::FoldedCells => records.last().is_some_and(|r| r.health.inverted_cells > 0),
+            Quantity::InvertedCells | Quantity::FoldedCells => {
+                records.last().is_some_and(|r| r.health.inverted_cells > 0)
+            }
             Quantity::ClippedReturns => any(|r| r.health.return_failures > 0),
             Quantity::HourglassShare => any(|r| r.energy.hourglass > 0.1 * r.energy.elastic),
             Quantity::InertiaShare => any(|r| r.energy.kinetic > 0.05 * r.energy.elastic),
