@@ -866,7 +866,13 @@ impl Draft {
                 "motion.phase.0.speed_mm_s"
             }
             6 => {
-                self.body += "[flat_punch]\nradius_mm = 2.0\n\n[sphere]\nradius_mm = 3.0\n\n";
+                // A table that is there already would be no TOML at all.
+                for tool in ["flat_punch", "sphere"] {
+                    let table = format!("[{tool}]\n");
+                    if !self.body.contains(&table) {
+                        self.body += &format!("{table}radius_mm = 3.0\n\n");
+                    }
+                }
                 "tools"
             }
             _ => {
