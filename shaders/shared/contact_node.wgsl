@@ -77,7 +77,7 @@ struct Memory {
 // Sums over the steps of a frame; forces on the tissue.
 struct ContactSums {
     // Whole impulse [N s] and angular impulse about the tip [N m s]. In the record of a node, w: work of the tool in the step that was booked
-    // last [J], and that step, modulo 65536. In the sums, w of the impulse: work in the last step of the frame [J].
+    // last, with the velocity ahead [J], and that step, modulo 65536. In the sums, w of the impulse: that work in the last step of the frame [J].
     impulse: vec4<f32>,
     angular_impulse: vec4<f32>,
     // Parts along the insertion direction [N s]: cutting, spreading, sliding, and the part of spreading on the shaft of a needle.
@@ -155,12 +155,14 @@ fn book_contact(
     let d = step_input.direction.xyz * params.dt;
     let torque = cross(lever, total);
     var power = dot(total, step_input.velocity.xyz);
+    var power_ahead = dot(total, step_input.velocity_ahead.xyz);
 #ifdef FREE_PATH
     power += dot(torque, angular_velocity());
+    power_ahead += dot(torque, step_input.angular_velocity_ahead.xyz);
 #endif
     let work = power * params.dt + more.work;
     let impulse = contact_records[index].impulse.xyz + total * params.dt;
-    contact_records[index].impulse = vec4<f32>(impulse, work);
+    contact_records[index].impulse = vec4<f32>(impulse, power_ahead * params.dt + more.work);
     let angular_impulse = contact_records[index].angular_impulse.xyz + torque * params.dt + more.angular_impulse;
     contact_records[index].angular_impulse = vec4<f32>(angular_impulse, step_mark());
     contact_records[index].parts += vec4<f32>(dot(tip, d), dot(normal, d), dot(tangential, d), more.shaft);

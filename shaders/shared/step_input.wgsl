@@ -13,6 +13,9 @@ struct StepInput {
     tip: vec4<f32>,
     velocity: vec4<f32>,
     direction: vec4<f32>,
+    // Velocity and angular velocity over the step that begins now; the others are means over the steps before and after. w unused.
+    velocity_ahead: vec4<f32>,
+    angular_velocity_ahead: vec4<f32>,
     // Depth of the tip from the entry point along the direction [m].
     depth: f32,
     // Number of the step since t = 0.

@@ -8,7 +8,8 @@ use crate::error::Result;
 use crate::material::{describe_constants, describe_verdict, four_digits};
 use crate::mesh::Mesh;
 use crate::scene::{Face, FaceDrive, RegionShape, Scene, TipShape, TissueMaterial, Tool};
-use crate::solver::simulation::{EngineChoice, Simulation, tool_mach};
+use crate::solver::advice::tool_mach;
+use crate::solver::simulation::{EngineChoice, Simulation};
 use crate::solver::stable_dt::power_iteration;
 
 /// Wall time that the trial of the prediction may take [s].

@@ -479,7 +479,7 @@ impl GpuEngine {
                     for s in read_all::<ContactSums>(bytes) {
                         let vector = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
                         sums.impulse += vector(s.impulse);
-                        // Tools do work with the force at the beginning of a step: half of the last one is to come.
+                        // What the tool does until the middle of the last step goes into the springs of contact.
                         sums.half_step += has_steps * 0.5 * f64::from(s.impulse[3]);
                         sums.angular_impulse += vector(s.angular_impulse);
                         let [cutting, spreading, sliding, shaft] = s.parts.map(f64::from);
@@ -1351,6 +1351,8 @@ fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) ->
         out.tip = with(pose.tip, spin.x);
         out.velocity = with(pose.velocity, spin.y);
         out.direction = with(pose.direction, spin.z);
+        out.velocity_ahead = vec4(pose.velocity_ahead);
+        out.angular_velocity_ahead = vec4(pose.angular_velocity_ahead);
         out.depth = pose.depth as f32;
     }
     for (out, drive) in out.drives.iter_mut().zip(&input.drives) {

@@ -110,6 +110,8 @@ shared_structs! {
         tip: [f32; 4],
         velocity: [f32; 4],
         direction: [f32; 4],
+        velocity_ahead: [f32; 4],
+        angular_velocity_ahead: [f32; 4],
         depth: f32,
         step: u32,
         load_factor: f32,

@@ -24,6 +24,10 @@ pub struct ToolPose {
     pub direction: DVec3,
     /// Angular velocity [rad/s]: a point of the tool at the lever l from the tip moves with v + omega x l.
     pub angular_velocity: DVec3,
+    /// The same two over the step that begins with this pose [m/s], [rad/s]; they differ where a phase begins or ends within the steps
+    /// before and after.
+    pub velocity_ahead: DVec3,
+    pub angular_velocity_ahead: DVec3,
     /// Depth along the direction from the entry point [m].
     pub depth: f64,
     /// Index of the phase.
@@ -126,11 +130,15 @@ impl Kinematics {
             leg.at(time - start)
         };
         let (offset, shaking) = self.vibration.map_or((DVec3::ZERO, DVec3::ZERO), |v| v.at(time));
+        let velocity = at.velocity + shaking;
+        let angular_velocity = swing_rate(self.reference, at.direction, at.turning);
         ToolPose {
             tip: at.tip + offset,
-            velocity: at.velocity + shaking,
+            velocity,
             direction: at.direction,
-            angular_velocity: swing_rate(self.reference, at.direction, at.turning),
+            angular_velocity,
+            velocity_ahead: velocity,
+            angular_velocity_ahead: angular_velocity,
             depth: at.depth + offset.dot(at.direction),
             phase: if self.led { 0 } else { phase.min(last) },
         }
@@ -141,15 +149,23 @@ impl Kinematics {
     /// Pose at the beginning `time` of a step of `dt` [s]. Its velocities are means over the steps before and after, so that a force there
     /// does the work of both halves, also where a phase begins or ends within them. Before t = 0 the tool stands still.
     pub fn pose_of_step(&self, time: f64, dt: f64) -> ToolPose {
-        const PARTS: u32 = 16;
+        const PARTS: u32 = 8;
         let mut pose = self.pose(time);
         let (from, to) = (time - dt * (1.0 - 1e-6), time + dt * (1.0 - 1e-6));
         let changes = self.legs.iter().map(|(start, _)| *start).chain([self.end]).any(|t| from < t && t < to);
         if changes {
-            let part = |i: u32| self.pose(time + dt * (2.0 * (f64::from(i) + 0.5) / f64::from(PARTS) - 1.0));
-            let moving = (0..PARTS).filter(|i| time > 0.0 || 2 * i >= PARTS).map(part);
-            let sums = moving.fold((DVec3::ZERO, DVec3::ZERO), |s, p| (s.0 + p.velocity, s.1 + p.angular_velocity));
-            (pose.velocity, pose.angular_velocity) = (sums.0 / f64::from(PARTS), sums.1 / f64::from(PARTS));
+            // Means over half of the time: `from` is -1 for the step before, 0 for the step after.
+            let mean = |from: f64| {
+                let at = |i: u32| self.pose(time + dt * (from + (f64::from(i) + 0.5) / f64::from(PARTS)));
+                let sums = (0..PARTS)
+                    .map(at)
+                    .fold((DVec3::ZERO, DVec3::ZERO), |s, p| (s.0 + p.velocity, s.1 + p.angular_velocity));
+                (sums.0 / f64::from(PARTS), sums.1 / f64::from(PARTS))
+            };
+            let before = if time > 0.0 { mean(-1.0) } else { (DVec3::ZERO, DVec3::ZERO) };
+            let after = mean(0.0);
+            (pose.velocity, pose.angular_velocity) = (0.5 * (before.0 + after.0), 0.5 * (before.1 + after.1));
+            (pose.velocity_ahead, pose.angular_velocity_ahead) = after;
         }
         pose
     }

@@ -106,6 +106,8 @@ pub struct FrameSums {
     pub angular_impulse: DVec3,
     /// Work done by the tool [J]; with a flexible needle that of its hub, once the run has booked the beam.
     pub tool_work: f64,
+    /// Of the last step only, with the speed of the tool after its beginning [J].
+    pub last_tool_work: f64,
     /// Impulse on the tissue, shared over the entries of the centre-line [N s]; zero without a flexible needle.
     pub needle_loads: [DVec3; ENTRY_COUNT],
     /// Total: gained and damped by a flexible needle [J].

@@ -1,5 +1,6 @@
 //! The step: one list of stages, two engines.
 
+pub mod advice;
 pub mod change;
 pub mod checkpoint;
 pub mod clock;

@@ -4,13 +4,13 @@ use std::collections::{BTreeSet, VecDeque};
 use std::str::FromStr;
 use std::sync::Arc;
 
+use super::advice::advice;
 use super::checkpoint::{Checkpoint, foreign_image};
 use super::clock::Clock;
 use super::elements::{CellShape, CellStates, Elements};
 use super::engine::{Engine, FramePlan, FrameSums, State, StepInput};
 use super::stable_dt::{power_iteration, wave_speed_bound};
 use super::stiffening::DueStep;
-use crate::effects::mass_scaling::{AUTO_MACH, AUTO_PASSAGES, FEWEST_PASSAGES, Loading, MOST_MACH};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::material::{Verdict, von_mises};
@@ -132,48 +132,6 @@ pub fn choose_step(model: &Model, stable_dt: f64) -> (f64, u64) {
     (frame / steps, steps as u64)
 }
 
-/// Largest tool speed over the shear wave speed at the scaled density; `None` without a tool.
-pub fn tool_mach(model: &Model) -> Option<f64> {
-    let wave = (model.scene.material.law.shear_modulus() / model.scaled_density()).sqrt();
-    model.kinematics.is_some().then(|| model.scene.motion.largest_speed() / wave)
-}
-
-/// Cells over the diameter of a needle beyond which a scene is told that they are coarse: there hourglass shapes held a fifth of the
-/// internal energy.
-pub const COARSEST: f64 = 0.7;
-
-/// Whether the cells are coarse against the needle.
-fn coarse_cells(model: &Model) -> Option<String> {
-    let plan = model.puncture.as_ref()?;
-    let across = model.scene.tissue.cell_size / (2.0 * plan.needle.radius);
-    (across > COARSEST).then(|| {
-        format!(
-            "cells of {across:.2} needle diameters: the tip bends them rather than parting them, and the force depends on the mesh; \
-             tissue.cell_size_mm of half a diameter or less is advised"
-        )
-    })
-}
-
-/// What will make the scaled inertia show in the force, if anything.
-fn inertia_that_shows(model: &Model) -> Option<String> {
-    let scene = &model.scene;
-    let loading = Loading::of(model.kinematics.is_some().then_some(&scene.motion), &scene.faces, scene.tissue.size);
-    let wave = (scene.material.law.shear_modulus() / model.scaled_density()).sqrt();
-    let (mach, passages) = (loading.mach(wave), loading.passages(wave));
-    let what = match (mach > MOST_MACH, passages < FEWEST_PASSAGES && model.mass_scaling() > 1.0) {
-        (true, _) => format!("the tool moves at {mach:.2} of the scaled shear wave speed"),
-        (false, true) => {
-            format!(
-                "a face moves or a load grows within {passages:.1} passages of a scaled shear wave through the tissue"
-            )
-        }
-        (false, false) => return None,
-    };
-    Some(format!(
-        "{what}: inertia will show in the force; lower solver.mass_scaling (\"auto\" keeps to {AUTO_MACH} and {AUTO_PASSAGES} passages)"
-    ))
-}
-
 impl Simulation {
     /// Prepares a scene: mesh, model, stable step, engine.
     ///
@@ -287,8 +245,7 @@ impl Simulation {
                     .into(),
             );
         }
-        notices.extend(inertia_that_shows(&model));
-        notices.extend(coarse_cells(&model));
+        notices.extend(advice(&model));
         let most = purpose.most_steps(steps_per_frame);
         let engine = super::change::engine(&model, device.as_ref(), dt, most, purpose.drawn)?;
         let kinematics = match purpose.led {

@@ -393,6 +393,7 @@ impl FrameSums {
         self.impulse += total * dt;
         self.angular_impulse += c.torque * dt;
         self.tool_work += (total.dot(pose.velocity) + c.torque.dot(pose.angular_velocity)) * dt;
+        self.last_tool_work += (total.dot(pose.velocity_ahead) + c.torque.dot(pose.angular_velocity_ahead)) * dt;
         self.friction_dissipation += c.friction_work;
         self.contact_dissipation += c.damping + c.released;
     }
@@ -456,11 +457,11 @@ impl Engine for CpuEngine {
             if crate::ending::is_overdue() {
                 return Err(Error::Ended(crate::ending::reason()));
             }
-            let worked = self.sums.tool_work;
+            self.sums.last_tool_work = 0.0;
             self.forces(input);
             if index + 1 == plan.steps.len() {
-                // Tools do work with the force at the beginning of a step: half of the last one is to come.
-                self.sums.half_step = 0.5 * (self.sums.tool_work - worked);
+                // What the tool does until the middle of the last step, with the speed that it has then, goes into the springs of contact.
+                self.sums.half_step = 0.5 * self.sums.last_tool_work;
                 self.measure_stored();
                 if let Some(pose) = &input.pose {
                     self.share_needle_loads(pose);

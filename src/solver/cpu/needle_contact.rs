@@ -174,6 +174,7 @@ impl CpuEngine {
             self.sums.book(&sums, pose, self.dt);
             if line.is_some() {
                 self.sums.tool_work += bend_power * self.dt;
+                self.sums.last_tool_work += bend_power * self.dt;
                 self.node_impulse[index] += total * self.dt;
             }
         }

@@ -146,6 +146,7 @@ struct Drawn {
     /// [Pa]
     shear: f64,
     young: f64,
+    bulk: f64,
     /// [kg/m^3]
     density: f64,
 }
@@ -579,8 +580,9 @@ impl Draft {
         let path = std::mem::take(&mut self.tables);
         let mut table = String::new();
         let area = std::f64::consts::PI * (0.5e-3 * diameter).powi(2);
-        let pressure = if tame { n.between(2.0, 12.0) } else { n.log(0.5, 60.0) };
-        let force = (pressure * soft.young * area).clamp(0.005, 20.0);
+        let pressure = if tame { n.between(1.0, 6.5) } else { n.log(0.5, 60.0) };
+        let bears = if tame { 2.8 * soft.bulk } else { f64::INFINITY };
+        let force = ((pressure * soft.young).min(bears) * area).clamp(0.005, 20.0);
         let cutting = force * if tame { n.between(0.3, 0.9) } else { n.between(0.2, 1.1) };
         if tame || n.chance(0.9) {
             writeln!(table, "puncture_force_n = {}\ncutting_force_n = {}", written(force), written(cutting))
@@ -1059,7 +1061,7 @@ fn material(n: &mut Numbers, tame: bool) -> Drawn {
 }
 
 fn drawn(lines: Vec<String>, law: ElasticLaw, density: f64) -> Drawn {
-    Drawn { lines, shear: law.shear_modulus(), young: law.youngs_modulus(), density }
+    Drawn { lines, shear: law.shear_modulus(), young: law.youngs_modulus(), bulk: law.bulk_modulus, density }
 }
 
 /// A block of tetrahedra, six in each of `cells`, its inner nodes moved by up to `jitter` of a cell, as text of Gmsh 2.2.

@@ -4,10 +4,11 @@ use std::f64::consts::PI;
 
 use crate::effects::cohesive::Law;
 use crate::effects::mass_scaling::{FEWEST_PASSAGES, Loading, MOST_MACH};
+use crate::effects::puncture::{MOST_PRESSURE_OVER_BULK, MOST_PRESSURE_OVER_YOUNG};
 use crate::material::{Isochoric, Verdict};
 use crate::model::Model;
 use crate::scene::{Face, RegionShape, Scene, TissueMaterial, Tool};
-use crate::solver::simulation::COARSEST;
+use crate::solver::advice::{COARSEST, MOST_JUMP, edge_jump, mean_edge, puncture_pressure};
 
 /// Largest speed of a tool [m/s].
 const MOST_SPEED: f64 = 0.2;
@@ -15,8 +16,8 @@ const MOST_SPEED: f64 = 0.2;
 const MOST_NU: f64 = 0.499;
 /// Largest ratio of the moduli of two materials.
 const MOST_CONTRAST: f64 = 30.0;
-/// Puncture force over section of the needle and Young's modulus.
-const PRESSURE: [f64; 2] = [0.5, 25.0];
+/// Least puncture force over section of the needle and Young's modulus.
+const LEAST_PRESSURE: f64 = 0.5;
 /// Strain of a driven face: pressed, pulled, sheared; its twist [rad]; a load over Young's modulus.
 const MOST_PRESSED: f64 = 0.35;
 const MOST_PULLED: f64 = 0.5;
@@ -114,15 +115,15 @@ fn needle(model: &Model, materials: &[&TissueMaterial], not: &mut impl FnMut(boo
         let (force, cutting) = forces.unwrap_or((puncture.puncture_force, puncture.cutting_force));
         let pressure = force / (area * material.law.youngs_modulus());
         hardest = hardest.max(force);
-        not(
-            (PRESSURE[0]..=PRESSURE[1]).contains(&pressure),
-            format!("puncture force of {pressure:.1} E over the section"),
-        );
+        not(pressure >= LEAST_PRESSURE, format!("puncture force of {pressure:.1} E over the section"));
         not(cutting <= force, "cutting force above the puncture force".into());
         if let Some(energy) = material.membrane_energy {
             not(energy <= 2e-3 * force, format!("membrane of {:.2} mJ", energy * 1e3));
         }
     }
+    let (over_young, over_bulk) = puncture_pressure(scene).unwrap_or_default();
+    not(over_young <= MOST_PRESSURE_OVER_YOUNG, format!("puncture force of {over_young:.1} E over the section"));
+    not(over_bulk <= MOST_PRESSURE_OVER_BULK, format!("puncture force of {over_bulk:.1} K over the section"));
     let motion = &scene.motion;
     let through = motion.deepest_point().z < -scene.tissue.size.z;
     not(through || motion.deepest_point().z >= 1.9 * h - scene.tissue.size.z, "ends beside the bottom".into());
@@ -187,6 +188,8 @@ fn indenter(scene: &Scene, not: &mut impl FnMut(bool, String)) {
 
 fn faces(model: &Model, softest: f64, not: &mut impl FnMut(bool, String)) {
     let scene = &model.scene;
+    let jump = edge_jump(scene).map_or(0.0, |(jump, ..)| jump / mean_edge(&model.mesh));
+    not(jump <= MOST_JUMP, format!("a face moves by {jump:.1} cells against one that holds their edge"));
     for (face, condition) in Face::ALL.iter().zip(&scene.faces) {
         let length = scene.tissue.size[face.axis()];
         if let Some(drive) = condition.drive {
@@ -238,5 +241,28 @@ fn effects(model: &Model, materials: &[&TissueMaterial], softest: f64, not: &mut
         }
         let strength = cohesive.strength.max(cohesive.shear_strength) / scene.material.law.youngs_modulus();
         not((0.05..=6.0).contains(&strength), format!("bond of {strength:.2} E"));
+        let hung = hung_load(scene, cohesive);
+        not(hung <= 1.0, format!("a dead load of {hung:.1} of the bond that it hangs on"));
     }
+}
+
+/// Largest nominal stress of a dead load on a plane that may part, across the plane and bending included, over the strength of the bond:
+/// beyond 1 what hangs on the bond flies away for as long as the run lasts.
+fn hung_load(scene: &Scene, cohesive: &crate::effects::cohesive::Params) -> f64 {
+    let centre = 0.5 * glam::DVec3::new(0.0, 0.0, -scene.tissue.size.z);
+    let stress = |plane: &crate::effects::cohesive::Plane| {
+        let on = Face::ALL.into_iter().filter(|f| f.axis() == plane.axis).filter_map(|face| {
+            let load = scene.faces[face as usize].traction?;
+            let half = if face.is_max() { 0.5 } else { -0.5 } * scene.tissue.size[plane.axis];
+            let arm = (centre[plane.axis] + half - plane.at).abs();
+            let bending = (0..3).filter(|a| *a != plane.axis).map(|a| 6.0 * load[a].abs() * arm / scene.tissue.size[a]);
+            let outwards = if face.is_max() { load[plane.axis] } else { -load[plane.axis] };
+            Some(
+                (outwards.max(0.0) + bending.sum::<f64>())
+                    .hypot(load.reject_from(glam::DVec3::AXES[plane.axis]).length()),
+            )
+        });
+        on.fold(0.0, f64::max)
+    };
+    cohesive.planes.iter().map(stress).fold(0.0, f64::max) / cohesive.strength.min(cohesive.shear_strength)
 }

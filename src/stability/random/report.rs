@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::generator::RandomScene;
 use super::runner::{End, Outcome, apart};
-use super::{MOST_APART, OK_PART};
+use super::{MOST_APART, OK_PART, SENSITIVE};
 
 /// One scene on all engines.
 #[derive(Debug, Clone, Serialize)]
@@ -17,6 +17,8 @@ pub struct SceneReport {
     pub outcomes: Vec<Outcome>,
     /// Largest difference of the forces of the first two engines over the largest force.
     pub apart: Option<f64>,
+    /// The same of the CPU engine and itself, with bulk moduli that differ by one rounding of f32; known where the engines are apart.
+    pub own: Option<f64>,
     /// True where the scene holds a deliberate mistake.
     pub mistaken: bool,
 }
@@ -27,7 +29,14 @@ impl SceneReport {
             [found, reference, ..] => apart(found, reference),
             _ => None,
         };
-        SceneReport { seed: scene.seed, index: scene.index, outcomes, apart, mistaken: scene.mistake.is_some() }
+        SceneReport {
+            seed: scene.seed,
+            index: scene.index,
+            outcomes,
+            apart,
+            own: None,
+            mistaken: scene.mistake.is_some(),
+        }
     }
 
     /// True for a scene within what a user would do, as it came to run. A refused one counts among the others: none of its numbers
@@ -46,6 +55,12 @@ impl SceneReport {
         self.reasonable()
             && self.outcomes.iter().all(|o| o.end == End::Ok)
             && self.apart.is_some_and(|part| part.is_nan() || part > MOST_APART)
+            && !self.is_sensitive()
+    }
+
+    /// True where the CPU engine cannot follow itself either.
+    pub fn is_sensitive(&self) -> bool {
+        self.own.is_some_and(|part| part > SENSITIVE)
     }
 
     /// True where an engine ended as none may.
@@ -118,6 +133,10 @@ impl SceneReport {
         if let Some(apart) = self.apart {
             write!(text, "; forces apart {:.3} %", 100.0 * apart).expect("text grows");
         }
+        if let Some(own) = self.own {
+            write!(text, " (the CPU engine from itself after one rounding of f32: {:.4} %)", 100.0 * own)
+                .expect("text grows");
+        }
         text
     }
 }
@@ -188,8 +207,16 @@ impl RandomReport {
                     .expect("text grows");
             }
         }
-        let compared = self.scenes.iter().filter(|s| s.reasonable()).filter_map(|s| s.apart);
+        let compared = self.scenes.iter().filter(|s| s.reasonable() && !s.is_sensitive()).filter_map(|s| s.apart);
         let (count, worst) = compared.fold((0, 0.0_f64), |(n, worst), x| (n + 1, worst.max(x)));
+        let sensitive: Vec<u64> = self.scenes.iter().filter(|s| s.is_sensitive()).map(|s| s.index).collect();
+        if !sensitive.is_empty() {
+            writeln!(
+                text,
+                "not compared, since the CPU engine does not follow itself after one rounding of f32 either: {sensitive:?}"
+            )
+            .expect("text grows");
+        }
         if count > 0 {
             writeln!(
                 text,

@@ -17,6 +17,7 @@ use crate::Error;
 use crate::gpu::Gpu;
 use crate::model::Model;
 use crate::observables::FrameRecord;
+use crate::scene::Scene;
 use crate::solver::simulation::Simulation;
 use crate::verdict::{Quantity, Verdict};
 
@@ -196,15 +197,16 @@ fn contradiction(verdict: &Verdict, records: &[FrameRecord], imbalance: f64) -> 
     })
 }
 
-/// Runs a scene on the device, or on the CPU engine without one. `folder` holds its mesh.
-pub fn run(scene: &RandomScene, folder: &Path, device: Option<Gpu>) -> Outcome {
+/// Runs a scene on the device, or on the CPU engine without one, with bulk moduli of `1 + nudge` times those of its text. `folder` holds
+/// its mesh.
+pub fn run(scene: &RandomScene, folder: &Path, device: Option<Gpu>, nudge: f64) -> Outcome {
     let engine = if device.is_some() { "gpu" } else { "cpu" };
     let begin = Instant::now();
     let (told, results) = mpsc::channel();
     let cancelled = Arc::new(AtomicBool::new(false));
     let (own, path, stop) = (scene.clone(), folder.to_path_buf(), cancelled.clone());
     let thread = std::thread::Builder::new().name(scene.name.clone()).spawn(move || {
-        let work = || simulate(&own, &path, device, &stop, &|limit| drop(told.send(Message::Limit(limit))));
+        let work = || simulate(&own, &path, device, nudge, &stop, &|limit| drop(told.send(Message::Limit(limit))));
         let outcome = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
             let text = payload.downcast_ref::<&str>().map(|t| t.to_string());
             let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
@@ -248,11 +250,17 @@ fn simulate(
     random: &RandomScene,
     folder: &Path,
     device: Option<Gpu>,
+    nudge: f64,
     cancelled: &AtomicBool,
     expect: &dyn Fn(Duration),
 ) -> Outcome {
     let mut outcome = Outcome::new(if device.is_some() { "gpu" } else { "cpu" });
-    let simulation = random.scene(folder).and_then(|scene| Simulation::on(scene, device));
+    let nudged = |mut scene: Scene| {
+        scene.material.law.bulk_modulus *= 1.0 + nudge;
+        scene.regions.iter_mut().for_each(|region| region.material.law.bulk_modulus *= 1.0 + nudge);
+        scene
+    };
+    let simulation = random.scene(folder).and_then(|scene| Simulation::on(nudged(scene), device));
     let mut simulation = match simulation {
         Ok(simulation) => simulation,
         Err(error) => {
