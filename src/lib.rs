@@ -4,12 +4,13 @@
 //! [`scene`] -> [`mesh`] -> [`effects`] -> [`separation`] and [`model`] -> [`solver`] (engines [`solver::cpu`] and
 //! [`gpu`]) -> [`observables`] -> [`output`] and [`render`]. [`stability`] runs that line on the hard cases, [`study`] many
 //! times over, [`training`] scores what a trainee did, [`haptic`] gives the
-//! forces to a device at 1 kHz. [`untrusted`] lists the readers of files.
+//! forces to a device at 1 kHz. [`untrusted`] lists the readers of files, [`docs`] renders the parts of `docs/` that follow from tables.
 
 #[macro_use]
 pub mod terminal;
 
 pub mod commands;
+pub mod docs;
 pub mod effects;
 pub mod ending;
 pub mod error;

@@ -422,7 +422,7 @@ fn has_parallel() -> bool {
 fn run_parts(place: &Place, of: usize) {
     let numbers: Vec<String> = (1..=of).map(|k| k.to_string()).collect();
     if has_parallel() {
-        // The way of the README: one word after another, which parallel puts together to a line for the shell.
+        // The way of docs/study.md: one word after another, which parallel puts together to a line for the shell.
         let program = Command::cargo_bin("stylet").unwrap().get_program().to_owned();
         let output = Command::new("parallel")
             .current_dir(place.folder.path())

@@ -39,7 +39,7 @@ pub struct Effect {
     pub key: &'static str,
     /// Name tested by `#ifdef` in the shaders.
     pub define: &'static str,
-    /// One line for `check` and README.
+    /// One line for `check`, the window and `docs/effects`.
     pub summary: &'static str,
     /// Where the equations come from.
     pub source: &'static str,

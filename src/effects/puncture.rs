@@ -69,7 +69,7 @@ pub const EFFECT: Effect = Effect {
     key: "puncture",
     define: "PUNCTURE",
     summary: "tip law (puncture, cutting) and contact with the opened path of the needle",
-    source: "this project (README, What it computes); toughness: Gokgol2012, Azar2008",
+    source: "this project (docs/effects/puncture.md); toughness: Gokgol2012, Azar2008",
     cost: "three dispatches per step; 4 B per cell; 160 B per node near the path",
     parameters: &PARAMETERS,
 };

@@ -471,21 +471,6 @@ fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
 }
 
 #[test]
-fn the_readme_lists_the_stages_of_the_step() {
-    let path = format!("{}/README.md", env!("CARGO_MANIFEST_DIR"));
-    let text = std::fs::read_to_string(&path).unwrap_or_default();
-    let section = text.split("\n## Stages").nth(1).unwrap_or_else(|| panic!("{path} has no heading `## Stages`"));
-    let section = section.split("\n## ").next().unwrap_or_default();
-    let listed: Vec<&str> = section
-        .lines()
-        .filter(|l| l.trim_start().starts_with(|c: char| c.is_ascii_digit()))
-        .filter_map(|l| l.split('`').nth(1))
-        .collect();
-    let names: Vec<&str> = Stage::ALL.iter().map(|s| s.name()).collect();
-    assert_eq!(listed, names, "{path}: list of stages");
-}
-
-#[test]
 fn tools_leave_no_trace_in_tetrahedra() {
     let tools: Vec<usize> = (6..12).collect();
     let (with, without) = (effect_set(|_| true), effect_set(|i| !tools.contains(&i)));

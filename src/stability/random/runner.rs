@@ -30,7 +30,7 @@ const CELL_STEP: f64 = 1.5e-6;
 /// Strain whose energy in the whole tissue is rounding.
 const ROUNDING_STRAIN: f64 = 1e-4;
 
-/// Steps of the work of a frame below which no work is measured on its own, as README states it. Contact begins within a step: what is
+/// Steps of the work of a frame below which no work is measured on its own, as docs/verdict.md states it. Contact begins within a step: what is
 /// wrong then is a part of one step's work.
 const FLOOR_STEPS: f64 = 50.0;
 
