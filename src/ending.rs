@@ -94,7 +94,7 @@ mod system {
     /// Runs between any two instructions: atomics, `write` and `_exit` only.
     extern "C" fn asked(number: libc::c_int) {
         if !BEGUN.load(Ordering::Relaxed) {
-            for text in ["error: ended by ", name(number), " before the first step; nothing was written\n"] {
+            for text in ["error: ended by ", name(number), " before anything was kept\n"] {
                 // SAFETY: the bytes live as long as the program.
                 unsafe { libc::write(2, text.as_ptr().cast(), text.len()) };
             }

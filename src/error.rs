@@ -1,6 +1,9 @@
 //! The one error type. A message tells what is wrong, where it stands and the way out.
 
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use crate::terminal::plain;
 
 /// Result of every fallible call of the library.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -31,8 +34,13 @@ pub enum Error {
     #[error("ended by {0} within a frame")]
     Ended(&'static str),
     /// A file could not be written or read.
-    #[error("{path}: {source}\n  way out: {}", way_out_of(source))]
+    #[error("{}: {source}\n  way out: {}", named(path), way_out_of(source))]
     File { path: PathBuf, source: std::io::Error },
+}
+
+/// A path in a message.
+fn named(path: &Path) -> String {
+    brief(&path.display().to_string())
 }
 
 /// What to do about a file that cannot be written or read.
@@ -50,33 +58,30 @@ fn way_out_of(source: &std::io::Error) -> &'static str {
     }
 }
 
-/// A text for a message: a word or a text of unreasonable length, which somebody else wrote, is cut.
+/// A text for a message, which somebody else may have written: long words are cut, then the text, both in their middle, so that the
+/// reason at the end stays; what steers a terminal is written out.
 pub fn brief(text: &str) -> String {
-    /// Longest word [character]; a path may have more of them.
+    /// Longest word [byte]; a path may have more of them.
     const WORD: usize = 120;
-    const PATH: usize = 4096;
+    const PATH: usize = 1000;
     /// Longest text [byte].
-    const TEXT: usize = 8192;
-    // Only what is kept is looked at word by word.
-    let (kept, cut) = match text.len() > TEXT {
-        true => (&text[..text.floor_char_boundary(TEXT)], true),
-        false => (text, false),
-    };
-    let mut short = String::with_capacity(kept.len());
-    for piece in kept.split_inclusive(char::is_whitespace) {
+    const TEXT: usize = 2000;
+    let mut short = String::new();
+    for piece in text.split_inclusive(char::is_whitespace) {
         let most = if piece.contains(std::path::MAIN_SEPARATOR) { PATH } else { WORD };
-        match piece.char_indices().nth(most) {
-            Some((end, _)) => {
-                short += &piece[..piece.floor_char_boundary(end.min(WORD / 2))];
-                short += "... ";
-            }
-            None => short += piece,
-        }
+        short += &shortened(piece, most);
     }
-    if cut {
-        short += "...";
+    plain(&shortened(&short, TEXT)).into_owned()
+}
+
+/// A text of more than `most` bytes without its middle.
+fn shortened(text: &str, most: usize) -> Cow<'_, str> {
+    if text.len() <= most {
+        return text.into();
     }
-    short
+    let head = &text[..text.floor_char_boundary(most / 2)];
+    let tail = &text[text.ceil_char_boundary(text.len() - most / 4)..];
+    format!("{head}...{tail}").into()
 }
 
 impl Error {
@@ -97,5 +102,33 @@ impl Error {
             Error::Ended(_) => crate::ending::exit_code(),
             _ => 1,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reason_stays_whatever_is_long_before_it() {
+        let long = "a".repeat(100_000);
+        let words = "a b ".repeat(25_000);
+        let folders = "a/".repeat(50_000);
+        for text in [&long, &words, &folders] {
+            let short = brief(&format!("`{text}` stands where a number is expected"));
+            assert!(short.starts_with("`a") && short.ends_with("a` stands where a number is expected"), "{short}");
+            assert!(short.len() < 2000, "{} bytes", short.len());
+        }
+        let path = format!("{}/scene.toml", "folder/".repeat(60));
+        assert_eq!(brief(&path), path);
+        assert_eq!(brief("\u{e4}".repeat(100).as_str()).matches("...").count(), 1);
+    }
+
+    #[test]
+    fn nothing_steers_a_terminal() {
+        assert_eq!(
+            brief("\x1b[31mred\x07\n\tnext \u{9b}1m \u{202e}"),
+            "\\u{1b}[31mred\\u{7}\n\tnext \\u{9b}1m \\u{202e}"
+        );
     }
 }

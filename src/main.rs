@@ -14,7 +14,7 @@ use stylet::commands::report::{ReportOptions, ReportOutcome};
 use stylet::commands::study::{StudyOptions, StudyOutcome};
 use stylet::commands::{self, bench::BenchOptions, run::RunOptions};
 use stylet::ending;
-use stylet::error::{Error, Result};
+use stylet::error::{Error, Result, brief};
 use stylet::output::checkpoint::RunCheckpoint;
 use stylet::scene::Scene;
 use stylet::solver::simulation::EngineChoice;
@@ -529,26 +529,31 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
         None => run(&cli.run, start),
         Some(Command::Run(args)) => run(&args, start),
         Some(Command::Check(args)) => {
+            ending::watch();
             let scene = Scene::load(&args.scene.scene, &args.scene.overrides)?;
             print(&commands::check::check(scene, args.scene.engine)?);
             Ok(0)
         }
         Some(Command::Material(args)) => {
+            ending::watch();
             print(commands::material::material(&args)?.trim_end());
             Ok(0)
         }
         Some(Command::Bench(args)) if args.effects => {
+            ending::watch();
             let report = commands::bench_effects::bench_effects(args.engine)?;
             print(&if args.json { report.json() } else { report.table() });
             Ok(0)
         }
         Some(Command::Bench(args)) => {
+            ending::watch();
             let options = BenchOptions { engine: args.engine, max_cells: args.max_cells };
             let report = commands::bench::bench(&options)?;
             print(&if args.json { report.json() } else { report.table() });
             Ok(0)
         }
         Some(Command::Fit(args)) => {
+            ending::watch();
             let volumetric = match args.bulk_modulus_kpa {
                 Some(modulus) => Volumetric::BulkModulus(modulus * 1e3),
                 None => Volumetric::PoissonRatio(args.poisson_ratio),
@@ -587,6 +592,7 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
             Ok(0)
         }
         Some(Command::Prepare(args)) => {
+            ending::watch();
             print(&prepare(args)?);
             Ok(0)
         }
@@ -599,6 +605,7 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
             Ok(0)
         }
         Some(Command::CompareAdapters(args)) => {
+            ending::watch();
             let options = CompareOptions { scene: args.scene, overrides: args.overrides };
             let table = commands::compare_adapters::compare_adapters(&options)?;
             print(if args.json { table.json() } else { table.table() }.trim_end());
@@ -731,6 +738,23 @@ fn misspelt_subcommand() -> Option<Error> {
     Some(Error::input(format!("there is no subcommand and no scene file called {word}"), way_out))
 }
 
+/// Help, the version, or the refusal of a call.
+fn wrong_call(reason: &clap::Error) -> ExitCode {
+    /// What somebody gave is longer than that, not what the program says of it [B].
+    const LONG: usize = 3000;
+    if !reason.use_stderr() {
+        terminal::tell_of_lost(reason.print());
+        return ExitCode::from(u8::from(terminal::output_is_lost()));
+    }
+    let text = reason.render().to_string();
+    match text.len() > LONG || terminal::plain(&text) != text {
+        true => eprintln!("{}", brief(&text).trim_end()),
+        // In colours where the terminal has them.
+        false => drop(reason.print()),
+    }
+    ExitCode::from(2)
+}
+
 fn main() -> ExitCode {
     let start = Instant::now();
     if std::env::var_os("NODEVICE_SELECT").is_none() {
@@ -744,7 +768,11 @@ fn main() -> ExitCode {
         eprintln!("error: {error}");
         return ExitCode::from(error.exit_code());
     }
-    let code = match dispatch(Cli::parse(), start) {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(reason) => return wrong_call(&reason),
+    };
+    let code = match dispatch(cli, start) {
         Ok(0) if terminal::output_is_lost() => 1,
         Ok(code) => code,
         Err(error) => {

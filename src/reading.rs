@@ -12,15 +12,15 @@ use crate::Error;
 /// Most bytes of the kinds of files.
 pub mod most {
     /// A scene or a library of materials: a thousand times more than a person writes; parsed it takes 80 times as much.
-    pub const SCENE: u64 = 4 << 20;
+    pub const SCENE: u64 = 1 << 20;
     /// Measured curves.
     pub const CURVE: u64 = 16 << 20;
     /// A mesh: some two million tetrahedra as text.
     pub const MESH: u64 = 384 << 20;
     /// A table of a run.
     pub const TABLE: u64 = 256 << 20;
-    /// A checkpoint, compressed.
-    pub const CHECKPOINT: u64 = 1 << 30;
+    /// A checkpoint, compressed: that of the main scene has a megabyte.
+    pub const CHECKPOINT: u64 = 256 << 20;
     /// What the program wrote for itself: summaries, plans, ledgers.
     pub const OWN: u64 = 64 << 20;
 }
@@ -88,7 +88,16 @@ pub fn text(path: &Path, most: u64) -> Result<String, Unread> {
     })
 }
 
-fn on_disk(path: &Path, most: u64, count: u64) -> Result<Vec<u8>, Unread> {
+/// The same piece by piece, for a reader that may have enough before the end.
+///
+/// # Errors
+/// As [`bytes`]; a built-in file is none of those that are read so.
+pub fn stream(path: &Path, most: u64) -> Result<impl Read, Unread> {
+    Ok(opened(path, most)?.0.take(most))
+}
+
+/// The file and its length.
+fn opened(path: &Path, most: u64) -> Result<(File, u64), Unread> {
     // Opening a device may do something, opening a pipe may wait: a look first.
     is_file(&std::fs::metadata(path)?)?;
     let file = open(path)?;
@@ -97,7 +106,18 @@ fn on_disk(path: &Path, most: u64, count: u64) -> Result<Vec<u8>, Unread> {
     if found.len() > most {
         return Err(too_large(found.len(), most));
     }
-    let mut bytes = Vec::with_capacity(found.len().min(count) as usize);
+    if holes::are_most_of(&file, &found) {
+        return Err(Unread::Refused {
+            reason: "most of it is a hole: it has a length, but nothing was written there".into(),
+            way_out: "copy or write the file again; it was cut short on its way",
+        });
+    }
+    Ok((file, found.len()))
+}
+
+fn on_disk(path: &Path, most: u64, count: u64) -> Result<Vec<u8>, Unread> {
+    let (file, length) = opened(path, most)?;
+    let mut bytes = Vec::with_capacity(length.min(count) as usize);
     // It may grow meanwhile, and some files of the system do not tell their size.
     file.take(if count < most { count } else { most + 1 }).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > most {
@@ -116,6 +136,50 @@ fn open(path: &Path) -> io::Result<File> {
 #[cfg(not(unix))]
 fn open(path: &Path) -> io::Result<File> {
     File::open(path)
+}
+
+/// Files that take little room on the disk because there is nothing in them: a download or a copy that was given up leaves one. They
+/// read as zeros without end.
+#[cfg(any(target_os = "linux", target_os = "macos", target_os = "freebsd"))]
+mod holes {
+    use std::fs::{File, Metadata};
+    use std::os::fd::AsRawFd;
+    use std::os::unix::fs::MetadataExt;
+
+    use nix::libc;
+
+    /// Shorter files are read whatever they hold [B].
+    const SHORT: u64 = 4 << 20;
+
+    /// Whether more than half of the file is holes. Few blocks alone do not tell: a file system may compress what it keeps.
+    pub fn are_most_of(file: &File, found: &Metadata) -> bool {
+        found.len() > SHORT && found.blocks() * 512 < found.len() / 2 && data(file, found.len()) < found.len() / 2
+    }
+
+    /// Bytes that are no holes; all where the file system does not tell. The place in the file is at its beginning afterwards.
+    fn data(file: &File, length: u64) -> u64 {
+        // SAFETY: the descriptor is open as long as the file lives; the call does nothing but look, and move the place in it.
+        let seek = |at: u64, whence| u64::try_from(unsafe { libc::lseek(file.as_raw_fd(), at as libc::off_t, whence) });
+        let (mut data, mut at) = (0, 0);
+        while at < length {
+            // No data behind this place.
+            let Ok(begin) = seek(at, libc::SEEK_DATA) else { break };
+            let end = seek(begin, libc::SEEK_HOLE).unwrap_or(length);
+            data += end.saturating_sub(begin);
+            at = end.max(begin + 1);
+        }
+        match seek(0, libc::SEEK_SET) {
+            Ok(0) => data,
+            _ => length,
+        }
+    }
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "macos", target_os = "freebsd")))]
+mod holes {
+    pub fn are_most_of(_: &std::fs::File, _: &std::fs::Metadata) -> bool {
+        false
+    }
 }
 
 fn is_file(found: &std::fs::Metadata) -> Result<(), Unread> {
@@ -141,8 +205,8 @@ fn too_large(found: u64, most: u64) -> Unread {
 
 include!(concat!(env!("OUT_DIR"), "/built_in.rs"));
 
-/// Name and bytes of the file that is built into the program under this relative path.
-pub fn built_in(path: &Path) -> Option<(&'static str, &'static [u8])> {
+/// The relative path as the names of built-in files have it.
+fn plain_name(path: &Path) -> Option<String> {
     let mut parts: Vec<&str> = Vec::new();
     for part in path.components() {
         match part {
@@ -152,7 +216,12 @@ pub fn built_in(path: &Path) -> Option<(&'static str, &'static [u8])> {
             Component::RootDir | Component::Prefix(_) => return None,
         }
     }
-    let name = parts.join("/");
+    Some(parts.join("/"))
+}
+
+/// Name and bytes of the file that is built into the program under this relative path.
+pub fn built_in(path: &Path) -> Option<(&'static str, &'static [u8])> {
+    let name = plain_name(path)?;
     let at = BUILT_IN.binary_search_by(|(other, _)| (*other).cmp(&name)).ok()?;
     Some(BUILT_IN[at])
 }
@@ -160,6 +229,12 @@ pub fn built_in(path: &Path) -> Option<(&'static str, &'static [u8])> {
 /// Whether there is no file of that name and the built-in one is taken.
 pub fn is_built_in(path: &Path) -> bool {
     built_in(path).is_some() && !path.exists()
+}
+
+/// The folder of built-in files under this relative path, with a slash at its end.
+pub fn built_in_folder(path: &Path) -> Option<String> {
+    let folder = plain_name(path).filter(|name| !name.is_empty())? + "/";
+    BUILT_IN.iter().any(|(name, _)| name.starts_with(&folder)).then_some(folder)
 }
 
 /// Names of the built-in files in a folder and below it.

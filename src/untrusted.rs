@@ -84,7 +84,7 @@ impl Reader {
             Err(error) => {
                 let text = error.to_string();
                 assert!(text.contains("way out"), "{}: no way out in: {text}", self.name);
-                assert!(text.len() < 200_000, "{}: {} bytes of message", self.name, text.len());
+                assert!(text.len() < 8_000, "{}: {} bytes of message", self.name, text.len());
                 assert!(
                     matches!(error, Error::Scene(_) | Error::Input { .. }),
                     "{}: not told as wrong input: {text}",

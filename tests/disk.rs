@@ -195,13 +195,37 @@ fn a_checkpoint_that_cannot_be_written_leaves_the_one_before() {
     let limit = checkpoint.len() as u64 / 1024 - 2;
     assert!(limit > 17, "a checkpoint of {} B", checkpoint.len());
     let output = place.call_limited(limit, "run --resume out --checkpoint 0.02");
-    let text = assert_told(&output, 1, "out/checkpoint.stylet", "File too large");
+    // The run goes on without, until its tables do not fit either.
+    let text = assert_told(&output, 1, ".csv", "File too large");
+    let told = "out/checkpoint.stylet: File too large (os error 27); the one before is kept, the run goes on without";
+    assert_eq!(text.matches(told).count(), 1, "{text}");
     assert!(text.contains("go on with: stylet run --resume out"), "{text}");
     assert_eq!(place.bytes("out/checkpoint.stylet"), checkpoint);
     assert_whole_tables(&place.path("out"));
     assert!(place.leftovers("out").is_empty(), "{:?}", place.leftovers("out"));
     let output = place.call("run --resume out");
     assert!(output.status.success(), "{}", told(&output));
+}
+
+/// A run whose tables fit is not ended by a checkpoint that does not; and whoever could go on from nothing is told so.
+#[test]
+fn a_run_without_room_for_a_checkpoint() {
+    let place = Place::new();
+    let fine = SCENE.replace("cell_size_mm = 1.2", "cell_size_mm = 0.7").replace("depth_mm = 3.0", "depth_mm = 0.5");
+    std::fs::write(place.path("fine.toml"), fine).unwrap();
+    let output = place.call_limited(64, "run fine.toml --engine cpu --out out --checkpoint 0.05");
+    let text = told(&output);
+    assert!(output.status.success(), "{text}");
+    let note = "out/checkpoint.stylet: File too large (os error 27); there is none, the run goes on without";
+    assert_eq!(text.matches(note).count(), 1, "{text}");
+    assert_whole_tables(&place.path("out"));
+    assert!(place.leftovers("out").is_empty() && !place.path("out/checkpoint.stylet").exists());
+
+    // Neither the tables nor a checkpoint fit.
+    let output = place.call_limited(18, "run short.toml --engine cpu --out bare --checkpoint 0");
+    let text = assert_told(&output, 1, ".csv", "File too large");
+    assert!(text.contains("note: no checkpoint could be written either, so the run cannot go on from here"), "{text}");
+    assert!(text.contains("bare/checkpoint.stylet: File too large") && !text.contains("go on with"), "{text}");
 }
 
 /// A disk of its own, as small as the test wants it, in a name space where the user may mount one.
@@ -342,6 +366,10 @@ fn standard_output_that_is_full_is_a_failure() {
     let place = Place::new();
     let output = place.shell("\"$STYLET\" check short.toml >/dev/full");
     assert_told(&output, 1, "standard output", "No space left on device");
+    for arguments in ["--help", "run --help", "--version"] {
+        let output = place.shell(&format!("\"$STYLET\" {arguments} >/dev/full"));
+        assert_told(&output, 1, "standard output", "No space left on device");
+    }
     // A reader that has enough is none.
     let output = place.shell("set -o pipefail; \"$STYLET\" schema | head -n 1");
     assert!(output.status.success(), "{}", told(&output));

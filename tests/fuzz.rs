@@ -194,7 +194,7 @@ fn assert_clear(error: &Error, case: &str) {
         Error::Input { .. } | Error::Adapter { .. } => assert!(text.contains("way out"), "{case}\n{text}"),
         _ => assert!(!text.is_empty()),
     }
-    assert!(text.len() < 200_000, "{case}: {} bytes of message", text.len());
+    assert!(text.len() < 8_000, "{case}: {} bytes of message", text.len());
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::time::Instant;
 
 use crate::effects::{EffectSet, damage, fibres, plasticity, viscoelastic};
-use crate::error::Result;
+use crate::error::{Result, brief};
 use crate::material::{describe_constants, describe_verdict, four_digits};
 use crate::mesh::Mesh;
 use crate::scene::{Face, FaceDrive, RegionShape, Scene, TipShape, TissueMaterial, Tool};
@@ -30,7 +30,7 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     let scene = &model.scene;
     let law = scene.material.law;
     line(format!("scene        {} ({})", scene.name, scene.path.display()));
-    line(format!("             {}", scene.title));
+    line(format!("             {}", brief(&scene.title)));
     // What changes the meaning of all that follows comes first.
     for notice in &scene.notices {
         line(format!("note         {notice}"));

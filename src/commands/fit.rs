@@ -13,9 +13,10 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::material::Mode;
-use crate::material::fit::{Fit, LawFit, Point, best_stable, fit_all, nominal_stress};
+use crate::material::fit::{Fit, LAWS, LawFit, Point, best_stable, fit_all, nominal_stress};
 use crate::material::{ElasticLaw, Isochoric, Verdict, describe_verdict};
 use crate::output::fit_chart::fit_chart;
+use crate::output::folder::probe;
 use crate::output::whole_file;
 use crate::reading;
 use crate::scene::presets::bulk_modulus_from_poisson;
@@ -97,6 +98,9 @@ pub struct FitReport {
 pub fn fit(options: &FitOptions) -> Result<FitReport> {
     check_options(options)?;
     let curves = read_curves(&options.files)?;
+    if let Some(folder) = &options.out {
+        check_folder(folder, options)?;
+    }
     let fits = fit_all(&curves.points);
     let files = options
         .files
@@ -149,10 +153,38 @@ fn check_options(options: &FitOptions) -> Result<()> {
             "use letters, digits, - and _, e.g. --preset my-muscle",
         ));
     }
+    if let Some(law) = &options.law
+        && !LAWS.contains(&law.as_str())
+    {
+        return Err(Error::input(format!("`{law}` is no law"), format!("use one of {}", LAWS.join(", "))));
+    }
     if options.files.is_empty() {
         return Err(Error::input("no file was given", format!("give a CSV file with the header `{EXAMPLE}`")));
     }
     Ok(())
+}
+
+/// Names of the files that go into the folder `--out`.
+fn file_names(options: &FitOptions) -> Vec<String> {
+    let preset = options.preset.iter().map(|name| format!("{name}.toml"));
+    [CHART, TABLE].map(String::from).into_iter().chain(preset).collect()
+}
+
+/// Makes the folder, and refuses one that holds such files or cannot be written to: before the fit, which takes a while.
+fn check_folder(folder: &Path, options: &FitOptions) -> Result<()> {
+    let there = file_names(options).into_iter().map(|name| folder.join(name)).find(|path| path.exists());
+    if let Some(path) = there.filter(|_| !options.force) {
+        return Err(Error::input(
+            format!("{} is already there", path.display()),
+            "give another folder with --out, or replace the file with --force",
+        ));
+    }
+    fs::create_dir_all(folder).and_then(|()| probe(folder)).map_err(|reason| {
+        Error::input(
+            format!("{}: cannot be used as a folder: {reason}", folder.display()),
+            "give a folder that can be written to with --out",
+        )
+    })
 }
 
 /// Reads the points of all files.
@@ -657,13 +689,9 @@ impl FitReport {
 
     /// A `[[material]]` block of a library of presets.
     fn preset_text(&self, name: &str, options: &FitOptions) -> Result<String> {
-        let keys = || self.fits.iter().map(|f| f.key).collect::<Vec<_>>().join(", ");
         let chosen = match &options.law {
             None => best_stable(&self.fits).and_then(|f| f.stable),
-            Some(law) => match self.fits.iter().find(|f| f.key == law) {
-                None => return Err(Error::input(format!("`{law}` is no law"), format!("use one of {}", keys()))),
-                Some(fit) => fit.stable,
-            },
+            Some(law) => self.fits.iter().find(|f| f.key == law).and_then(|f| f.stable),
         };
         let Some(fit) = chosen else {
             return Err(Error::input(
@@ -715,22 +743,9 @@ impl FitReport {
     }
 
     fn write(&mut self, folder: &Path, options: &FitOptions) -> Result<()> {
-        let mut files = vec![(folder.join(CHART), self.chart(folder)?), (folder.join(TABLE), self.table())];
-        if let (Some(name), Some(text)) = (&options.preset, &self.preset) {
-            files.push((folder.join(format!("{name}.toml")), text.clone()));
-        }
-        if let Some((path, _)) = files.iter().find(|(path, _)| path.exists() && !options.force) {
-            return Err(Error::input(
-                format!("{} is already there", path.display()),
-                "give another folder with --out, or replace the file with --force",
-            ));
-        }
-        fs::create_dir_all(folder).map_err(|reason| {
-            Error::input(
-                format!("{}: cannot be used as a folder: {reason}", folder.display()),
-                "give a folder that can be written to with --out",
-            )
-        })?;
+        let contents = [self.chart(folder)?, self.table()].into_iter().chain(self.preset.clone());
+        let files: Vec<(PathBuf, String)> =
+            file_names(options).iter().map(|name| folder.join(name)).zip(contents).collect();
         for (path, text) in files {
             whole_file::write(&path, text.as_bytes())?;
             self.written.push(path);

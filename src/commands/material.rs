@@ -474,6 +474,10 @@ fn bulk_modulus(args: &MaterialArgs, shear: f64) -> Result<Option<f64>> {
 /// Switches the effects and overrides their parameters.
 fn effects(args: &MaterialArgs, material: &mut Material) -> Result<()> {
     if let Some(list) = &args.effects {
+        if let Some((_, twice)) = list.iter().enumerate().find(|(index, name)| list[..*index].contains(name)) {
+            let key = twice.to_possible_value().map_or(String::new(), |value| value.get_name().to_string());
+            return Err(Error::input(format!("--effects: `{key}` is listed twice"), "name every effect once"));
+        }
         // Parameters of a scene stay; what it does not have comes with its default.
         let on = |name: EffectName| list.contains(&name);
         material.plasticity = on(EffectName::Plasticity).then(|| material.plasticity.unwrap_or_default());

@@ -145,6 +145,7 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     let mut failure = None;
     // Frame after which a checkpoint is written, when the last one was, and whether the run ends with it.
     let (mut due, mut written, mut ending) = (None, Instant::now(), false);
+    let mut checkpoint_every = options.checkpoint_every;
     loop {
         if interrupted.load(Ordering::Relaxed) && !ending {
             ending = true;
@@ -175,16 +176,24 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
         };
         first_step_ms.get_or_insert_with(|| program_start.elapsed().as_secs_f64() * 1e3);
         if due == Some(frame) {
-            if let Err(error) = run.write_checkpoint() {
-                failure = Some(error);
-                break;
+            match run.write_checkpoint() {
+                Ok(()) => {}
+                // What a run goes on from is worth less than the run itself.
+                Err(error @ Error::File { .. }) if !ending => {
+                    run.tell_of_no_checkpoint(&error);
+                    checkpoint_every = None;
+                }
+                Err(error) => {
+                    failure = Some(error);
+                    break;
+                }
             }
             (due, written) = (None, Instant::now());
             if ending {
                 status = Status::Interrupted;
                 break;
             }
-        } else if due.is_none() && options.checkpoint_every.is_some_and(|s| written.elapsed().as_secs_f64() >= s) {
+        } else if due.is_none() && checkpoint_every.is_some_and(|s| written.elapsed().as_secs_f64() >= s) {
             due = Some(run.simulation.stop_soon());
         }
     }
@@ -206,7 +215,10 @@ pub fn run(scene: Scene, options: &RunOptions, program_start: Instant, interrupt
     if let Some(newest) = newest
         && let Err(error) = newest.write(&checkpoint)
     {
-        log::info!("no checkpoint: {error}");
+        eprintln!(
+            "note: no checkpoint could be written either, so the run cannot go on from here: {}",
+            reason_of(&error)
+        );
     }
     // What stopped the run comes first, then what of its results could not be written.
     let mut errors = failure.into_iter().chain(missing);
@@ -363,6 +375,19 @@ impl<'a> Run<'a> {
         let Some(image) = self.images.back().cloned() else { return Ok(()) };
         let (checkpoint, path) = (self.checkpoint(image), self.output.file(folder::CHECKPOINT));
         self.clock.aside(|| checkpoint.write(&path))
+    }
+
+    /// Says that a checkpoint within the run could not be written, and that no other is tried before its end.
+    fn tell_of_no_checkpoint(&self, error: &Error) {
+        let time = self.records.last().map_or(0.0, |r| r.time);
+        let kept = match self.output.file(folder::CHECKPOINT).exists() {
+            true => "the one before is kept",
+            false => "there is none",
+        };
+        eprintln!(
+            "note: no checkpoint could be written at {time:.3} s: {}; {kept}, the run goes on without",
+            reason_of(error)
+        );
     }
 
     /// Writes the newest image as checkpoint.
@@ -579,6 +604,11 @@ fn tried_in_words(tried: Result<Trial>) -> String {
         })
         .collect();
     format!("{}; none of them is a way out", tried.join(", "))
+}
+
+/// The first line of an error: what is wrong, without the way out.
+fn reason_of(error: &Error) -> String {
+    error.to_string().lines().next().unwrap_or_default().to_string()
 }
 
 fn difference(after: Option<f64>, before: Option<f64>) -> Option<f64> {

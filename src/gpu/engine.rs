@@ -12,6 +12,7 @@ use super::device::Gpu;
 use super::kernel::{BindingKind, Compiled, Kernel, MeshNumbers, STEP_INPUT};
 use super::layout::Layout;
 use super::memory::Memory;
+use super::pace::Pace;
 use super::structs::*;
 use super::texels::{Texels, texel_numbers};
 use crate::effects::EffectSet;
@@ -36,9 +37,6 @@ pub const DISPLACEMENT_UNIT: f64 = 1.0 / (1u64 << 36) as f64;
 
 /// Frames whose results may be under way.
 const RING: usize = 3;
-
-/// Most steps of one submission: some seconds of a slow software adapter.
-const SUBMITTED_STEPS: usize = 1024;
 
 /// How long the mapping of a finished submission may take.
 const MAPPING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
@@ -165,7 +163,8 @@ struct InFlight {
     slot: usize,
     frame: u64,
     steps: u32,
-    submission: wgpu::SubmissionIndex,
+    /// The last one of its submissions, see [`Pace`].
+    submission: u64,
     /// 0: not mapped yet, 1: mapped, 2: failed.
     mapped: Arc<AtomicU8>,
 }
@@ -193,6 +192,9 @@ pub struct GpuEngine {
     staging: Vec<wgpu::Buffer>,
     in_flight: VecDeque<InFlight>,
     finished: VecDeque<FrameSums>,
+    pace: Pace<wgpu::SubmissionIndex>,
+    /// What its times count from.
+    begin: std::time::Instant,
     /// Buffers that a checkpoint holds.
     kept: Vec<&'static str>,
     max_steps: usize,
@@ -310,6 +312,8 @@ impl GpuEngine {
             staging,
             in_flight: VecDeque::new(),
             finished: VecDeque::new(),
+            pace: Pace::default(),
+            begin: std::time::Instant::now(),
             kept,
             max_steps,
             moment: DVec3::ZERO,
@@ -371,27 +375,48 @@ impl GpuEngine {
         polled.map(|_| ()).map_err(|e| Error::Device(e.to_string()))
     }
 
-    /// Waits for a submission. Without a limit of time: where several threads share a device, one that ran out while another thread
-    /// collects the last submission makes wgpu 30 panic. [`SUBMITTED_STEPS`] bounds how long it takes.
-    fn wait_for(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
-        self.wait(wgpu::PollType::Wait { submission_index: Some(submission.clone()), timeout: None })
+    /// Waits for the oldest submission under way. Without a limit of time: where several threads share a device, one that ran out
+    /// while another thread collects the last submission makes wgpu 30 panic. [`Pace`] bounds how long it takes.
+    fn wait_for_oldest(&mut self) -> Result<()> {
+        /// A wait that is shorter has not waited [s].
+        const NOTHING: f64 = 2e-4;
+        let Some(oldest) = self.pace.oldest() else { return Ok(()) };
+        let from = self.begin.elapsed().as_secs_f64();
+        self.wait(wgpu::PollType::Wait { submission_index: Some(oldest), timeout: None })?;
+        let now = self.begin.elapsed().as_secs_f64();
+        self.pace.finished(now, now - from > NOTHING);
+        Ok(())
+    }
+
+    /// Submits what was encoded, `steps` steps, once the device has little enough to do; the number of the submission.
+    fn submit(&mut self, encoder: wgpu::CommandEncoder, steps: usize) -> Result<u64> {
+        while !self.pace.has_room(steps) {
+            self.wait_for_oldest()?;
+        }
+        let submission = self.gpu.queue.submit([encoder.finish()]);
+        Ok(self.pace.submitted(steps, submission, self.begin.elapsed().as_secs_f64()))
     }
 
     fn collect_oldest(&mut self, wait: bool) -> Result<bool> {
-        let Some(front) = self.in_flight.front() else { return Ok(false) };
+        let Some((last, mapped)) = self.in_flight.front().map(|front| (front.submission, front.mapped.clone())) else {
+            return Ok(false);
+        };
         if wait {
-            self.wait_for(&front.submission)?;
+            while self.pace.is_under_way(last) {
+                self.wait_for_oldest()?;
+            }
+            await_mapping(&self.gpu, &mapped)?;
         } else {
             self.wait(wgpu::PollType::Poll)?;
         }
-        if wait {
-            await_mapping(&self.gpu, &front.mapped)?;
-        }
-        match front.mapped.load(Ordering::Acquire) {
+        match mapped.load(Ordering::Acquire) {
             1 => {}
             2 => return Err(Error::Device("results of a frame could not be mapped".into())),
             _ if wait => return Err(Error::Device("results of a frame did not arrive".into())),
             _ => return Ok(false),
+        }
+        while self.pace.is_under_way(last) {
+            self.pace.finished(self.begin.elapsed().as_secs_f64(), false);
         }
         let Some(done) = self.in_flight.pop_front() else { return Ok(false) };
         let buffer = self.staging[done.slot].clone();
@@ -1396,17 +1421,18 @@ impl Engine for GpuEngine {
             buffer.write(&self.gpu.queue, bytemuck::bytes_of(&centre_line(line)));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        // Nothing ends what has been submitted: the steps of a very long frame are submitted in several parts.
-        let whole = plan.steps.len().saturating_sub(1) / SUBMITTED_STEPS * SUBMITTED_STEPS;
-        for part in (0..whole).step_by(SUBMITTED_STEPS) {
-            self.encode_steps(&mut encoder, part..part + SUBMITTED_STEPS)?;
-            let next = self.gpu.device.create_command_encoder(&Default::default());
-            let submission = self.gpu.queue.submit([std::mem::replace(&mut encoder, next).finish()]);
-            self.wait_for(&submission)?;
-        }
+        let mut from = 0;
         match plan.steps.len().checked_sub(1) {
             Some(last) => {
-                self.encode_steps(&mut encoder, whole..last)?;
+                // The rest goes with the step that is measured.
+                while last - from > self.pace.steps() {
+                    let part = from..from + self.pace.steps();
+                    from = part.end;
+                    self.encode_steps(&mut encoder, part.clone())?;
+                    let next = self.gpu.device.create_command_encoder(&Default::default());
+                    self.submit(std::mem::replace(&mut encoder, next), part.len())?;
+                }
+                self.encode_steps(&mut encoder, from..last)?;
                 self.encode_measured_step(&mut encoder, last);
             }
             None => self.encode_selected(&mut encoder, 0, |stage| stage.averages() || stage.once_per_frame()),
@@ -1416,7 +1442,7 @@ impl Engine for GpuEngine {
             let source = &self.buffers[range.name];
             source.encode_copy(&mut encoder, (range.from, range.size), (&self.staging[slot], range.offset));
         }
-        let submission = self.gpu.queue.submit([encoder.finish()]);
+        let submission = self.submit(encoder, plan.steps.len() - from)?;
         let mapped = map_for_reading(&self.staging[slot]);
         self.in_flight.push_back(InFlight {
             slot,

@@ -6,6 +6,7 @@ pub mod engine;
 pub mod kernel;
 mod layout;
 mod memory;
+mod pace;
 pub mod structs;
 pub mod texels;
 mod workers;

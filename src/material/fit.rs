@@ -95,9 +95,12 @@ pub struct LawFit {
     pub stable: Option<Fit>,
 }
 
+/// Keys of the laws that are fitted.
+pub const LAWS: [&str; 5] = ["neo_hookean", "mooney_rivlin", "yeoh", "ogden", "demiray"];
+
 /// Fits all five laws, in the order of `src/material`.
 pub fn fit_all(points: &[Point]) -> Vec<LawFit> {
-    ["neo_hookean", "mooney_rivlin", "yeoh", "ogden", "demiray"].map(|key| fit_law(key, points)).into()
+    LAWS.map(|key| fit_law(key, points)).into()
 }
 
 /// The stable fit to recommend: the smallest error, and of equally good laws the one with the fewest constants.

@@ -3,7 +3,7 @@
 //! Format: the line `stylet checkpoint 1`, then zlib of a postcard message. The checksum of zlib finds a damaged file.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::io::{Read, Write};
+use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use flate2::read::ZlibDecoder;
@@ -24,8 +24,9 @@ const MAGIC: &[u8] = b"stylet checkpoint 1\n";
 /// Bytes of a message that are unpacked to see whose it is.
 const FIRST: u64 = 4096;
 
-/// Most bytes of a message: the largest mesh with all histories, and the records of a long run [B].
-const LARGEST_MESSAGE: u64 = 4 << 30;
+/// Most bytes of a message [B]. The main scene has one or two MiB. The largest mesh that portable devices take has 0.8 million cells:
+/// 128 MiB of corner forces, as much of Prony terms, and some 100 MiB of all else; a larger one is not written either.
+const LARGEST_MESSAGE: u64 = 512 << 20;
 
 /// A run that goes on later.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -76,6 +77,11 @@ impl RunCheckpoint {
     /// `Error::File` where it cannot be written; an older checkpoint is left as it was.
     pub fn write(&self, path: &Path) -> Result<()> {
         let message = postcard::to_allocvec(self).map_err(|e| Error::Device(format!("no checkpoint: {e}")))?;
+        if message.len() as u64 > LARGEST_MESSAGE {
+            let reason =
+                format!("a checkpoint of {} MiB, at most {} are read back", message.len() >> 20, LARGEST_MESSAGE >> 20);
+            return Err(Error::file(path, std::io::Error::new(std::io::ErrorKind::FileTooLarge, reason)));
+        }
         let mut encoder = ZlibEncoder::new(MAGIC.to_vec(), flate2::Compression::fast());
         let bytes = encoder.write_all(&message).and_then(|()| encoder.finish());
         whole_file::write(path, &bytes.map_err(|source| Error::file(path, source))?)
@@ -91,7 +97,8 @@ impl RunCheckpoint {
             return Self::read(&path);
         }
         let folder = folder.display();
-        let status = Summary::read(&path.with_file_name(SUMMARY)).map(|summary| summary.status);
+        let summary = path.with_file_name(SUMMARY);
+        let status = Summary::read(&summary).map(|summary| summary.status);
         let (message, way_out) = match status {
             Ok(Status::Ok | Status::Doubtful(_)) => (
                 format!("the run in {folder} has finished: nothing is left to go on with"),
@@ -108,6 +115,12 @@ impl RunCheckpoint {
                 format!("the run in {folder} was stopped, and its checkpoint is not there any more"),
                 "put checkpoint.stylet back, or start the run anew with --force",
             ),
+            Err(error) if summary.exists() => {
+                return Err(Error::input(
+                    format!("there is no checkpoint in {folder}, and what became of its run cannot be read: {error}"),
+                    "start the run anew with --force",
+                ));
+            }
             Err(_) => (
                 format!(
                     "there is no checkpoint in {folder}: no run was stopped there, or it was killed before its first one"
@@ -129,19 +142,25 @@ impl RunCheckpoint {
                 reason.way_out("name the folder of a run that was stopped; a run that has ended keeps none"),
             )
         };
-        // A large file that is something else is not read as a whole.
-        let head = reading::head(path, reading::most::CHECKPOINT, MAGIC.len() as u64).map_err(unread)?;
+        let mut file = reading::stream(path, reading::most::CHECKPOINT).map_err(unread)?;
+        let mut head = Vec::new();
+        file.by_ref().take(MAGIC.len() as u64).read_to_end(&mut head).map_err(|e| unread(e.into()))?;
         if head != MAGIC {
             return Err(damaged(path, "it does not begin like one"));
         }
-        Self::from_bytes(path, &reading::bytes(path, reading::most::CHECKPOINT).map_err(unread)?)
+        Self::unpack(path, BufReader::new(file))
     }
 
     /// The same from the bytes of a file; `path` stands for it in messages.
     pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
-        let Some(packed) = bytes.strip_prefix(MAGIC) else {
-            return Err(damaged(path, "it does not begin like one"));
-        };
+        match bytes.strip_prefix(MAGIC) {
+            Some(packed) => Self::unpack(path, packed),
+            None => Err(damaged(path, "it does not begin like one")),
+        }
+    }
+
+    /// What comes behind the first line.
+    fn unpack(path: &Path, packed: impl Read) -> Result<Self> {
         let mut decoder = ZlibDecoder::new(packed);
         let mut message = Vec::new();
         // A few bytes may unpack to a thousand times as many: the first of them tell whether the others are wanted.

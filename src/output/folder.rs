@@ -187,11 +187,15 @@ const LEAST_SPACE: usize = 16 << 10;
 
 /// Writes and removes a small file: permission bits alone do not tell whether a file system can be written to, nor an empty file
 /// whether it is full.
-fn probe_writable(path: &Path) -> Result<()> {
+pub(crate) fn probe(path: &Path) -> io::Result<()> {
     let probe = path.join(format!("{WRITE_TEST}{}{UNFINISHED}", std::process::id()));
     let written = fs::write(&probe, [0; LEAST_SPACE]);
     let removed = if probe.exists() { fs::remove_file(&probe) } else { Ok(()) };
-    written.and(removed).map_err(|reason| match reason.kind() {
+    written.and(removed)
+}
+
+fn probe_writable(path: &Path) -> Result<()> {
+    probe(path).map_err(|reason| match reason.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => Error::input(
             format!("no room for results in {}: {reason}", path.display()),
             "free space on that disk, raise the limit (`ulimit -f`), or give a folder on another disk with --out",

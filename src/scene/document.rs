@@ -16,15 +16,23 @@ use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue, ValueDeserializer};
 
 use crate::error::brief;
+use crate::terminal::plain;
 
 /// Most entries of any list: counted before anything is made of them.
 const MOST_ENTRIES: usize = 4096;
 
+/// Most entries of all tables and lists together: a thousand targets, goals and phases have fewer. Each is kept with its path.
+const MOST_IN_ALL: usize = 32_768;
+
 /// Most tables and lists within each other; a scene needs five. What walks down a document may then call itself.
 const DEEPEST: usize = 24;
 
-/// Most problems that are told at once.
+/// Longest key [byte]; every entry below it has it in its path.
+const LONGEST_KEY: usize = 200;
+
+/// Most problems that are told at once, and most bytes of them.
 const MOST_PROBLEMS: usize = 30;
+const MOST_TOLD: usize = 6000;
 
 /// A parsed scene file with overrides.
 pub struct Document<'s> {
@@ -56,7 +64,7 @@ impl<'s> Document<'s> {
     /// Parses `source` and applies `overrides` (`key=value`); the error is rendered.
     pub fn parse(path: &Path, source: &'s str, overrides: &'s [String]) -> Result<Document<'s>, String> {
         let mut document = Document {
-            name: path.display().to_string(),
+            name: brief(&path.display().to_string()),
             source,
             lines: files::line_starts(source).collect(),
             overrides,
@@ -82,22 +90,12 @@ impl<'s> Document<'s> {
             }
         }
         if !problems.is_empty() {
-            return Err(problems.join("\n"));
+            return Err(told(&problems));
         }
-        if let Some((span, path, problem)) = oversized("", &document.root, DEEPEST) {
-            let (message, way_out) = match problem {
-                Oversized::Long(count) => (
-                    format!("`{path}` has {count} entries; no list of a scene may have more than {MOST_ENTRIES}"),
-                    format!(
-                        "keep at most {MOST_ENTRIES} entries, of most lists far fewer; `stylet schema` describes them"
-                    ),
-                ),
-                Oversized::Deep => (
-                    format!("`{path}`: more than {DEEPEST} tables and lists within each other"),
-                    "write the keys as `stylet schema` describes them".into(),
-                ),
-            };
-            return Err(document.render(span, &message, "too much", &way_out));
+        if let Some(found) = oversized(&document.root, DEEPEST, &mut MOST_IN_ALL.clone()) {
+            let path: Vec<&str> = found.path.iter().rev().map(String::as_str).collect();
+            let (message, way_out) = found.problem.in_words(&path.join("."));
+            return Err(document.render(found.span, &message, "too much", &way_out));
         }
         record_places("", &document.root, &mut document.places);
         Ok(document)
@@ -105,18 +103,18 @@ impl<'s> Document<'s> {
 
     /// Reads the document into `T`; the error is rendered.
     ///
-    /// A list of a fixed length is checked against the schema first: the reading layer stops after the last number that it wants and
-    /// leaves the others unread.
+    /// The lengths of lists are checked against the schema first: the reading layer stops after the last number that it wants and
+    /// leaves the others unread, and names no key where one is missing.
     pub fn deserialize<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, String> {
         let schema = schemars::schema_for!(T).to_value();
         let mut problems = Problems::new(self);
-        too_long("", self.root.get_ref(), &schema, &schema, &mut problems);
+        wrong_lengths("", self.root.get_ref(), &schema, &schema, &mut problems);
         problems.check()?;
         T::deserialize(ValueDeserializer::from(self.root.clone())).map_err(|error| {
             let span = error.span().unwrap_or(0..0);
             let message = one_line(error.message());
             let way_out = way_out_of_reading(&message);
-            let message = in_plain_words(&message).unwrap_or(message);
+            let message = in_plain_words(&message, is_date(&self.root, &span)).unwrap_or(message);
             // A missing field is reported for its whole table; the first line shows which one.
             self.render(span, &message, "here", &way_out)
         })
@@ -164,8 +162,9 @@ impl<'s> Document<'s> {
             .with_labels(vec![Label::primary((), shown).with_message(label)])
             .with_notes(vec![format!("way out: {way_out}")]);
         let config = Config { chars: Chars::ascii(), ..Config::default() };
-        term::emit_into_string(&config, &excerpt, &diagnostic)
-            .unwrap_or_else(|_| format!("error: {}: {message}\n  = way out: {way_out}\n", self.name))
+        let text = term::emit_into_string(&config, &excerpt, &diagnostic)
+            .unwrap_or_else(|_| format!("error: {}: {message}\n  = way out: {way_out}\n", self.name));
+        plain(&text).into_owned()
     }
 
     /// The line in which a span begins, cut where it is long, and the place of the span in it. Only the first line of a span is shown:
@@ -250,19 +249,36 @@ impl<'a> Problems<'a> {
         self.found.push((start, text));
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.found.is_empty()
+    }
+
     /// `Err` with all problems, in the order of the file, where there are any.
     pub fn check(&mut self) -> Result<(), String> {
         if self.found.is_empty() {
             return Ok(());
         }
         self.found.sort_by_key(|(place, _)| *place);
-        let mut texts: Vec<&str> = self.found.iter().map(|(_, text)| text.trim_end()).take(MOST_PROBLEMS).collect();
-        let more = format!("and {} more problems of this kind or another", self.found.len() - texts.len());
-        if self.found.len() > texts.len() {
-            texts.push(&more);
-        }
-        Err(texts.join("\n\n") + "\n")
+        let texts: Vec<&str> = self.found.iter().map(|(_, text)| text.as_str()).collect();
+        Err(told(&texts))
     }
+}
+
+/// The first of these rendered problems, as many as somebody reads, and how many more there are.
+fn told(problems: &[impl AsRef<str>]) -> String {
+    let mut bytes = 0;
+    let fits = |text: &&str| {
+        bytes += text.len();
+        // A single one is told whatever its length.
+        bytes <= MOST_TOLD || bytes == text.len()
+    };
+    let all = problems.iter().map(|text| text.as_ref().trim_end());
+    let mut texts: Vec<&str> = all.take(MOST_PROBLEMS).take_while(fits).collect();
+    let more = format!("and {} more problems of this kind or another", problems.len() - texts.len());
+    if problems.len() > texts.len() {
+        texts.push(&more);
+    }
+    texts.join("\n\n") + "\n"
 }
 
 /// The entry of `choices` that differs least from `word`, where it is close enough to be a slip of the keys.
@@ -296,8 +312,18 @@ fn edit_distance(a: &str, b: &str) -> usize {
     row[b.len()]
 }
 
+/// Whether the value that stands in `span` is a date, which the reading layer takes for a table.
+fn is_date(value: &Spanned<DeValue>, span: &Range<usize>) -> bool {
+    match value.get_ref() {
+        DeValue::Datetime(_) => value.span() == *span,
+        DeValue::Table(table) => table.values().any(|item| is_date(item, span)),
+        DeValue::Array(array) => array.iter().any(|item| is_date(item, span)),
+        _ => false,
+    }
+}
+
 /// "invalid type: integer `16`, expected a string" in words of a scene file; `None` for any other message.
-fn in_plain_words(message: &str) -> Option<String> {
+fn in_plain_words(message: &str, date: bool) -> Option<String> {
     let (found, expected) = message.strip_prefix("invalid type: ")?.split_once(", expected ")?;
     let quoted = found.split_once('`').and_then(|(_, rest)| rest.strip_suffix('`')).unwrap_or_default();
     let found = match found.split(' ').next()? {
@@ -305,6 +331,7 @@ fn in_plain_words(message: &str) -> Option<String> {
         "boolean" => quoted.to_string(),
         "string" => format!("the text {}", found.strip_prefix("string ")?),
         "sequence" => "a list".into(),
+        "map" if date => "a date".into(),
         "map" => "a table".into(),
         _ => found.into(),
     };
@@ -454,34 +481,76 @@ fn one_line(message: &str) -> String {
     message.trim().replace('\n', ", ")
 }
 
-/// What no scene needs.
+/// What no scene and no library needs.
 enum Oversized {
     /// A list of so many entries.
-    Long(usize),
+    List(usize),
+    /// A key of so many bytes.
+    Key(usize),
+    /// More entries in all than any such file has.
+    Whole,
     Deep,
 }
 
-/// The first list that is too long, or table that lies `depth` levels below `value`, with its place and path; looks no deeper.
-fn oversized(path: &str, value: &Spanned<DeValue>, depth: usize) -> Option<(Range<usize>, String, Oversized)> {
-    let Some(depth) = depth.checked_sub(1) else { return Some((value.span(), path.into(), Oversized::Deep)) };
-    match value.get_ref() {
-        DeValue::Table(table) => {
-            table.iter().find_map(|(key, item)| oversized(&join(path, key.get_ref()), item, depth))
+/// Where a document has it; the path begins with its last part.
+struct OversizedAt {
+    span: Range<usize>,
+    path: Vec<String>,
+    problem: Oversized,
+}
+
+impl Oversized {
+    /// Message and way out.
+    fn in_words(&self, path: &str) -> (String, String) {
+        let as_described = "write the keys as `stylet schema` describes them".to_string();
+        match self {
+            Oversized::List(count) => (
+                format!("`{path}` has {count} entries; no list of such a file may have more than {MOST_ENTRIES}"),
+                format!("keep at most {MOST_ENTRIES} entries, of most lists far fewer; `stylet schema` describes them"),
+            ),
+            Oversized::Key(length) => {
+                (format!("a key of {length} bytes; no key of such a file is longer than {LONGEST_KEY}"), as_described)
+            }
+            Oversized::Whole => (
+                format!("more than {MOST_IN_ALL} entries of tables and lists in all, here in `{path}`"),
+                "remove what the scene does not need; `stylet schema` describes all keys".into(),
+            ),
+            Oversized::Deep => {
+                (format!("`{path}`: more than {DEEPEST} tables and lists within each other"), as_described)
+            }
         }
+    }
+}
+
+/// The first key or list that is too long, table that lies `depth` levels below `value`, or entry beyond the `left` that may come;
+/// looks no deeper, and makes a path only of what it has found.
+fn oversized(value: &Spanned<DeValue>, depth: usize, left: &mut usize) -> Option<OversizedAt> {
+    let found = |span, problem| Some(OversizedAt { span, path: Vec::new(), problem });
+    let Some(depth) = depth.checked_sub(1) else { return found(value.span(), Oversized::Deep) };
+    let mut below = |name: &dyn Fn() -> String, item: &Spanned<DeValue>| {
+        let Some(fewer) = left.checked_sub(1) else { return found(item.span(), Oversized::Whole) };
+        *left = fewer;
+        let mut found = oversized(item, depth, left)?;
+        found.path.push(name());
+        Some(found)
+    };
+    match value.get_ref() {
+        DeValue::Table(table) => table.iter().find_map(|(key, item)| match key.get_ref().len() {
+            length if length > LONGEST_KEY => found(key.span(), Oversized::Key(length)),
+            _ => below(&|| key.get_ref().to_string(), item),
+        }),
         // A list of tables has no place of its own, its entries have.
         DeValue::Array(array) if array.len() > MOST_ENTRIES => {
             let span = array.get(MOST_ENTRIES).map_or(value.span(), Spanned::span);
-            Some((span, path.into(), Oversized::Long(array.len())))
+            found(span, Oversized::List(array.len()))
         }
-        DeValue::Array(array) => {
-            array.iter().enumerate().find_map(|(index, item)| oversized(&join(path, &index.to_string()), item, depth))
-        }
+        DeValue::Array(array) => array.iter().enumerate().find_map(|(index, item)| below(&|| index.to_string(), item)),
         _ => None,
     }
 }
 
-/// Reports every list that is longer than the schema allows.
-fn too_long(
+/// Reports every list of a fixed length that has another one. Why a list may only have so many entries is told where it is read.
+fn wrong_lengths(
     path: &str,
     value: &DeValue,
     schema: &serde_json::Value,
@@ -489,29 +558,31 @@ fn too_long(
     problems: &mut Problems,
 ) {
     if let Some(place) = schema["$ref"].as_str().and_then(|place| place.strip_prefix('#')) {
-        return too_long(path, value, whole.pointer(place).unwrap_or_default(), whole, problems);
+        return wrong_lengths(path, value, whole.pointer(place).unwrap_or_default(), whole, problems);
     }
     for choice in ["anyOf", "oneOf", "allOf"].into_iter().filter_map(|key| schema[key].as_array()).flatten() {
-        too_long(path, value, choice, whole, problems);
+        wrong_lengths(path, value, choice, whole, problems);
     }
     match value {
         DeValue::Table(table) => {
             for (key, item) in table {
                 let below = &schema["properties"][key.get_ref().as_ref()];
-                too_long(&join(path, key.get_ref()), item.get_ref(), below, whole, problems);
+                wrong_lengths(&join(path, key.get_ref()), item.get_ref(), below, whole, problems);
             }
         }
         DeValue::Array(array) => {
-            if let Some(most) = schema["maxItems"].as_u64().filter(|most| array.len() as u64 > *most) {
+            let (least, most) = (schema["minItems"].as_u64(), schema["maxItems"].as_u64());
+            let count = array.len() as u64;
+            if let Some(wanted) = most.filter(|most| least == Some(*most) && count != *most) {
                 problems.report(
                     path,
-                    format!("`{path}` has {} entries, {most} are wanted", array.len()),
-                    "too long",
-                    format!("write {most} entries; `stylet schema` tells what they mean"),
+                    format!("`{path}` has {count} entries, {wanted} are wanted"),
+                    if count > wanted { "too long" } else { "too short" },
+                    format!("write {wanted} entries; `stylet schema` tells what they mean"),
                 );
             }
             for (index, item) in array.iter().enumerate() {
-                too_long(&join(path, &index.to_string()), item.get_ref(), &schema["items"], whole, problems);
+                wrong_lengths(&join(path, &index.to_string()), item.get_ref(), &schema["items"], whole, problems);
             }
         }
         _ => {}

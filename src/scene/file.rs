@@ -23,6 +23,7 @@ pub struct SceneFile {
     pub material: MaterialTable,
     /// Parts of another material, at most 15; where two overlap, the later one counts.
     #[serde(default)]
+    #[schemars(length(max = 15))]
     pub region: Vec<RegionTable>,
     /// What holds, moves or loads the six faces; default: sides and bottom fixed, top free; all free for a mesh.
     #[serde(default)]
@@ -55,6 +56,7 @@ pub struct SceneFile {
     pub outputs: OutputsTable,
     /// Points of the tissue that the insertion wants to reach, at most 64; their motion is written to targets.csv.
     #[serde(default)]
+    #[schemars(length(max = 64))]
     pub target: Vec<TargetTable>,
     /// What a trainee is asked to do; changes nothing in the simulation.
     pub task: Option<TaskTable>,

@@ -322,8 +322,12 @@ impl EngineReport {
         let form = if self.short { "short form" } else { "full form" };
         let cure = if self.without_cure { ", without the cure: every case must fail" } else { "" };
         let mut out = format!("stability, {form}{cure}\n");
-        let place = [self.adapter.as_str(), self.driver.as_str()].join(", ");
-        out += &wrapped(&format!("{} engine on {place}", self.engine), "", "  ");
+        // What runs it is known from the first case on.
+        let place = match self.adapter.as_str() {
+            "" => "nothing was run".to_string(),
+            adapter => format!("{} engine on {adapter}, {}", self.engine, self.driver),
+        };
+        out += &wrapped(&place, "", "  ");
         out.push('\n');
         let what = if self.without_cure { "without" } else { "what is hard" };
         let mut row = |cells: [&str; 8]| {

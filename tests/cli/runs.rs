@@ -303,6 +303,24 @@ fn every_signal_that_ends_a_job_leaves_results_and_a_checkpoint() {
     answer.ended(143).says("going on at");
 }
 
+/// Commands that keep nothing before their end say so, and end with the code of the signal.
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_any_command_with_a_sentence() {
+    let place = Place::new();
+    let args = ["bench", "--engine", "cpu"];
+    let mut child = place.program(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    if child.try_wait().unwrap().is_some() {
+        panic!("ended before the signal: {}", Answer::from(child.wait_with_output().unwrap()).all());
+    }
+    let sent = std::time::Instant::now();
+    assert!(std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+    let answer = Answer::from(child.wait_with_output().unwrap()).ended(143);
+    answer.says("error: ended by SIGTERM before anything was kept");
+    assert!(sent.elapsed().as_secs() < 4, "{:?}", sent.elapsed());
+}
+
 /// A frame of many thousand steps is given up; the run is kept as it was before.
 #[cfg(unix)]
 #[test]

@@ -60,6 +60,12 @@ fn either_vtk_format_is_read_under_either_extension() {
         let bytes = std::fs::read(folder().join(file)).unwrap();
         let under = |name: &str| parse(name, &bytes, MILLIMETRES).unwrap_or_else(|e| panic!("{e}")).mesh;
         assert!(under(name) == under(file), "{file} as {name}");
+        // From the disk only the head is looked at before the whole is read.
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join(name);
+        std::fs::write(&path, &bytes).unwrap();
+        let read = read_with(&path, MILLIMETRES).unwrap_or_else(|e| panic!("{e}")).mesh;
+        assert!(read == under(file), "{file} as {name} on disk");
     }
 }
 

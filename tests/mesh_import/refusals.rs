@@ -195,3 +195,32 @@ fn abaqus() {
     refused("TYPE=C3D4", "TYPE=C3D8R", &["no tetrahedra, but 2 elements of type C3D8R"]);
     refused("TYPE=C3D4", "TYPE=S3", &["no tetrahedra, only 2 elements of type S3"]);
 }
+
+/// A file that was cut short on its way often goes on as zeros, which would be one endless word.
+#[test]
+fn zeros_in_a_text() {
+    let zeros = "\0".repeat(1 << 20);
+    for (name, text, line) in [
+        ("a.inp", "*NODE\n".to_string(), 2),
+        ("a.inp", INP.to_string(), 11),
+        ("a.msh", two_tets().replace("$EndNodes\n", ""), 14),
+        ("a.vtk", VTK.to_string(), 19),
+    ] {
+        let begin = std::time::Instant::now();
+        let message = refusal(name, format!("{text}{zeros}").as_bytes());
+        assert_contains(&message, &["a byte of value 0 stands here", &format!("{name}:")]);
+        let told: u64 = message.split(':').nth(1).unwrap().parse().unwrap();
+        assert!(told.abs_diff(line) <= 2, "{message}");
+        assert!(begin.elapsed().as_secs() < 2 && message.len() < 500, "{message}");
+    }
+}
+
+/// Numbers that no engine takes are refused before anything is made of them.
+#[test]
+fn more_points_than_anybody_computes() {
+    let head = "# vtk DataFile Version 3.0\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\n";
+    let message = refusal("a.vtk", format!("{head}POINTS 30000000 float\n").as_bytes());
+    assert_contains(&message, &["30000000 points; at most 4194304 are read", "coarser mesh"]);
+    let message = refusal("a.vtk", format!("{head}CELLS 30000000 150000000\n").as_bytes());
+    assert_contains(&message, &["30000000 cells; at most 4194304 are read"]);
+}

@@ -34,6 +34,7 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
         parts: 0,
         instances: 0,
     };
+    file.source.refuse_zeros()?;
     file.keywords()?;
     file.add_elements()?;
     file.raw.refuse_other_volumes()?;

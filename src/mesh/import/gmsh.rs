@@ -278,6 +278,7 @@ impl GmshFile<'_> {
             return Err(source.broken(at, format!("numbers of {size} bytes cannot be read, only of 8")));
         }
         if kind == 0 {
+            source.refuse_zeros()?;
             return source.end_line();
         }
         source.line();

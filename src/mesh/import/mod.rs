@@ -114,7 +114,8 @@ pub fn read_with(path: &Path, options: ImportOptions) -> Result<Imported> {
     };
     let name = path.display().to_string();
     // A large file that is something else is not read as a whole.
-    format.confirm(&name, &reading::head(path, reading::most::MESH, HEAD).map_err(unread)?)?;
+    let head = reading::head(path, reading::most::MESH, HEAD).map_err(unread)?;
+    format.found_in(&head).confirm(&name, &head)?;
     parse_as(format, &name, &reading::bytes(path, reading::most::MESH).map_err(unread)?, options)
 }
 

@@ -60,6 +60,11 @@ pub(super) enum ElementClass {
     Lower,
 }
 
+/// Most nodes, and most elements of all kinds: several times what a device takes.
+pub(super) const MOST_ENTITIES: u64 = 4 << 20;
+/// Way out where there are more.
+pub(super) const COARSER: &str = "write a coarser mesh, and no more of it than the needle meets";
+
 /// Most sets that a node or element may be in on average: a short file could otherwise name all of them again and again.
 pub(super) const MOST_SETS: usize = 64;
 

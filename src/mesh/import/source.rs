@@ -71,6 +71,14 @@ impl<'a> Source<'a> {
         self.fail(at, message, WRITE_AGAIN)
     }
 
+    /// Refuses what no text has: a file that was cut short on its way often goes on as zeros, which would be one endless word.
+    pub fn refuse_zeros(&self) -> Result<()> {
+        match self.rest().iter().position(|byte| *byte == 0) {
+            Some(place) => Err(self.broken(self.at + place, "a byte of value 0 stands here, which no text has")),
+            None => Ok(()),
+        }
+    }
+
     /// Steps over spaces, tabs and line ends.
     pub fn skip_space(&mut self) {
         let rest = self.rest();

@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::raw::{ElementClass, RawMesh, RawNode, RawTet, Words};
+use super::raw::{COARSER, ElementClass, MOST_ENTITIES, RawMesh, RawNode, RawTet, Words};
 use super::source::{Source, WRITE_AGAIN, excerpt};
 use crate::{Error, Result};
 
@@ -191,6 +191,9 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
     }
     source.line();
     source.binary = binary;
+    if !binary {
+        source.refuse_zeros()?;
+    }
     let mut file = VtkFile { source, binary, grid: Grid::default(), starts: [None; 4], attribute_of: None };
     file.sections()?;
     file.finish()
@@ -362,8 +365,17 @@ impl VtkFile<'_> {
         })
     }
 
+    /// Refuses numbers that no engine takes before anything is made of them.
+    fn few_enough(&self, at: usize, count: u64, what: &str) -> Result<()> {
+        match count > MOST_ENTITIES {
+            true => Err(self.source.fail(at, format!("{count} {what}; at most {MOST_ENTITIES} are read"), COARSER)),
+            false => Ok(()),
+        }
+    }
+
     fn points(&mut self, at: usize) -> Result<()> {
         let count = self.count_on_line("the number of points")?;
+        self.few_enough(at, count, "points")?;
         let kind = self.data_type()?;
         self.end_head()?;
         let start = self.source.at();
@@ -388,6 +400,7 @@ impl VtkFile<'_> {
 
     fn cells(&mut self, at: usize) -> Result<()> {
         let count = self.count_on_line("the number of cells")?;
+        self.few_enough(at, count, "cells")?;
         let size = self.count_on_line("the length of the cell list")?;
         self.end_head()?;
         // Binary data of the older layout never spells OFFSETS: its first four bytes are a small number.

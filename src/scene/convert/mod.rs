@@ -8,6 +8,7 @@ mod frames;
 pub(super) mod library;
 mod material;
 mod mesh;
+mod missing;
 pub(super) mod parameters;
 mod regions;
 mod targets;
@@ -19,6 +20,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use parameters::OwnTables;
+
+use missing::{refusal, unreadable};
 
 use super::document::{Document, Problems, closest};
 use super::file::*;
@@ -48,7 +51,7 @@ pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, Str
     let source = reading::text(path, reading::most::SCENE).map_err(|unread| match unread {
         Unread::System(error) => unreadable(path, &error),
         Unread::Refused { reason, way_out } => {
-            format!("error: cannot read the scene file {}: {reason}\n  = way out: {way_out}\n", path.display())
+            refusal(&format!("cannot read the scene file {}: {reason}", path.display()), way_out)
         }
     })?;
     let mut scene = parse(path, &source, overrides)?;
@@ -67,49 +70,6 @@ pub fn parse(path: &Path, source: &str, overrides: &[String]) -> std::result::Re
     check.finite_numbers(&document)?;
     let file: SceneFile = document.deserialize()?;
     check.scene(path, &file)
-}
-
-/// Names of the TOML files in a folder, sorted.
-fn toml_files(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<String> = entries
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .filter(|name| name.ends_with(".toml"))
-        .collect();
-    names.sort();
-    names
-}
-
-/// The text for a file that cannot be read.
-fn unreadable(path: &Path, error: &std::io::Error) -> String {
-    let name = path.display();
-    let named = path.parent().filter(|p| !p.as_os_str().is_empty());
-    if path.is_dir() {
-        let scenes = toml_files(path);
-        let way_out = match scenes.first() {
-            Some(first) => {
-                format!("give one of its scenes, e.g. {}; there are: {}", path.join(first).display(), scenes.join(", "))
-            }
-            None => "give the path of a scene file (.toml); this folder holds none".into(),
-        };
-        return format!("error: {name} is a folder, not a scene file\n  = way out: {way_out}\n");
-    }
-    let stem = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    // Beside the file first; a bare name may also mean one of the program's own scenes. The ending that all share is no likeness.
-    let folders = [named.unwrap_or(Path::new(".")), Path::new("scenes")];
-    let near = folders.iter().find_map(|folder| {
-        let scenes = toml_files(folder);
-        let stems = scenes.iter().map(|name| name.trim_end_matches(".toml"));
-        closest(&stem, stems).map(|near| folder.join(format!("{near}.toml")))
-    });
-    let listed = named.unwrap_or(Path::new("scenes"));
-    let scenes = toml_files(listed);
-    let way_out = match near {
-        Some(near) => format!("did you mean {}?", near.strip_prefix(".").unwrap_or(&near).display()),
-        None if scenes.is_empty() => "give the path of a scene file (.toml); the program's own lie in scenes/".into(),
-        None => format!("scenes in {}: {}", listed.display(), scenes.join(", ")),
-    };
-    format!("error: cannot read the scene file {name}: {error}\n  = way out: {way_out}\n")
 }
 
 /// Range of a number, in the unit of its key.
@@ -250,17 +210,23 @@ impl Check<'_> {
         const THINNEST: f64 = 0.1;
         let Some(cohesive) = scene.effects.cohesive.as_ref().filter(|c| !c.planes.is_empty()) else { return };
         let grid = BlockMesh::for_scene(scene);
+        // A plane that is there twice has no grid line, whatever lies beside it.
         for (index, plane) in cohesive.planes.iter().enumerate() {
-            let axis = ["x", "y", "z"][plane.axis];
             if cohesive.planes[..index].iter().any(|other| (other.axis, other.at) == (plane.axis, plane.at)) {
+                let axis = ["x", "y", "z"][plane.axis];
                 self.problems.report(
                     &format!("cohesive.plane.{index}.at_mm"),
                     format!("the plane {axis} = {} mm is there already", four_digits(plane.at / MM)),
                     "the same plane",
                     "remove one of the two",
                 );
-                continue;
             }
+        }
+        if !self.problems.is_empty() {
+            return;
+        }
+        for (index, plane) in cohesive.planes.iter().enumerate() {
+            let axis = ["x", "y", "z"][plane.axis];
             let lines = &grid.lines[plane.axis];
             let doubled = lines.iter().filter(|line| **line == plane.at).count() == 2 && lines.is_sorted();
             let gap = |line: &f64| Some((line - plane.at).abs()).filter(|gap| *gap > 0.0);
