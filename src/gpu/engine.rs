@@ -38,6 +38,9 @@ pub const DISPLACEMENT_UNIT: f64 = 1.0 / (1u64 << 36) as f64;
 /// Frames whose results may be under way.
 const RING: usize = 3;
 
+/// Bytes from the input of one step to that of the next: the default limits let a device ask for offsets in multiples of 256.
+const STEP_STRIDE: usize = size_of::<StepInput>().next_multiple_of(256);
+
 /// How long the mapping of a finished submission may take.
 const MAPPING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
 
@@ -605,12 +608,12 @@ impl GpuEngine {
     fn encode_selected(&self, encoder: &mut wgpu::CommandEncoder, step: usize, wanted: impl Fn(Stage) -> bool) {
         let mut pass = encoder.begin_compute_pass(&Default::default());
         for kernel in self.kernels.iter().filter(|k| wanted(k.stage)) {
-            kernel.encode(&mut pass, (step * size_of::<StepInput>()) as u32);
+            kernel.encode(&mut pass, (step * STEP_STRIDE) as u32);
         }
     }
 
     fn encode_step(&self, pass: &mut wgpu::ComputePass<'_>, step: usize) {
-        let offset = (step * size_of::<StepInput>()) as u32;
+        let offset = (step * STEP_STRIDE) as u32;
         for kernel in self.kernels.iter().filter(|k| !k.stage.once_per_frame() && !k.stage.draws()) {
             kernel.encode(pass, offset);
         }
@@ -772,7 +775,7 @@ fn contents(name: &str, model: &Model, layout: &Layout, dt: f64, measure_threads
     let zeros = |count: u64, size: usize| Contents::Zeros(count * size as u64);
     match name {
         "params" => bytes_of(&[params(model, dt)]),
-        STEP_INPUT => zeros(max_steps.max(1) as u64, size_of::<StepInput>()),
+        STEP_INPUT => zeros(max_steps.max(1) as u64, STEP_STRIDE),
         "gravity" => {
             let g = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration);
             bytes_of(&[GravityParams { acceleration: vec4(g / model.mass_scaling()) }])
@@ -1414,8 +1417,11 @@ impl Engine for GpuEngine {
         }
         if let Some(buffer) = self.buffers.get(STEP_INPUT) {
             let numbered = (plan.first_step..).zip(&plan.steps);
-            let inputs: Vec<StepInput> = numbered.map(|(n, s)| step_input(s, n, self.dt)).collect();
-            buffer.write(&self.gpu.queue, bytemuck::cast_slice(&inputs));
+            let mut inputs = vec![0; plan.steps.len() * STEP_STRIDE];
+            for (place, (n, s)) in inputs.chunks_exact_mut(STEP_STRIDE).zip(numbered) {
+                place[..size_of::<StepInput>()].copy_from_slice(bytemuck::bytes_of(&step_input(s, n, self.dt)));
+            }
+            buffer.write(&self.gpu.queue, &inputs);
         }
         if let (Some(buffer), Some(line)) = (self.buffers.get("centre_line"), &plan.centre_line) {
             buffer.write(&self.gpu.queue, bytemuck::bytes_of(&centre_line(line)));
