@@ -10,6 +10,7 @@ use serde_json::Value;
 
 use crate::effects::parameter::Parameter;
 use crate::effects::{EFFECTS, Effect};
+use crate::engine::Stage;
 use crate::material::four_digits;
 use crate::observables::ForceParts;
 use crate::output::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, SAMPLE_TABLE, TARGET_TABLE};
@@ -17,7 +18,6 @@ use crate::output::sample::SAMPLE_COLUMNS;
 use crate::output::tables::{CORE_COLUMNS, energy_columns, force_columns};
 use crate::output::target::TARGET_COLUMNS;
 use crate::scene::file::SceneFile;
-use crate::solver::step::Stage;
 use crate::verdict::{BOUNDS, Bound};
 use crate::{Error, Result};
 

@@ -1,21 +1,25 @@
 //! Stylet: a needle goes into soft tissue, and a person sees and feels what happens.
 //!
 //! Reading order, which is also the straight line that data takes:
-//! [`scene`] -> [`mesh`] -> [`effects`] -> [`separation`] and [`model`] -> [`solver`] (engines [`solver::cpu`] and
-//! [`gpu`]) -> [`observables`] -> [`output`] and [`render`]. [`stability`] runs that line on the hard cases, [`study`] many
-//! times over, [`training`] scores what a trainee did, [`haptic`] gives the
-//! forces to a device at 1 kHz. [`untrusted`] lists the readers of files, [`docs`] renders the parts of `docs/` that follow from tables.
+//! [`scene`] -> [`mesh`], [`effects`], [`separation`] -> [`model`] -> [`engine`] (the contract) -> [`cpu`] and [`gpu`], which do not know
+//! each other -> [`observables`] -> [`simulation`] (a run) -> [`output`] and [`render`]. Below stand [`material`] and [`needle`], laws and the
+//! tool. [`stability`] runs that line on the hard cases, [`study`] many times over, [`training`] scores what a trainee did, [`haptic`]
+//! gives the forces to a device at 1 kHz. [`untrusted`] lists the readers of files, [`docs`] renders the parts of `docs/` that follow from
+//! tables. `docs/architecture.md` has the floors that these modules stand on; `tests/architecture.rs` holds them.
 
 #[macro_use]
 pub mod terminal;
 
 pub mod commands;
+pub mod cpu;
 pub mod docs;
 pub mod effects;
 pub mod ending;
+pub mod engine;
 pub mod error;
 pub mod gpu;
 pub mod haptic;
+pub mod hash;
 #[cfg(feature = "link")]
 pub mod link;
 pub mod material;
@@ -32,12 +36,13 @@ pub mod render;
 pub mod scene;
 pub mod separation;
 pub mod session;
-pub mod solver;
+pub mod simulation;
 pub mod stability;
 pub mod study;
 pub mod training;
 pub mod untrusted;
 pub mod verdict;
+pub mod whole_file;
 #[cfg(feature = "window")]
 pub mod window;
 

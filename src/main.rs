@@ -17,7 +17,7 @@ use stylet::ending;
 use stylet::error::{Error, Result, brief};
 use stylet::output::checkpoint::RunCheckpoint;
 use stylet::scene::Scene;
-use stylet::solver::simulation::EngineChoice;
+use stylet::simulation::EngineChoice;
 use stylet::{eprintln, println, terminal};
 
 /// Scene of the main job.

@@ -12,14 +12,14 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::engine::EngineInfo;
 use crate::error::{Error, Result};
+use crate::needle::motion::HandPose;
 use crate::output::checkpoint::fingerprint;
-use crate::output::whole_file;
 use crate::reading;
 use crate::scene::Scene;
-use crate::scene::motion::HandPose;
-use crate::solver::engine::EngineInfo;
-use crate::solver::simulation::Simulation;
+use crate::simulation::Simulation;
+use crate::whole_file;
 
 /// File of a session in its folder.
 pub const SESSION: &str = "session.json";

@@ -8,7 +8,7 @@ use std::process::Command;
 use serde_json::Value;
 use stylet::gpu::Gpu;
 use stylet::scene::Scene;
-use stylet::solver::simulation::Simulation;
+use stylet::simulation::Simulation;
 
 /// `compare-adapters` of a scene of the repository with these variables of the environment; the table as JSON.
 fn compared(scene: &str, overrides: &[&str], variables: &[(&str, &str)]) -> Value {

@@ -4,12 +4,12 @@ use std::path::Path;
 use std::time::Instant;
 
 use stylet::effects::parameter::with_overrides;
+use stylet::engine::State;
+use stylet::needle::motion::HandPose;
 use stylet::observables::FrameRecord;
 use stylet::scene::Scene;
-use stylet::scene::motion::HandPose;
-use stylet::solver::change::Reach;
-use stylet::solver::engine::State;
-use stylet::solver::simulation::{Purpose, Simulation};
+use stylet::simulation::change::Reach;
+use stylet::simulation::{Purpose, Simulation};
 
 #[path = "common/mod.rs"]
 mod common;

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use stylet::gpu::Gpu;
 use stylet::observables::FrameRecord;
 use stylet::scene::Scene;
-use stylet::solver::checkpoint::Checkpoint;
-use stylet::solver::simulation::{EngineChoice, Simulation};
+use stylet::simulation::checkpoint::Checkpoint;
+use stylet::simulation::{EngineChoice, Simulation};
 
 fn repository() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

@@ -6,15 +6,15 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
-use stylet::effects::mass_scaling;
-use stylet::material::{Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean};
-use stylet::model::Model;
-use stylet::scene::{FaceDrive, Scene, TissueMaterial};
-use stylet::solver::cpu::CpuEngine;
-use stylet::solver::engine::{Engine, FrameSums, StepInput};
-use stylet::solver::stable_dt::{
+use stylet::cpu::CpuEngine;
+use stylet::effects::{TissueMaterial, mass_scaling};
+use stylet::engine::stable_dt::{
     largest_frequency, largest_frequency_of, power_iteration, stiffness_bounds, wave_speed_bound,
 };
+use stylet::engine::{Engine, FrameSums, StepInput};
+use stylet::material::{Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean};
+use stylet::model::Model;
+use stylet::scene::{FaceDrive, Scene};
 
 use common::*;
 

@@ -5,7 +5,7 @@ mod common;
 use common::*;
 use stylet::gpu::Memory;
 use stylet::scene::Scene;
-use stylet::solver::simulation::{Purpose, Simulation};
+use stylet::simulation::{Purpose, Simulation};
 
 /// Fields of the drawn cells and nodes, (von Mises, pressure, stretch, stiffness left) each.
 type Fields = Vec<[f32; 4]>;
@@ -24,7 +24,7 @@ fn compare(scene: &str, overrides: &[&str], frames: u64) {
         record = simulation.next_frame().unwrap().unwrap();
     }
     let fields = simulation.snapshot(&record).unwrap();
-    let engine = simulation.engine().on_device().unwrap();
+    let engine = simulation.on_device().unwrap();
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     engine.encode_fields(&mut encoder);
     gpu.queue.submit([encoder.finish()]);

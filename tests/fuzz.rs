@@ -12,10 +12,10 @@ use stylet::error::Error;
 use stylet::mesh::BlockMesh;
 use stylet::output::checkpoint::RunCheckpoint;
 use stylet::scene::Scene;
-use stylet::solver::simulation::{EngineChoice, Simulation};
-use stylet::study::plan::{Basis, Costs, MeshSize, Plan, choose};
+use stylet::simulation::{EngineChoice, Simulation};
+use stylet::study::plan::{Basis, Costs, Plan, choose};
 use stylet::study::store::RunRecord;
-use stylet::study::{Axis, Engine, Settings};
+use stylet::study::{Axis, Engine, MeshSize, Settings};
 use stylet::untrusted::{READERS, Reader};
 
 /// Longest time for reading one scene and laying its mesh.
@@ -390,7 +390,7 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
             let mut session = stylet::session::Session::new(&scene, &["solver.safety=0.4".into()], &Default::default());
             let motion = &scene.motion;
             session.poses = (0..20)
-                .map(|n| stylet::scene::motion::HandPose {
+                .map(|n| stylet::needle::motion::HandPose {
                     entry: motion.entry,
                     direction: motion.direction,
                     depth: 1e-4 * f64::from(n),

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use stylet::engine::stable_dt::power_iteration;
 use stylet::gpu::Gpu;
 use stylet::mesh::BlockMesh;
 use stylet::model::Model;
 use stylet::scene::Scene;
-use stylet::solver::stable_dt::power_iteration;
 
 /// A soft block with a stiff stone in it, pressed from above. The stone bounds the step.
 const SCENE: &str = r#"

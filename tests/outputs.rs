@@ -6,9 +6,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
-use stylet::effects::EffectSet;
+use stylet::effects::{EffectSet, TissueMaterial};
 use stylet::material::ElasticLaw;
-use stylet::mesh::{BlockMesh, Mesh};
+use stylet::mesh::{BlockMesh, Mesh, Tissue};
+use stylet::needle::{Motion, NeedleShape, Phase, Tool};
 use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord, Health};
 use stylet::output::folder::{
     ENERGY_TABLE, FORCE_CHART, FORCE_PARTS_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY,
@@ -20,10 +21,7 @@ use stylet::output::{
     write_parts_chart, write_sample_chart,
 };
 use stylet::render::{self, Image, Picture, offscreen, raster};
-use stylet::scene::{
-    Face, FaceCondition, FaceDrive, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Target, Tissue,
-    TissueMaterial, Tool,
-};
+use stylet::scene::{Face, FaceCondition, FaceDrive, Outputs, Scene, SolverSettings, Target};
 use stylet::verdict::{Doubt, Quantity, Verdict};
 use stylet::{Error, Result};
 
@@ -424,7 +422,7 @@ fn a_failed_write_keeps_the_old_file() {
     fs::write(&path, "old").unwrap();
     // A folder of the temporary name stands in the way.
     fs::create_dir(base.path().join("held.json.part")).unwrap();
-    assert!(stylet::output::whole_file::write(&path, b"new").is_err());
+    assert!(stylet::whole_file::write(&path, b"new").is_err());
     assert_eq!(fs::read_to_string(&path).unwrap(), "old");
 }
 

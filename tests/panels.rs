@@ -7,11 +7,12 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use stylet::effects::EFFECTS;
 use stylet::scene::Scene;
-use stylet::solver::simulation::{Purpose, Simulation};
+use stylet::simulation::{Purpose, Simulation};
 use stylet::window::accuracy::Accuracy;
 use stylet::window::effects_panel;
 use stylet::window::practice::Timing;
-use stylet::window::tuning::{Source, Taken, Tuning};
+use stylet::window::source::Source;
+use stylet::window::tuning::{Taken, Tuning};
 
 #[path = "common/mod.rs"]
 mod common;
@@ -58,7 +59,7 @@ fn every_effect_has_a_switch_and_every_number_a_slider() {
     for effect in &EFFECTS {
         assert!(harness.query_by_label(&effect.key.replace('_', " ")).is_some(), "no switch for {}", effect.key);
         for parameter in effect.parameters {
-            let count = parameter.values(&scene).len();
+            let count = parameter.values(&scene.numbers()).len();
             assert!(
                 harness.query_all_by_label(parameter.name).count() >= count,
                 "no slider for each of {} numbers of {}",

@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use stylet::scene::motion::HandPose;
+use stylet::needle::motion::HandPose;
 use stylet::window::hand::{Desk, InputDevice, Key, Recording};
 use stylet::window::practice::{Leader, Practice, State};
-use stylet::window::tuning::Source;
+use stylet::window::source::Source;
 
 #[path = "common/mod.rs"]
 mod common;

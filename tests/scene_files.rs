@@ -7,8 +7,8 @@ use stylet::Error;
 use stylet::material::{Isochoric, Verdict};
 use stylet::mesh::BlockMesh;
 use stylet::observables::{FrameRecord, TargetRecord};
-use stylet::scene::{FaceDrive, RegionShape, Scene, presets};
-use stylet::solver::simulation::{EngineChoice, Simulation};
+use stylet::scene::{FaceDrive, RegionShape, Scene, needles, presets};
+use stylet::simulation::{EngineChoice, Simulation};
 
 fn repository() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -556,7 +556,7 @@ fn the_schema_knows_the_words() {
     let effects = list("/properties/effects/items/enum");
     assert_eq!(effects, stylet::effects::EFFECTS.map(|e| e.key));
     let gauges = list("/$defs/NeedleTable/properties/gauge/enum");
-    assert!(gauges.contains(&"16G".to_string()) && gauges.len() == presets::needles().len());
+    assert!(gauges.contains(&"16G".to_string()) && gauges.len() == needles::needles().len());
     let known = list("/$defs/MaterialTable/then/properties/preset/enum");
     assert!(known.contains(&"across-fibre".to_string()) && known.len() == presets::tissues().len());
     // A library of one's own has other names.

@@ -7,11 +7,11 @@ use std::process::{Command, Output};
 
 use common::*;
 use glam::{DQuat, DVec3};
+use stylet::needle::motion::HandPose;
 use stylet::observables::FrameRecord;
 use stylet::scene::Scene;
-use stylet::scene::motion::HandPose;
 use stylet::session::{SceneChange, Session, SessionFile};
-use stylet::solver::simulation::{Purpose, Simulation};
+use stylet::simulation::{Purpose, Simulation};
 
 /// A small insertion.
 const OVERRIDES: [&str; 3] =
@@ -97,7 +97,7 @@ fn changes_are_replayed_in_their_frames() {
             session.change(&mut simulation, frame as u64).unwrap();
         }
         let now = simulation.hand().unwrap();
-        session.poses.push(stylet::scene::motion::HandPose { depth: wanted(frame), ..now });
+        session.poses.push(stylet::needle::motion::HandPose { depth: wanted(frame), ..now });
         simulation.lead(session.poses.last().unwrap());
         records.push(simulation.next_frame().unwrap().unwrap());
     }
@@ -131,7 +131,7 @@ fn changes_are_replayed_in_their_frames() {
 fn a_hand_that_goes_as_the_script_does_feels_the_same() {
     let mut scene = scene();
     // As deep as a hand may go: both get the same mesh.
-    scene.motion.phases = vec![stylet::scene::Phase::Insert { speed: 2e-3, depth: 8.5e-3 }];
+    scene.motion.phases = vec![stylet::needle::Phase::Insert { speed: 2e-3, depth: 8.5e-3 }];
     let mut scripted = Simulation::on(scene.clone(), gpu()).unwrap();
     let mut led = Simulation::for_purpose(scene, gpu(), Purpose { led: true, drawn: false }).unwrap();
     let mut frames = 0;

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use assert_cmd::cargo::CommandCargoExt;
 use serde_json::Value;
 use stylet::gpu::Gpu;
-use stylet::solver::simulation::EngineChoice;
+use stylet::simulation::EngineChoice;
 use stylet::stability::random::{self, RandomOptions, RandomScene};
 use stylet::stability::{CASES, EngineReport, Options, Suite, run};
 

@@ -10,9 +10,9 @@ use stylet::study::advice::{Candidate, sentences};
 use stylet::study::metrics::{curve_error, field_error, interpolated};
 use stylet::study::order::{fit, richardson};
 use stylet::study::pareto::front;
-use stylet::study::plan::{Basis, Choice, Costs, MeshSize, Role, UnitCost, choose, shard};
+use stylet::study::plan::{Basis, Choice, Costs, Role, UnitCost, choose, shard};
 use stylet::study::subject::Variant;
-use stylet::study::{Axis, Engine, Settings};
+use stylet::study::{Axis, Engine, MeshSize, Settings};
 use tempfile::TempDir;
 
 /// A scene that runs in a fraction of a second on the CPU engine.

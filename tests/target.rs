@@ -17,7 +17,7 @@ use stylet::output::TargetFigures;
 use stylet::output::folder::{SUMMARY, TARGET_TABLE};
 use stylet::output::target::TARGET_COLUMNS;
 use stylet::scene::{Scene, Target};
-use stylet::solver::simulation::{EngineChoice, Simulation};
+use stylet::simulation::{EngineChoice, Simulation};
 
 /// A short and coarse insertion at 10 mm/s; 160 keeps the inertia of 4000 at 2 mm/s.
 const SHORT: [&str; 4] = [
@@ -129,7 +129,7 @@ fn without_targets_nothing_is_stored_or_read_back() {
     let bytes = |scene: Scene| {
         let model = model(scene);
         let engine = gpu_engine(&model, 1e-5, 4)?;
-        Some((engine.buffer_sizes(), stylet::solver::engine::Engine::info(&engine).device_bytes))
+        Some((engine.buffer_sizes(), stylet::engine::Engine::info(&engine).device_bytes))
     };
     let plain = block([6.0, 6.0, 6.0], 1.0);
     let mut aimed = plain.clone();

@@ -6,17 +6,16 @@ use std::path::{Path, PathBuf};
 use glam::{DQuat, DVec3};
 use stylet::Error;
 use stylet::mesh::Mesh;
-use stylet::observables::{CoreSample, FrameRecord, TargetRecord};
+use stylet::observables::{CoreSample, FrameRecord, Judge, Sizes, TargetRecord};
 use stylet::output::Summary;
 use stylet::scene::{Goal, Obstacle, RegionShape, Scene};
-use stylet::solver::simulation::{EngineChoice, Simulation};
+use stylet::simulation::{EngineChoice, Simulation};
 use stylet::training::history::{self, History, file_name, progress};
 use stylet::training::kinematic::{Block, Body, KinematicFigures, Plan, Sample, check, passes};
 use stylet::training::physical::{MOST_CLAMPED, PhysicalFigures, Trust};
 use stylet::training::score::{COLUMNS, Score, TEXT_WIDTH};
 use stylet::training::task::clearance_of;
 use stylet::training::{scripted_samples, texts};
-use stylet::verdict::{Judge, Sizes};
 
 const MM: f64 = 1e-3;
 

@@ -1,4 +1,4 @@
-// Energies and Jacobians of one cell. Equations: src/solver/elements.rs, Elements::measure.
+// Energies and Jacobians of one cell. Equations: src/engine/elements.rs, Elements::measure.
 struct CellEnergy {
     // Stored energy and hourglass energy [J], the part of the first that Prony terms hold.
     elastic: f32,

@@ -1,4 +1,4 @@
-// A tetrahedron at rest, corners a, b, c, d right-handed. Equations: src/solver/elements.rs.
+// A tetrahedron at rest, corners a, b, c, d right-handed. Equations: src/engine/elements.rs.
 struct Tetrahedron {
     // Nodes of the corners, and the slots of `corner_force` that take the forces on them.
     nodes: vec4<u32>,

@@ -1,4 +1,4 @@
-// Stage cell_fields: what a window draws of every cell. Equations: src/solver/simulation.rs, `snapshot`.
+// Stage cell_fields: what a window draws of every cell. Equations: src/simulation/fields.rs, `snapshot`.
 #import shared/params
 #import shared/thread_index
 #import shared/displacement

@@ -3,7 +3,7 @@
 // One thread walks up a strip of cells in one column. It keeps the plane of four nodes between two cells, so that
 // every cell loads four nodes and stores four forces instead of eight. On a rectilinear grid all gradients and the
 // four hourglass vectors are one 8-point Walsh-Hadamard transform: sums over xi, eta, zeta, eta zeta, zeta xi,
-// xi eta, xi eta zeta. The sums are formed in integers and are exact. Equations: src/solver/elements.rs.
+// xi eta, xi eta zeta. The sums are formed in integers and are exact. Equations: src/engine/elements.rs.
 #import shared/params
 #import shared/thread_index
 #import shared/displacement

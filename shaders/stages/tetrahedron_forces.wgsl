@@ -2,7 +2,7 @@
 //
 // f_i = V (w P_iso + p cof F) B_i with the mean p of the pressures of the four nodes. The pressure carries over from
 // neighbours that may be intact, so it is not weakened with the cell; a flat cell adds its own. Equations:
-// src/solver/elements.rs.
+// src/engine/elements.rs.
 #import shared/params
 #import shared/thread_index
 #import shared/displacement

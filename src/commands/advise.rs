@@ -7,14 +7,14 @@ use super::report::moment;
 use crate::effects::mass_scaling::{AUTO_MACH, Loading};
 use crate::error::{Error, Result};
 use crate::output::folder::safe_name;
-use crate::solver::simulation::EngineChoice;
+use crate::simulation::EngineChoice;
 use crate::study::advice::{Candidate, best_in_real_time, speed};
 use crate::study::analysis::Analysis;
-use crate::study::plan::{MeshSize, UnitCost};
+use crate::study::plan::UnitCost;
 use crate::study::runner::{measure_engine, predicted_factor};
 use crate::study::store::Store;
 use crate::study::subject::Subject;
-use crate::study::{Settings, digits, trimmed};
+use crate::study::{MeshSize, Settings, digits, trimmed};
 
 /// Wall time of the measurement of one mesh [s].
 const MEASURED_S: f64 = 0.4;

@@ -10,22 +10,21 @@ use std::time::Instant;
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::effects::{EffectSet, friction, mass_scaling, puncture};
+use crate::cpu::CpuEngine;
+use crate::effects::{EffectSet, TissueMaterial, friction, mass_scaling, puncture};
+use crate::engine::stable_dt::wave_speed_bound;
+use crate::engine::{Engine, FramePlan, StepInput};
 use crate::error::Result;
 use crate::gpu::engine::{Features, stages};
 use crate::gpu::{Gpu, GpuEngine};
 use crate::material::ElasticLaw;
-use crate::mesh::BlockMesh;
 use crate::mesh::tets::TetMesh;
+use crate::mesh::{BlockMesh, Tissue};
 use crate::model::Model;
+use crate::needle::{Motion, NeedleShape, Phase, Tool};
 use crate::process;
-use crate::scene::{
-    FaceCondition, Motion, NeedleShape, Outputs, Phase, Scene, SolverSettings, Tissue, TissueMaterial, Tool,
-};
-use crate::solver::cpu::CpuEngine;
-use crate::solver::engine::{Engine, FramePlan, StepInput};
-use crate::solver::simulation::{EngineChoice, Simulation};
-use crate::solver::stable_dt::wave_speed_bound;
+use crate::scene::{FaceCondition, Outputs, Scene, SolverSettings};
+use crate::simulation::{EngineChoice, Simulation};
 
 /// What the command line chooses.
 #[derive(Debug, Clone)]

@@ -19,8 +19,9 @@ use crate::gpu::Gpu;
 use crate::gpu::compose::{compose, compose_without_effects};
 use crate::gpu::engine::{Features, defines, stages};
 use crate::model::Model;
-use crate::scene::{Motion, Phase, Scene, Tool};
-use crate::solver::simulation::EngineChoice;
+use crate::needle::{Motion, Phase, Tool};
+use crate::scene::Scene;
+use crate::simulation::EngineChoice;
 
 /// Cells per axis of the block: 20 k.
 const CELLS: [usize; 3] = [28, 28, 26];

@@ -19,7 +19,7 @@ use crate::gpu::Gpu;
 use crate::gpu::device;
 use crate::observables::{EnergyAccount, FrameRecord};
 use crate::scene::Scene;
-use crate::solver::simulation::Simulation;
+use crate::simulation::Simulation;
 
 /// Most that a run on an adapter may differ from the CPU engine, in percent: what f32 costs in the main job (0.02 % of the force)
 /// five times over. A wrong kernel is beyond it by orders of magnitude.

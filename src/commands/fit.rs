@@ -17,9 +17,9 @@ use crate::material::fit::{Fit, LAWS, LawFit, Point, best_stable, fit_all, nomin
 use crate::material::{ElasticLaw, Isochoric, Verdict, describe_verdict};
 use crate::output::fit_chart::fit_chart;
 use crate::output::folder::probe;
-use crate::output::whole_file;
 use crate::reading;
 use crate::scene::presets::bulk_modulus_from_poisson;
+use crate::whole_file;
 
 /// Names of the files in the folder `--out`.
 pub const CHART: &str = "fit.svg";

@@ -10,16 +10,16 @@ use serde::Serialize;
 use crate::effects::viscoelastic::{LARGEST_TERM_COUNT, Term};
 use crate::effects::{damage, fibres, plasticity, viscoelastic};
 use crate::error::{Error, Result};
-use crate::material::Mode;
 use crate::material::{
-    Continuation, Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict,
-    four_digits,
+    Continuation, Demiray, ElasticLaw, Isochoric, Mode, MooneyRivlin, NeoHookean, Ogden, Verdict, Yeoh,
+    describe_verdict, four_digits,
 };
 use crate::material_point::Material;
 use crate::material_test::{self, Leg, Protocol, Row};
-use crate::output::{material_chart::material_chart, whole_file};
+use crate::output::material_chart::material_chart;
 use crate::scene::document::closest;
 use crate::scene::{Scene, presets};
+use crate::whole_file;
 
 const KPA: f64 = 1e3;
 const MM: f64 = 1e-3;

@@ -13,8 +13,8 @@ use crate::effects::{exactly, one_switch_away};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::scene::Scene;
-use crate::solver::change::Reach;
-use crate::solver::simulation::{Purpose, Simulation};
+use crate::simulation::change::Reach;
+use crate::simulation::{Purpose, Simulation};
 
 /// What the command line says.
 #[derive(Debug, Clone, Default)]

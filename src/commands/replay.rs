@@ -9,7 +9,7 @@ use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
 use crate::output::{DrivenFace, OutputFolder, Tables};
 use crate::session::{SESSION, Session};
-use crate::solver::simulation::{EngineChoice, Purpose, Simulation};
+use crate::simulation::{EngineChoice, Purpose, Simulation};
 use crate::training::kinematic::Sample;
 use crate::training::score::Score;
 

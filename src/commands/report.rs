@@ -9,12 +9,13 @@ use serde::{Deserialize, Serialize};
 
 use super::run::{self, RunOptions};
 use crate::error::{Error, Result};
+use crate::output::Status;
 use crate::output::report::CaseResults;
 use crate::output::report::lv2022::{CASES, Case, Report, SCENES};
-use crate::output::{Status, whole_file};
 use crate::reading;
 use crate::scene::Scene;
-use crate::solver::simulation::EngineChoice;
+use crate::simulation::EngineChoice;
+use crate::whole_file;
 
 /// Names of the reports.
 pub const NAMES: [&str; 1] = ["lv2022"];

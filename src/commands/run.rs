@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::ending;
+use crate::engine::EngineInfo;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::observables::FrameRecord;
@@ -19,10 +20,9 @@ use crate::process;
 use crate::reading;
 use crate::render;
 use crate::scene::{OnTrouble, Scene};
-use crate::solver::checkpoint::Checkpoint;
-use crate::solver::engine::EngineInfo;
-use crate::solver::simulation::{EngineChoice, Simulation};
-use crate::solver::trial::Trial;
+use crate::simulation::checkpoint::Checkpoint;
+use crate::simulation::trial::Trial;
+use crate::simulation::{EngineChoice, Simulation};
 
 /// What the command line adds to the scene.
 #[derive(Debug, Clone, Default)]

@@ -9,10 +9,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::run::EXIT_DIVERGED;
 use crate::error::{Error, Result};
-use crate::output::whole_file;
-use crate::solver::simulation::EngineChoice;
+use crate::simulation::EngineChoice;
 use crate::stability::random::{self, RandomOptions, SceneReport};
 use crate::stability::{self, Options, Suite};
+use crate::whole_file;
 
 /// Table and JSON in the folder of `--out`.
 const TABLE: &str = "stability.txt";

@@ -10,13 +10,13 @@ use super::report::moment;
 use crate::error::{Error, Result};
 use crate::output::folder::safe_name;
 use crate::output::progress::time_left;
-use crate::output::whole_file;
-use crate::solver::simulation::EngineChoice;
+use crate::simulation::EngineChoice;
 use crate::study::analysis::Analysis;
 use crate::study::plan::{Costs, LeftOut, Plan, PlannedRun, Role, shard};
 use crate::study::store::{FIGURES, PAGE, RunRecord, Store, TABLE};
 use crate::study::subject::Subject;
 use crate::study::{Axis, Engine, page, runner, tables};
+use crate::whole_file;
 
 /// Part of the budget that may be used before another spare run is begun and predicted to end.
 const SPARE_SHARE: f64 = 0.95;

@@ -89,6 +89,9 @@ const PARAMETERS: [Parameter; 7] = [
     .logarithmic(),
 ];
 
+/// Overlap and slip of torn faces, in cells, beyond which they do not touch any more.
+pub const TORN_REACH: f64 = 0.3;
+
 /// Parameters in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Params {

@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use super::Effect;
 use super::parameter::Parameter;
-use crate::scene::Tool;
+use crate::needle::Tool;
 
 pub const EFFECT: Effect = Effect {
     key: "indentation",

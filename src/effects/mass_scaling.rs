@@ -8,11 +8,8 @@
 //! wave speed; kinetic over internal energy is reported and should stay below 5 %.
 //! Source: Olovsson, Simonsson & Unosson 2005 (selective mass scaling); Joldes et al. 2008 (tissue).
 
-use glam::DVec3;
-
 use super::Effect;
 use super::parameter::Parameter;
-use crate::scene::{Face, FaceCondition, Motion};
 
 pub const EFFECT: Effect = Effect {
     key: "mass_scaling",
@@ -63,21 +60,6 @@ pub struct Loading {
 }
 
 impl Loading {
-    /// Of a tool with this motion (`None` without a tool) and of the faces of a tissue of this size [m]. Loads that come at once are left
-    /// out: their waves are wanted.
-    pub fn of(motion: Option<&Motion>, faces: &[FaceCondition; 6], size: DVec3) -> Self {
-        let slowness = |face: Face| {
-            let FaceCondition { drive, traction, traction_ramp, .. } = &faces[face as usize];
-            let ramp = traction.map(|_| *traction_ramp).filter(|ramp| *ramp > 0.0);
-            let times = drive.map(|drive| drive.duration).into_iter().chain(ramp);
-            times.map(move |time| time / size[face.axis()]).reduce(f64::min)
-        };
-        Loading {
-            tool_speed: motion.map_or(0.0, Motion::largest_speed),
-            slowness: Face::ALL.into_iter().filter_map(slowness).reduce(f64::min),
-        }
-    }
-
     /// Tool speed over the wave speed `wave` [m/s].
     pub fn mach(&self, wave: f64) -> f64 {
         self.tool_speed / wave

@@ -14,6 +14,8 @@ pub mod plasticity;
 pub mod puncture;
 pub mod viscoelastic;
 
+use crate::material::ElasticLaw;
+
 /// The effects of one scene, one field per effect, in the order of [`EFFECTS`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EffectSet {
@@ -30,6 +32,53 @@ pub struct EffectSet {
     pub indentation: Option<indentation::Params>,
     pub friction: Option<friction::Params>,
     pub flexible_needle: Option<flexible_needle::Params>,
+}
+
+/// Material of the tissue with its origin.
+#[derive(Debug, Clone)]
+pub struct TissueMaterial {
+    /// Preset name, or `constants`.
+    pub name: String,
+    /// Where the constants come from, one line.
+    pub source: String,
+    pub law: ElasticLaw,
+    /// Density [kg/m^3].
+    pub density: f64,
+    /// Parameters of this material's own; `None`: those of the scene's table, if the effect is on.
+    pub plasticity: Option<plasticity::Params>,
+    pub fibres: Option<fibres::Params>,
+    pub viscoelastic: Option<viscoelastic::Params>,
+    pub damage: Option<damage::Params>,
+    /// Tip forces in this material; `None`: those of the scene's puncture table.
+    pub cutting: Option<puncture::Cutting>,
+    /// A membrane: energy that puncturing this layer takes beyond cutting through it [J].
+    pub membrane_energy: Option<f64>,
+}
+
+impl TissueMaterial {
+    /// A material without parameters of its own for the effects. `density` [kg/m^3].
+    pub fn new(name: impl Into<String>, source: impl Into<String>, law: ElasticLaw, density: f64) -> Self {
+        TissueMaterial {
+            name: name.into(),
+            source: source.into(),
+            law,
+            density,
+            plasticity: None,
+            fibres: None,
+            viscoelastic: None,
+            damage: None,
+            cutting: None,
+            membrane_energy: None,
+        }
+    }
+}
+
+/// Where [`parameter::Parameter`] finds its present value.
+#[derive(Debug, Clone, Copy)]
+pub struct Numbers<'a> {
+    pub effects: &'a EffectSet,
+    /// Of the tissue outside all regions.
+    pub material: &'a TissueMaterial,
 }
 
 /// What the program knows about an effect without running it.

@@ -3,7 +3,7 @@
 //! A change goes the way of every scene: it becomes an override (`friction.coefficient=0.4`) and the scene is read anew, so that ranges,
 //! messages and conversions exist once.
 
-use crate::scene::Scene;
+use super::Numbers;
 
 /// One number, or the components of one list, of a scene file.
 #[derive(Debug, Clone, Copy)]
@@ -27,12 +27,12 @@ pub struct Parameter {
 pub const COUNT: &str = "count";
 
 /// Components of a list in the unit of its key.
-pub type Components = fn(&Scene) -> Option<Vec<f64>>;
+pub type Components = fn(&Numbers) -> Option<Vec<f64>>;
 
 /// The present value in the unit of the key; `None` where the scene has no such number.
 #[derive(Debug, Clone, Copy)]
 pub enum Value {
-    Number(fn(&Scene) -> Option<f64>),
+    Number(fn(&Numbers) -> Option<f64>),
     /// A list, which is always written whole, with the lists that are refused without it: key and values.
     List(Components, Option<(&'static str, Components)>),
 }
@@ -44,7 +44,7 @@ impl Parameter {
         unit: &'static str,
         range: [f64; 2],
         source: &'static str,
-        value: fn(&Scene) -> Option<f64>,
+        value: fn(&Numbers) -> Option<f64>,
     ) -> Self {
         Parameter { key, name, unit, range, logarithmic: false, source, value: Value::Number(value) }
     }
@@ -60,26 +60,26 @@ impl Parameter {
     }
 
     /// Present values: one, or the components of the list; empty where the scene has no such number.
-    pub fn values(&self, scene: &Scene) -> Vec<f64> {
+    pub fn values(&self, numbers: &Numbers) -> Vec<f64> {
         match self.value {
-            Value::Number(value) => value(scene).into_iter().collect(),
-            Value::List(values, _) => values(scene).unwrap_or_default(),
+            Value::Number(value) => value(numbers).into_iter().collect(),
+            Value::List(values, _) => values(numbers).unwrap_or_default(),
         }
     }
 
     /// Overrides that set component `index` to `value`.
-    pub fn overrides(&self, scene: &Scene, index: usize, value: f64) -> Vec<String> {
+    pub fn overrides(&self, numbers: &Numbers, index: usize, value: f64) -> Vec<String> {
         match self.value {
             Value::Number(_) if self.unit == COUNT => vec![format!("{}={}", self.key, value.round())],
             Value::Number(_) => vec![format!("{}={value}", self.key)],
             Value::List(values, beside) => {
-                let mut list = values(scene).unwrap_or_default();
+                let mut list = values(numbers).unwrap_or_default();
                 if let Some(place) = list.get_mut(index) {
                     *place = value;
                 }
                 let mut texts = vec![format!("{}={list:?}", self.key)];
                 if let Some((key, others)) = beside {
-                    texts.push(format!("{key}={:?}", others(scene).unwrap_or_default()));
+                    texts.push(format!("{key}={:?}", others(numbers).unwrap_or_default()));
                 }
                 texts
             }
@@ -100,6 +100,7 @@ pub fn with_overrides(overrides: &[String], more: &[String]) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::effects::EFFECTS;
+    use crate::scene::Scene;
     use std::path::Path;
 
     fn scene(overrides: &[String]) -> Scene {
@@ -118,14 +119,14 @@ mod tests {
         let before = scene(&base);
         let mut seen = 0;
         for parameter in EFFECTS.iter().flat_map(|effect| effect.parameters) {
-            for (index, value) in parameter.values(&before).into_iter().enumerate() {
+            for (index, value) in parameter.values(&before.numbers()).into_iter().enumerate() {
                 let wanted = if value == 0.0 { 0.01 } else { 0.97 * value };
-                let more = parameter.overrides(&before, index, wanted);
+                let more = parameter.overrides(&before.numbers(), index, wanted);
                 let after = scene(&with_overrides(&base, &more));
-                let found = parameter.values(&after);
+                let found = parameter.values(&after.numbers());
                 if parameter.key == "fibres.direction" {
                     // A vector of any length means its direction.
-                    let mut list = parameter.values(&before);
+                    let mut list = parameter.values(&before.numbers());
                     list[index] = wanted;
                     let length = list.iter().map(|x| x * x).sum::<f64>().sqrt();
                     assert!(found.iter().zip(&list).all(|(x, y)| (x - y / length).abs() < 1e-12), "{found:?}");
@@ -135,7 +136,9 @@ mod tests {
                 // A whole number stays one.
                 let wanted = if parameter.unit == COUNT { wanted.round() } else { wanted };
                 assert!((found[index] / wanted - 1.0).abs() < 1e-9, "{}: {found:?} instead of {wanted}", parameter.key);
-                for (other, old) in parameter.values(&before).into_iter().enumerate().filter(|(n, _)| *n != index) {
+                for (other, old) in
+                    parameter.values(&before.numbers()).into_iter().enumerate().filter(|(n, _)| *n != index)
+                {
                     assert!((found[other] - old).abs() <= 1e-9 * old.abs(), "{}: {other} moved", parameter.key);
                 }
                 seen += 1;

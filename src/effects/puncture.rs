@@ -191,6 +191,15 @@ const PARAMETERS: [Parameter; 14] = [
     .logarithmic(),
 ];
 
+/// Tip forces of one material [N].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cutting {
+    /// Force at which the tip enters the material, F_pun.
+    pub puncture_force: f64,
+    /// Force of steady cutting, F_cut = G_c w.
+    pub cutting_force: f64,
+}
+
 /// Parameters in SI units. Those marked [calibration] set the force as much as the tissue does; they are the
 /// same in every scene that compares materials.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,9 +14,8 @@
 //! Energy. With `E` the Green-Lagrange strain the viscous part of the work is `-q:E + sum E:dq` per volume; of this
 //! `Xi = sum q_i:q_i/(4 mu0 g_i)` is stored and the rest, `sum E:dq - Xi`, dissipated.
 
-use super::Effect;
 use super::parameter::{Parameter, Value};
-use crate::scene::Scene;
+use super::{Effect, Numbers};
 
 pub const EFFECT: Effect = Effect {
     key: "viscoelastic",
@@ -51,17 +50,17 @@ const PARAMETERS: [Parameter; 2] = [
 ];
 
 /// The series of the tissue's own material.
-fn series(scene: &Scene) -> Option<&Params> {
-    let common = scene.effects.viscoelastic.as_ref()?;
-    Some(scene.material.viscoelastic.as_ref().unwrap_or(common))
+fn series<'a>(numbers: &Numbers<'a>) -> Option<&'a Params> {
+    let common = numbers.effects.viscoelastic.as_ref()?;
+    Some(numbers.material.viscoelastic.as_ref().unwrap_or(common))
 }
 
-fn shares(scene: &Scene) -> Option<Vec<f64>> {
-    Some(series(scene)?.terms.iter().map(|term| term.ratio).collect())
+fn shares(numbers: &Numbers) -> Option<Vec<f64>> {
+    Some(series(numbers)?.terms.iter().map(|term| term.ratio).collect())
 }
 
-fn times(scene: &Scene) -> Option<Vec<f64>> {
-    Some(series(scene)?.terms.iter().map(|term| term.time).collect())
+fn times(numbers: &Numbers) -> Option<Vec<f64>> {
+    Some(series(numbers)?.terms.iter().map(|term| term.time).collect())
 }
 
 /// Most terms of a series.

@@ -17,6 +17,9 @@ use super::structs::*;
 use super::texels::{Texels, texel_numbers};
 use crate::effects::EffectSet;
 use crate::effects::adhesion::Bond;
+use crate::effects::cohesive::TORN_REACH;
+use crate::engine::elements::{HOURGLASS_MODULUS, PrismBase};
+use crate::engine::{ContactState, Engine, EngineImage, EngineInfo, FramePlan, FrameSums, Stage, State, foreign_image};
 use crate::error::{Error, Result};
 use crate::material::Isochoric;
 use crate::material_point::{Material as Constants, PointState};
@@ -24,13 +27,7 @@ use crate::mesh::BlockMesh;
 use crate::model::{
     ContactSurface, FreePlan, LARGEST_ANCHOR_COUNT, LARGEST_MATERIAL_COUNT, LARGEST_SEGMENT_COUNT, Model,
 };
-use crate::needle::free_path as needle;
-use crate::scene::Tool;
-use crate::solver::checkpoint::{EngineImage, foreign_image};
-use crate::solver::cpu::TORN_REACH;
-use crate::solver::elements::{HOURGLASS_MODULUS, PrismBase};
-use crate::solver::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State};
-use crate::solver::step::Stage;
+use crate::needle::{Tool, free_path as needle};
 
 /// One fixed-point unit of displacement, 2^-36 m.
 pub const DISPLACEMENT_UNIT: f64 = 1.0 / (1u64 << 36) as f64;
@@ -1363,7 +1360,7 @@ fn centre_line(line: &crate::needle::centre_line::CentreLine) -> CentreLine {
 }
 
 /// The input of step `number` in the layout of the shader.
-fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) -> StepInput {
+fn step_input(input: &crate::engine::StepInput, number: u64, dt: f64) -> StepInput {
     // Multiples of the golden ratio: any run of steps sees all offsets alike, so rounding errors cancel.
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let mut out = StepInput {
@@ -1398,10 +1395,6 @@ fn step_input(input: &crate::solver::engine::StepInput, number: u64, dt: f64) ->
 impl Engine for GpuEngine {
     fn info(&self) -> &EngineInfo {
         &self.info
-    }
-
-    fn on_device(&self) -> Option<&GpuEngine> {
-        Some(self)
     }
 
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {

@@ -8,8 +8,8 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use super::compose::{Composed, compose};
 use super::memory::Memory;
 use super::texels::{Access, format_of, rewritten};
+use crate::engine::Stage;
 use crate::error::{Error, Result};
-use crate::solver::step::Stage;
 
 /// One resource of an entry point.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
+use crate::engine::elements::cells_of_nodes;
 use crate::mesh::tets::TetMesh;
 use crate::mesh::{BlockMesh, Mesh};
-use crate::solver::elements::cells_of_nodes;
 
 /// Layout of the mesh at hand.
 #[derive(Debug, Clone)]

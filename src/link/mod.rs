@@ -1,7 +1,8 @@
 //! Needle and forces for other programs, over OpenIGTLink: 3D Slicer, Perk Tutor, PLUS, pyigtl.
 //!
 //! Reading order: [`message`] (bytes, with their checksum in [`crc`]) -> [`read`] (bytes that anybody may have sent) -> [`state`]
-//! (what is sent and what is asked for) -> [`server`] (clients come and go) and its `client` (one of them).
+//! (what is sent and what is asked for) -> [`server`] (clients come and go), its `client` (what waits for one of them) and
+//! the `conversation` with it.
 //!
 //! # What is sent
 //! Devices, for every published state unless another time is given:
@@ -41,14 +42,17 @@
 //! header.md, transform.md, position.md, status.md, sensordata.md, unit.md, string.md, timestamp.md), cited as [OpenIGTLink].
 
 mod client;
+mod conversation;
 pub mod crc;
 pub mod message;
 pub mod read;
 pub mod server;
+mod shared;
 pub mod state;
 
 pub use client::{ANSWERS, STATES};
-pub use server::{CLIENTS, LinkCounters, LinkOptions, LinkServer, STACK};
+pub use server::{CLIENTS, LinkCounters, LinkServer};
+pub use shared::{LinkOptions, STACK};
 pub use state::{LinkState, Pose, RunState, WantedPose, basis_along};
 
 /// Port that OpenIGTLink is registered for.

@@ -4,22 +4,21 @@
 //! [`LinkServer::publish`] waits for nobody.
 
 use std::io::{ErrorKind, Write};
-use std::net::{IpAddr, Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
 
-use super::client::{Client, Frame, serve};
+use super::client::{Client, Frame};
+use super::conversation::serve;
 use super::message::{Content, Status, timestamp};
-use super::state::{LinkState, Pose, RunState, STYLET, WantedPose};
+use super::shared::{Counters, LinkOptions, Shared, worker};
+use super::state::{LinkState, STYLET, WantedPose};
 use crate::error::{Error, Result};
 
 /// Most clients at once.
 pub const CLIENTS: usize = 8;
-
-/// Stack of a thread that serves a client [byte].
-pub const STACK: usize = 256 << 10;
 
 /// Longest time until a new client is noticed.
 const LOOK: Duration = Duration::from_millis(20);
@@ -29,38 +28,6 @@ const BETWEEN: Duration = Duration::from_millis(2);
 
 /// Pause after a failure to take a client, such as too many open files.
 const PAUSE: Duration = Duration::from_secs(1);
-
-/// How to serve.
-#[derive(Debug, Clone)]
-pub struct LinkOptions {
-    /// Address to listen at. Every other than the default opens the simulation to the network.
-    pub address: IpAddr,
-    /// 0 takes a free one, see [`LinkServer::address`].
-    pub port: u16,
-    /// Whether clients may say where the needle shall be.
-    pub allow_control: bool,
-    /// SENSOR and POSITION to every client from the beginning, not only to those who ask.
-    pub sensors: bool,
-    /// Longest time from the first to the last byte of a message.
-    pub message_timeout: Duration,
-    /// A client that takes nothing for this long while something waits for it is given up.
-    pub stall_timeout: Duration,
-}
-
-impl Default for LinkOptions {
-    /// This machine only, the usual port, no control.
-    fn default() -> Self {
-        LinkOptions {
-            address: IpAddr::V4(Ipv4Addr::LOCALHOST),
-            port: super::PORT,
-            allow_control: false,
-            sensors: false,
-            message_timeout: Duration::from_secs(10),
-            // 3D Slicer takes nothing while it loads a large scene.
-            stall_timeout: Duration::from_secs(60),
-        }
-    }
-}
 
 /// What happened since the server was started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -81,64 +48,6 @@ pub struct LinkCounters {
     pub wrong_poses: u64,
     /// Messages without meaning here.
     pub skipped: u64,
-}
-
-#[derive(Default)]
-pub(super) struct Counters {
-    refused_clients: AtomicU64,
-    pub(super) closed: AtomicU64,
-    lost_states: AtomicU64,
-    unsent_states: AtomicU64,
-    pub(super) denied: AtomicU64,
-    pub(super) wrong_poses: AtomicU64,
-    pub(super) skipped: AtomicU64,
-}
-
-/// Who listens, and what they hear first.
-#[derive(Default)]
-struct Audience {
-    clients: Vec<Arc<Client>>,
-    newest: Option<Arc<Frame>>,
-    /// The last state of the run and its text, and how often they changed.
-    status: Option<(RunState, String)>,
-    changes: u64,
-}
-
-/// The newest pose and who asked for it.
-struct Wanted {
-    pose: Pose,
-    number: u64,
-    received: Instant,
-    client: Weak<Client>,
-}
-
-/// What all threads know.
-pub(super) struct Shared {
-    pub(super) options: LinkOptions,
-    pub(super) counters: Counters,
-    audience: Mutex<Audience>,
-    wanted: Mutex<Option<Wanted>>,
-    stop: AtomicBool,
-}
-
-impl Shared {
-    fn audience(&self) -> MutexGuard<'_, Audience> {
-        self.audience.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn wanted(&self) -> MutexGuard<'_, Option<Wanted>> {
-        self.wanted.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(super) fn newest(&self) -> Option<Arc<Frame>> {
-        self.audience().newest.clone()
-    }
-
-    pub(super) fn want(&self, pose: Pose, client: &Arc<Client>) {
-        let mut wanted = self.wanted();
-        let number = wanted.as_ref().map_or(0, |w| w.number) + 1;
-        *wanted = Some(Wanted { pose, number, received: Instant::now(), client: Arc::downgrade(client) });
-    }
 }
 
 /// A running server. Dropping it closes every connection and the port, and waits for its threads.
@@ -240,11 +149,6 @@ impl Drop for LinkServer {
             let _ = taking.join();
         }
     }
-}
-
-/// A thread of this module before it starts.
-pub(super) fn worker(name: &str) -> thread::Builder {
-    thread::Builder::new().name(name.into()).stack_size(STACK)
 }
 
 /// Takes clients until the server stops; then ends all of them.

@@ -11,7 +11,23 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::scene::{Motion, Scene, Tissue};
+use crate::needle::Motion;
+
+/// The tissue block: `-size.x/2..size.x/2`, `-size.y/2..size.y/2`, `-size.z..0` [m]; the top face is z = 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tissue {
+    /// Edge lengths of the block [m].
+    pub size: DVec3,
+    /// Cell edge in the fine zone around the planned path [m].
+    pub cell_size: f64,
+    /// Half width of the fine zone around the path [m].
+    pub fine_radius: f64,
+    /// Ratio of neighbouring cell edges outside the fine zone, >= 1.
+    pub growth: f64,
+    /// Where the entry point lies between two grid lines, as a fraction of the cell (x, y); [0.0, 0.0] puts the axis
+    /// on grid lines, [0.5, 0.5] on cell centres.
+    pub axis_offset_cells: [f64; 2],
+}
 
 /// A rectilinear block of hexahedral cells: three lists of grid lines.
 ///
@@ -243,55 +259,10 @@ const FINE_BELOW_PATH: f64 = 4.0e-3;
 /// length to lie around it.
 pub const SLIT_HALF_WIDTH: f64 = 1.2;
 
-/// Fewest cells along half of the slit.
-const SLIT_HALF_CELLS: usize = 2;
-
 /// Fine lines that may be given up at one side to make room for a well-shaped series.
 const LINES_TO_GIVE_UP: usize = 3;
 
 impl BlockMesh {
-    /// The grid of a scene; fine around the path of its tool, uniform without a tool.
-    pub fn for_scene(scene: &Scene) -> BlockMesh {
-        let motion = scene.tool.as_ref().map(|_| &scene.motion);
-        let mut mesh = BlockMesh::for_tissue(&scene.tissue, motion);
-        let Some(cohesive) = &scene.effects.cohesive else { return mesh };
-        if let (true, Some(bore)) = (scene.has_bore(), scene.needle().and_then(|n| n.bore)) {
-            mesh.follow_bore(&scene.tissue, scene.motion.entry, bore.edge);
-        }
-        if let Some(slit) = scene.slit_axis() {
-            let mut tissue = scene.tissue.clone();
-            // The slit lies on a line. Where another line lies near the needle's side, the face there opens half, and the contact
-            // creates up to a tenth of the work (cells of 0.6 mm).
-            tissue.axis_offset_cells[slit] = 0.0;
-            tissue.axis_offset_cells[1 - slit] = 0.5;
-            mesh = BlockMesh::for_tissue(&tissue, motion);
-            let across = 1 - slit;
-            if let (true, Some(needle)) = (scene.motion.direction[across] == 0.0, scene.needle()) {
-                // Before an upright needle the slit ends on lines, at the same place in every mesh: with ends wherever the
-                // lines happen to be, the force at 12 mm is 0.94 N with cells of 0.8 mm and 1.49 N with 0.6 mm.
-                let end = SLIT_HALF_WIDTH * needle.radius;
-                mesh.lines[across] = lines_around(scene.motion.entry[across], end, &tissue, across, SLIT_HALF_CELLS);
-            }
-            mesh.split(slit, scene.motion.entry[slit]);
-        }
-        for plane in &cohesive.planes {
-            mesh.split(plane.axis, plane.at);
-        }
-        mesh
-    }
-
-    /// Lays lines on the square around a ring of the given radius, bends them to its circle and doubles them.
-    fn follow_bore(&mut self, tissue: &Tissue, entry: DVec3, radius: f64) {
-        let h = tissue.cell_size;
-        let centre = entry.truncate();
-        for axis in 0..2 {
-            self.lines[axis] = lines_around(centre[axis], radius, tissue, axis, 1);
-            self.split(axis, centre[axis] - radius);
-            self.split(axis, centre[axis] + radius);
-        }
-        self.bore = Some(Bore { centre, radius, outer: (3.0 * radius).max(radius + 2.0 * h) });
-    }
-
     /// Moves the nearest inner line of an axis to `at` [m] and doubles it.
     pub fn split(&mut self, axis: usize, at: f64) {
         let lines = &mut self.lines[axis];
@@ -326,7 +297,7 @@ impl BlockMesh {
 }
 
 /// Lines of a whole axis around `centre`, one of them there and two at the distance `radius` from it.
-fn lines_around(centre: f64, radius: f64, tissue: &Tissue, axis: usize, least: usize) -> Vec<f64> {
+pub fn lines_around(centre: f64, radius: f64, tissue: &Tissue, axis: usize, least: usize) -> Vec<f64> {
     let half = 0.5 * tissue.size[axis];
     let side = |face: f64| side_lines(face, radius, tissue, least);
     let mut lines: Vec<f64> = side(half + centre).iter().rev().map(|d| centre - d).collect();
@@ -463,7 +434,7 @@ fn series_edges(distance: f64, growth: f64) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Phase;
+    use crate::needle::Phase;
 
     fn tissue(size: [f64; 3], cell: f64, growth: f64) -> Tissue {
         Tissue {

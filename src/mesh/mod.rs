@@ -9,11 +9,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use block::{BlockMesh, Bore};
+pub use block::{BlockMesh, Bore, Tissue};
 pub use tets::TetMesh;
 pub use tissue_point::TissuePoint;
-
-use crate::scene::Scene;
 
 /// The mesh of a model.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,14 +48,6 @@ impl From<Arc<TetMesh>> for Mesh {
 }
 
 impl Mesh {
-    /// The mesh that a scene names, or its block.
-    pub fn of_scene(scene: &Scene) -> Self {
-        match &scene.mesh {
-            Some(tets) => Mesh::Tets(tets.clone()),
-            None => Mesh::Block(BlockMesh::for_scene(scene)),
-        }
-    }
-
     pub fn node_count(&self) -> usize {
         match self {
             Mesh::Block(mesh) => mesh.node_count(),

@@ -10,8 +10,7 @@
 
 use glam::DVec3;
 
-use super::lateral_axes;
-use crate::scene::{NeedleShape, TipShape};
+use super::{NeedleShape, TipShape, lateral_axes};
 
 /// Overlap phi [m] (positive inside the needle) and its gradient with respect to the position of the point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,6 +137,7 @@ impl Profile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::needle::BoreShape;
 
     /// The gradient is the derivative of the value, for cone and bevel, on tip and shaft.
     #[test]
@@ -169,7 +169,7 @@ mod tests {
         let (d, side) = (-direction, lateral_axes(direction).0);
         let other = d.cross(side);
         for tip in [TipShape::Cone, TipShape::Bevel { heading: 0.7 }] {
-            let bore = crate::scene::BoreShape { radius: 0.6e-3, edge: 0.65e-3, friction: 0.0 };
+            let bore = BoreShape { radius: 0.6e-3, edge: 0.65e-3, friction: 0.0 };
             let needle = NeedleShape { tip, bore: Some(bore), ..NeedleShape::cone("test", 0.8e-3, 2.5e-3) };
             let profile = Profile::new(&needle, direction);
             let less = |x: DVec3| (0.1e-3 - 0.02 * x.dot(d), -0.02);

@@ -1,17 +1,20 @@
-//! Motion of the tool on the CPU, the flexible needle ([`beam`]), and the geometry of a planned path.
+//! The tool: its shape and motion, where it is at a time, the beam of a flexible needle ([`beam`]), the geometry of paths and contact.
 
 pub mod banded;
 pub mod beam;
 pub mod centre_line;
-pub mod flexible;
 pub mod free_path;
 pub mod gap;
+pub mod motion;
+mod shape;
 pub mod slit;
 
 use glam::DVec3;
 
-use crate::scene::motion::{HandPose, Leg, Placement};
-use crate::scene::{Motion, Vibration};
+pub use motion::{Motion, Phase, Vibration};
+pub use shape::{BoreShape, NeedleShape, TipShape, Tool};
+
+use motion::{HandPose, Leg, Placement};
 
 /// Position and velocity of the tool tip at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::engine::State;
 use crate::model::Model;
 use crate::needle::ToolPose;
-use crate::solver::engine::State;
 
 /// Core in the bore at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

@@ -282,11 +282,13 @@ pub struct FieldSnapshot {
 }
 
 mod core_sample;
+mod judge;
 mod needle_volume;
 mod recorder;
 mod target;
 
 pub use core_sample::CoreSample;
+pub use judge::{Judge, Sizes, Trouble};
 pub use needle_volume::cells_in_needle;
 pub use recorder::Recorder;
 pub use target::TargetRecord;

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
+use crate::engine::State;
 use crate::model::Model;
 use crate::needle::ToolPose;
 use crate::needle::centre_line::CentreLine;
 use crate::needle::gap::Profile;
-use crate::solver::engine::State;
 
 /// Cells whose centre lies within the wall of the needle: inside its outer surface and, of a hollow one, outside its bore.
 /// Cells that the path has softened by more than half are the opened path itself and do not count. `line`: the centre-line of a

@@ -4,11 +4,10 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{EnergyAccount, ForceParts, FrameRecord, Health};
+use crate::engine::FrameSums;
+use crate::engine::clock::Clock;
 use crate::model::Model;
-use crate::needle::Kinematics;
-use crate::scene::Tool;
-use crate::solver::clock::Clock;
-use crate::solver::engine::FrameSums;
+use crate::needle::{Kinematics, Tool};
 
 /// Adds up what the frames deliver, in f64.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]

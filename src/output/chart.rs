@@ -8,8 +8,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::curve::CurveFigures;
-use super::whole_file;
 use crate::observables::{ForceParts, FrameRecord};
+use crate::whole_file;
 use crate::{Error, Result};
 
 /// Size of the chart [px].

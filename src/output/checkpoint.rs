@@ -12,11 +12,11 @@ use serde::{Deserialize, Serialize};
 
 use super::folder::{CHECKPOINT, SUMMARY};
 use super::summary::{Status, Summary};
-use super::whole_file;
 use crate::observables::FrameRecord;
 use crate::reading::{self, Unread};
 use crate::scene::Scene;
-use crate::solver::checkpoint::Checkpoint;
+use crate::simulation::checkpoint::Checkpoint;
+use crate::whole_file;
 use crate::{Error, Result};
 
 const MAGIC: &[u8] = b"stylet checkpoint 1\n";

@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::whole_file::UNFINISHED;
+use crate::whole_file::UNFINISHED;
 use crate::{Error, Result};
 
 /// Names of the single files of a run.

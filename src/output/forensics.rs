@@ -18,13 +18,13 @@ use serde::Serialize;
 use super::checkpoint::RunCheckpoint;
 use super::folder::{CHECKPOINT, OutputFolder};
 use super::tables::write_energy_table;
-use super::whole_file;
 use crate::gpu::Gpu;
 use crate::model::Model;
 use crate::render;
 use crate::render::slice::Plane;
 use crate::scene::{Scene, Target};
-use crate::solver::investigation::{Finding, Sign, StepRecord};
+use crate::simulation::investigation::{Finding, Sign, StepRecord};
+use crate::whole_file;
 use crate::{Error, Result};
 
 /// Name of the folder.

@@ -2,7 +2,7 @@
 //!
 //! [`folder`] decides where, before anything is simulated. [`tables`] are appended and flushed frame by frame under
 //! their final names, so an interrupted run keeps every row; all other files appear whole or not at all
-//! ([`whole_file`]). [`curve`] reads figures off the force curve, [`summary`] writes them down.
+//! ([`crate::whole_file`]). [`curve`] reads figures off the force curve, [`summary`] writes them down.
 
 pub mod chart;
 pub mod checkpoint;
@@ -12,6 +12,7 @@ pub mod folder;
 pub mod forensics;
 pub(crate) mod log_plot;
 pub mod material_chart;
+pub mod number;
 pub mod page;
 pub mod parts_chart;
 pub(crate) mod plot;
@@ -23,7 +24,6 @@ pub mod summary;
 pub mod tables;
 pub mod target;
 pub mod vtu;
-pub mod whole_file;
 
 pub use chart::write_force_chart;
 pub use curve::{CurveFigures, MajorDrop, major_drops};

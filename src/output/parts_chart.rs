@@ -6,8 +6,8 @@ use plotters::prelude::*;
 
 use super::chart::{Curve, FINER, rgb};
 use super::plot::{Area, Plot};
-use super::whole_file;
 use crate::observables::{ForceParts, FrameRecord};
+use crate::whole_file;
 use crate::{Error, Result};
 
 /// Of the areas, so that the grid shines through.

@@ -8,8 +8,8 @@ use plotters::prelude::*;
 use super::chart::{Curve, FINER, GREEN, HEAD, INWARD, ORANGE, OUTWARD, PINK, SIZE, draw_head, fine};
 use super::material_chart::{Mark, Panel};
 use super::sample::{DrivenFace, Motion, SamplePoint};
-use super::whole_file;
 use crate::observables::FrameRecord;
+use crate::whole_file;
 use crate::{Error, Result};
 
 const COLOURS: [RGBColor; 6] = [INWARD, OUTWARD, GREEN, PINK, ORANGE, RGBColor(86, 180, 233)];

@@ -8,10 +8,10 @@ use super::curve::{CurveFigures, MajorDrop, frames_on_the_way_in, major_drops};
 use super::sample::{DrivenFace, SamplePoint};
 use super::tables::{hourglass_to_internal, kinetic_to_internal};
 use super::target::TargetFigures;
-use super::whole_file;
 use crate::observables::FrameRecord;
 use crate::reading;
 use crate::verdict::Doubt;
+use crate::whole_file;
 use crate::{Error, Result};
 
 /// Internal energy below this fraction of its largest value says nothing about hourglassing: the ratio of two numbers

@@ -9,11 +9,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE, TARGET_TABLE};
+use super::number::number;
 use super::sample::{DrivenFace, SAMPLE_COLUMNS, SamplePoint};
 use super::target::{TARGET_COLUMNS, target_row};
-use super::whole_file;
 use crate::observables::{EnergyAccount, ForceParts, FrameRecord};
 use crate::scene::Target;
+use crate::whole_file;
 use crate::{Error, Result};
 
 /// Columns of `force.csv`; the meaning is that of the fields of [`FrameRecord`].
@@ -288,15 +289,6 @@ fn sample_row(face: &DrivenFace, p: &SamplePoint) -> [String; SAMPLE_COLUMNS.len
         known(p.shear_stress),
         number(p.moment),
     ]
-}
-
-/// Nine significant digits, trailing zeros left away; an exponent where the plain form would be long.
-pub fn number(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return if value == 0.0 { "0".into() } else { value.to_string() };
-    }
-    let rounded: f64 = format!("{value:.8e}").parse().expect("a number that was just formatted can be parsed");
-    if (1e-4..1e9).contains(&rounded.abs()) { format!("{rounded}") } else { format!("{rounded:e}") }
 }
 
 #[cfg(test)]

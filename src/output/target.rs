@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::curve::frames_on_the_way_in;
-use super::tables::number;
+use super::number::number;
 use crate::observables::{FrameRecord, TargetRecord};
 use crate::scene::Target;
 

@@ -7,9 +7,9 @@
 use std::path::PathBuf;
 
 use super::folder::{FIELD_COLLECTION, FIELD_FOLDER, OutputFolder};
-use super::whole_file;
 use crate::mesh::Mesh;
 use crate::observables::FieldSnapshot;
+use crate::whole_file;
 use crate::{Error, Result};
 
 /// VTK cell types of a tetrahedron with four and a hexahedron with eight nodes.

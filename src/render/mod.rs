@@ -7,8 +7,8 @@ use std::path::Path;
 
 use crate::mesh::Mesh;
 use crate::observables::FieldSnapshot;
-use crate::output::whole_file;
 use crate::scene::Scene;
+use crate::whole_file;
 use crate::{Error, Result};
 
 pub mod offscreen;

@@ -19,8 +19,9 @@ use super::stroke_font;
 use crate::mesh::Mesh;
 use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
 use crate::needle::gap::Profile;
+use crate::needle::{NeedleShape, Tool};
 use crate::observables::FieldSnapshot;
-use crate::scene::{NeedleShape, Scene, Tool};
+use crate::scene::Scene;
 
 /// Width where the scene names none, and bounds of what it may name [px].
 const DEFAULT_WIDTH: u32 = 900;

@@ -8,8 +8,9 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3};
 
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
+use crate::needle::Tool;
 use crate::observables::FieldSnapshot;
-use crate::scene::{Scene, Tool};
+use crate::scene::Scene;
 
 /// Remaining stiffness below which a cell counts as opened by the tip.
 pub const OPENED_BELOW: f64 = 0.5;

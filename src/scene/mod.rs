@@ -1,15 +1,18 @@
 //! A scene in SI units, as every later step of the program sees it.
 //!
-//! `file` holds the TOML form (units in the key names), `presets` the material and needle library;
+//! `file` holds the TOML form (units in the key names), `presets` and `needles` the library of materials and needles;
 //! [`Scene::load`] reads, checks and converts. Nothing after this module knows about millimetres.
 
+mod block;
 mod convert;
 pub(crate) mod document;
 pub mod edit;
 pub mod file;
-pub mod motion;
+mod loading;
+pub mod needles;
 pub mod presets;
 pub mod task;
+pub mod tissue_preset;
 mod words;
 
 use std::path::{Path, PathBuf};
@@ -19,12 +22,11 @@ use glam::DVec3;
 
 pub use document::closest;
 pub use file::OnTrouble;
-pub use motion::{Motion, Phase, Vibration};
 pub use task::{Goal, Obstacle, Task};
 
-use crate::effects::{self, EffectSet};
-use crate::material::ElasticLaw;
-use crate::mesh::tets::TetMesh;
+use crate::effects::{EffectSet, Numbers, TissueMaterial};
+use crate::mesh::{TetMesh, Tissue};
+use crate::needle::{Motion, NeedleShape, Tool};
 use crate::{Error, Result};
 
 /// Most steps of a frame: input and commands of a step take about 3 kB, and three frames may be under way.
@@ -88,6 +90,11 @@ impl Scene {
         }
     }
 
+    /// True where the path of the needle is found while the tip moves, false where it is planned: the one place that decides.
+    pub fn has_free_path(&self) -> bool {
+        self.effects.puncture.is_some_and(|p| p.always_free) || self.motion.is_free()
+    }
+
     /// True where the tissue separates around a hollow needle.
     pub fn has_bore(&self) -> bool {
         self.effects.cohesive.is_some() && self.needle().is_some_and(|n| n.bore.is_some())
@@ -96,7 +103,7 @@ impl Scene {
     /// Axis of the normal of the plane that a solid needle slits: 0 where the direction has no x, 1 where it has no y.
     pub fn slit_axis(&self) -> Option<usize> {
         let solid = self.needle().is_some_and(|n| n.bore.is_none());
-        if self.effects.cohesive.is_none() || !solid || crate::model::has_free_path(self) {
+        if self.effects.cohesive.is_none() || !solid || self.has_free_path() {
             return None;
         }
         (0..2).find(|a| self.motion.direction[*a].abs() < 1e-9)
@@ -105,81 +112,22 @@ impl Scene {
     /// The same for a hand: with room beyond the phases, and everywhere where the path is free.
     pub fn for_hand(mut self) -> Scene {
         self.motion = self.motion.with_room(self.tissue.size.z);
-        let free = crate::model::has_free_path(&self);
+        let free = self.has_free_path();
         if let Some(puncture) = &mut self.effects.puncture {
             puncture.anywhere = free;
         }
         self
     }
 
+    /// Where the parameters of effects find their present values.
+    pub fn numbers(&self) -> Numbers<'_> {
+        Numbers { effects: &self.effects, material: &self.material }
+    }
+
     /// JSON schema of the scene file, for editors and for the `schema` command.
     pub fn schema() -> serde_json::Value {
         schemars::schema_for!(file::SceneFile).to_value()
     }
-}
-
-/// The tissue block: `-size.x/2..size.x/2`, `-size.y/2..size.y/2`, `-size.z..0` [m]; the top face is z = 0.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Tissue {
-    /// Edge lengths of the block [m].
-    pub size: DVec3,
-    /// Cell edge in the fine zone around the planned path [m].
-    pub cell_size: f64,
-    /// Half width of the fine zone around the path [m].
-    pub fine_radius: f64,
-    /// Ratio of neighbouring cell edges outside the fine zone, >= 1.
-    pub growth: f64,
-    /// Where the entry point lies between two grid lines, as a fraction of the cell (x, y); [0.0, 0.0] puts the axis
-    /// on grid lines, [0.5, 0.5] on cell centres.
-    pub axis_offset_cells: [f64; 2],
-}
-
-/// Material of the tissue with its origin.
-#[derive(Debug, Clone)]
-pub struct TissueMaterial {
-    /// Preset name, or `constants`.
-    pub name: String,
-    /// Where the constants come from, one line.
-    pub source: String,
-    pub law: ElasticLaw,
-    /// Density [kg/m^3].
-    pub density: f64,
-    /// Parameters of this material's own; `None`: those of the scene's table, if the effect is on.
-    pub plasticity: Option<effects::plasticity::Params>,
-    pub fibres: Option<effects::fibres::Params>,
-    pub viscoelastic: Option<effects::viscoelastic::Params>,
-    pub damage: Option<effects::damage::Params>,
-    /// Tip forces in this material; `None`: those of the scene's puncture table.
-    pub cutting: Option<Cutting>,
-    /// A membrane: energy that puncturing this layer takes beyond cutting through it [J].
-    pub membrane_energy: Option<f64>,
-}
-
-impl TissueMaterial {
-    /// A material without parameters of its own for the effects. `density` [kg/m^3].
-    pub fn new(name: impl Into<String>, source: impl Into<String>, law: ElasticLaw, density: f64) -> Self {
-        TissueMaterial {
-            name: name.into(),
-            source: source.into(),
-            law,
-            density,
-            plasticity: None,
-            fibres: None,
-            viscoelastic: None,
-            damage: None,
-            cutting: None,
-            membrane_energy: None,
-        }
-    }
-}
-
-/// Tip forces of one material [N].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cutting {
-    /// Force at which the tip enters the material, F_pun.
-    pub puncture_force: f64,
-    /// Force of steady cutting, F_cut = G_c w.
-    pub cutting_force: f64,
 }
 
 /// A part of the tissue with a material of its own.
@@ -329,99 +277,6 @@ impl FaceDrive {
         }
         let within = halves.max(0.0) % 2.0;
         within.min(2.0 - within)
-    }
-}
-
-/// A rigid tool.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Tool {
-    Needle(NeedleShape),
-    /// Sphere of the given radius [m].
-    Sphere {
-        radius: f64,
-    },
-    /// Flat cylindrical punch of the given radius [m]; `bonded` sticks to the tissue where it touches first.
-    FlatPunch {
-        radius: f64,
-        bonded: bool,
-    },
-}
-
-/// A needle, solid to the tissue: a cylinder with a straight or oblique conical tip.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NeedleShape {
-    /// What the user calls it, e.g. `16G`.
-    pub name: String,
-    /// Shaft radius R [m].
-    pub radius: f64,
-    /// Length of the tip, Lc of the cone, 2R/tan(beta) of a bevel [m].
-    pub tip_length: f64,
-    /// Shape of the tip.
-    pub tip: TipShape,
-    /// What makes it hollow.
-    pub bore: Option<BoreShape>,
-    /// Name of the needle material.
-    pub material: String,
-    /// Young's modulus [Pa] and density [kg/m^3] of the material, and diameter of the bore [m] (0: solid): how a flexible
-    /// needle bends.
-    pub youngs_modulus: f64,
-    pub density: f64,
-    pub inner_diameter: f64,
-    /// Length from the tip to the hub [m]; with the density it gives the mass.
-    pub length: f64,
-}
-
-/// The inside of a hollow needle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BoreShape {
-    /// Radius of the bore [m].
-    pub radius: f64,
-    /// Radius of the cutting edge, between bore and outer radius [m].
-    pub edge: f64,
-    /// Friction coefficient of the bore (dimensionless).
-    pub friction: f64,
-}
-
-/// Shape of the tip of a needle.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum TipShape {
-    /// Circular cone, apex on the axis.
-    #[default]
-    Cone,
-    /// Bevel: an oblique circular cone with its apex on the rim, so that one side runs on along the shaft and the other
-    /// stands at the bevel angle to it.
-    Bevel {
-        /// Heading of the apex seen from the axis [rad], from the first lateral axis of the direction to the second
-        /// (`needle::lateral_axes`); for a vertical needle 0 is +x.
-        heading: f64,
-    },
-}
-
-impl NeedleShape {
-    /// Growth of the section's radius per length of the tip; half of that of the flank of a bevel.
-    pub fn tip_slope(&self) -> f64 {
-        self.radius / self.tip_length
-    }
-
-    /// Mass of a solid cylinder [kg]; the missing part of the tip does not count.
-    pub fn mass(&self) -> f64 {
-        std::f64::consts::PI * self.radius.powi(2) * self.length * self.density
-    }
-
-    /// A needle with a conical tip, of steel, 100 mm long. Lengths in m.
-    pub fn cone(name: &str, radius: f64, tip_length: f64) -> Self {
-        NeedleShape {
-            name: name.into(),
-            radius,
-            tip_length,
-            tip: TipShape::Cone,
-            bore: None,
-            material: "steel-304".into(),
-            youngs_modulus: 193e9,
-            density: 7900.0,
-            inner_diameter: 0.0,
-            length: 0.1,
-        }
     }
 }
 

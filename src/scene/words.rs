@@ -3,10 +3,11 @@
 use std::fmt;
 
 use schemars::{Schema, SchemaGenerator, json_schema};
+use serde::Deserialize;
 use serde::de::{Deserializer, Error, Visitor};
 use serde_json::json;
 
-use super::presets;
+use super::needles;
 use crate::effects::EFFECTS;
 use crate::mesh::import::LengthUnit;
 
@@ -23,12 +24,12 @@ pub fn effects(_: &mut SchemaGenerator) -> Schema {
 
 /// Gauges of the needle library.
 pub fn gauges(_: &mut SchemaGenerator) -> Schema {
-    one_of(presets::needles().iter().map(|needle| needle.gauge.as_str()))
+    one_of(needles::needles().iter().map(|needle| needle.gauge.as_str()))
 }
 
 /// Names of the needle materials.
 pub fn needle_materials(_: &mut SchemaGenerator) -> Schema {
-    one_of(presets::needle_materials().iter().map(|material| material.name.as_str()))
+    one_of(needles::needle_materials().iter().map(|material| material.name.as_str()))
 }
 
 /// Units of length of a mesh file.
@@ -41,9 +42,24 @@ pub fn axes(_: &mut SchemaGenerator) -> Schema {
     one_of(["x", "y", "z"].into_iter())
 }
 
+/// Names of the built-in materials, read off their file: the presets themselves are made of the tables that this schema describes.
+fn preset_names() -> Vec<String> {
+    #[derive(Deserialize)]
+    struct Library {
+        material: Vec<Named>,
+    }
+    #[derive(Deserialize)]
+    struct Named {
+        name: String,
+    }
+    let library: Library = toml::from_str(include_str!("../../assets/materials.toml"))
+        .expect("assets/materials.toml is part of the program and tested");
+    library.material.into_iter().map(|material| material.name).collect()
+}
+
 /// Without a library of its own a material knows the built-in presets alone.
 pub fn known_presets(material: &mut Schema) {
-    let names: Vec<&str> = presets::tissues().iter().map(|preset| preset.name.as_str()).collect();
+    let names = preset_names();
     material.insert("if".into(), json!({ "not": { "required": ["library"] } }));
     material.insert("then".into(), json!({ "properties": { "preset": { "enum": names } } }));
 }

@@ -3,7 +3,7 @@
 use super::Trace;
 use crate::Result;
 use crate::scene::Face;
-use crate::solver::simulation::{EngineChoice, Simulation};
+use crate::simulation::{EngineChoice, Simulation};
 
 /// Largest displacement of a node [nm]: zero of a body at rest.
 pub fn largest_displacement(simulation: &mut Simulation, _: &Trace) -> Result<f64> {

@@ -12,20 +12,21 @@ mod prepare;
 pub mod random;
 mod report;
 mod run;
+mod trace;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::engine::State;
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::scene::Scene;
-use crate::solver::engine::State;
-use crate::solver::simulation::{EngineChoice, Simulation};
+use crate::simulation::{EngineChoice, Simulation};
 use crate::{Error, Result};
 
 pub use cases::CASES;
 pub use report::{CaseReport, EngineReport, RunReport, Suite, list};
-pub use run::Trace;
+pub use trace::Trace;
 
 /// Folder of the scenes.
 pub const SCENES: &str = "scenes";

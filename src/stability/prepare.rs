@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::engine::State;
+use crate::engine::elements::{CellStates, Elements};
+use crate::engine::stable_dt::power_iteration;
 use crate::material_point::Volumetric;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::model::Model;
 use crate::scene::Scene;
-use crate::solver::elements::{CellStates, Elements};
-use crate::solver::engine::State;
-use crate::solver::stable_dt::power_iteration;
 
 /// Repeatable random numbers (splitmix64).
 struct Random(u64);

@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use serde::{Serialize, Serializer};
 
-use super::run::{End, Trace};
+use super::trace::{End, Trace};
 use super::{Balance, CASES, Case, Cure, Expected, Options, Part};
-use crate::solver::engine::EngineInfo;
-use crate::solver::simulation::EngineChoice;
+use crate::engine::EngineInfo;
+use crate::simulation::EngineChoice;
 use crate::verdict::Quantity;
 
 /// Columns of a terminal.

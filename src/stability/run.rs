@@ -5,59 +5,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::report::{CaseReport, RunReport};
-use super::{Balance, Case, Cure, Expected, Interruption, Options, Part};
+use super::trace::{End, Trace};
+use super::{Case, Cure, Expected, Interruption, Options, Part};
+use crate::engine::elements::{CellStates, Elements};
+use crate::engine::{EngineInfo, State};
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
-use crate::observables::FrameRecord;
 use crate::scene::Scene;
-use crate::solver::elements::{CellStates, Elements};
-use crate::solver::engine::{EngineInfo, State};
-use crate::solver::simulation::{EngineChoice, Simulation};
+use crate::simulation::{EngineChoice, Simulation};
 use crate::{Error, Result};
-
-/// What a run left behind.
-#[derive(Debug, Clone, Default)]
-pub struct Trace {
-    pub records: Vec<FrameRecord>,
-    /// Energy of the state that was written before the first step [J].
-    pub start_energy: f64,
-}
-
-impl Trace {
-    /// Largest part of the energy that was lost or created; 0 where nothing happened.
-    pub(super) fn imbalance(&self, balance: Balance) -> f64 {
-        match balance {
-            Balance::Frames => self.largest_residual(),
-            Balance::Means => self.drift(),
-        }
-    }
-
-    fn largest_residual(&self) -> f64 {
-        let residual = |r: &FrameRecord| (r.energy.external + self.start_energy - r.energy.accounted()).abs();
-        let work = self.records.last().map_or(0.0, |r| r.energy.external_max);
-        // `f64::max` would drop what is no number.
-        let larger = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
-        let largest = self.records.iter().map(residual).fold(0.0, larger);
-        if largest == 0.0 { 0.0 } else { largest / work.max(self.start_energy) }
-    }
-
-    fn drift(&self) -> f64 {
-        let tenth = (self.records.len() / 10).max(1);
-        let stored = |r: &FrameRecord| r.energy.elastic + r.energy.hourglass + r.energy.kinetic + r.energy.half_step;
-        let sum = |records: &[FrameRecord]| records.iter().map(stored).sum::<f64>();
-        (sum(&self.records[self.records.len().saturating_sub(tenth)..])
-            / sum(&self.records[..tenth.min(self.records.len())])
-            - 1.0)
-            .abs()
-    }
-}
-
-/// How a run ended, with the message of whoever ended it.
-pub(super) enum End {
-    Survived,
-    Stopped(String),
-    Refused(String),
-}
 
 /// Runs a case; `None`: interrupted. The engine tells of itself where one was made.
 pub(super) fn case(

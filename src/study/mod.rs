@@ -20,7 +20,7 @@ pub mod tables;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
-use crate::solver::simulation::EngineChoice;
+use crate::simulation::EngineChoice;
 
 /// An engine with its precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -179,4 +179,12 @@ pub fn digits(value: f64) -> String {
     }
     let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
     format!("{value:.decimals$}")
+}
+
+/// What a mesh costs before its engine is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshSize {
+    pub cells: u64,
+    /// Stable step without mass scaling [s]; it grows with the root of the factor.
+    pub unit_step_s: f64,
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::subject::{Subject, Variant, round4};
-use super::{Axis, Engine, Settings, trimmed};
+use super::{Axis, Engine, MeshSize, Settings, trimmed};
 use crate::error::{Error, Result};
 
 /// Part of the budget that the reference may take, and that all runs together may be predicted to take: predictions from short
@@ -28,14 +28,6 @@ const GRID: [(i32, f64); 8] = [(1, 4.0), (1, 16.0), (2, 4.0), (2, 16.0), (-1, 4.
 const ADDED_EFFECT: f64 = 1.5;
 /// Preparation of a run beside its steps [s]: mesh, model, shaders.
 const SETUP_S: f64 = 0.2;
-
-/// What a mesh costs before its engine is known.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MeshSize {
-    pub cells: u64,
-    /// Stable step without mass scaling [s]; it grows with the root of the factor.
-    pub unit_step_s: f64,
-}
 
 /// Wall time of one step [s]: `step_s + cells * cell_step_s`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -3,17 +3,17 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use super::plan::{Costs, MeshSize, PlannedRun, UnitCost};
+use super::plan::{Costs, PlannedRun, UnitCost};
 use super::store::RunRecord;
 use super::subject::Subject;
-use super::{Engine, Settings};
+use super::{Engine, MeshSize, Settings};
 use crate::error::{Error, Result};
 use crate::mesh::TissuePoint;
 use crate::observables::FrameRecord;
 use crate::output::curve::frames_on_the_way_in;
 use crate::output::{CurveFigures, Summary};
 use crate::process;
-use crate::solver::simulation::Simulation;
+use crate::simulation::Simulation;
 
 /// Wall time of the measurement of one mesh [s].
 const MEASURED_S: f64 = 0.5;

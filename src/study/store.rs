@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::Settings;
 use super::plan::Plan;
 use crate::error::{Error, Result};
-use crate::output::whole_file;
 use crate::reading;
+use crate::whole_file;
 
 pub const PLAN: &str = "plan.json";
 /// Folder of the finished runs.

@@ -4,18 +4,19 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::plan::MeshSize;
-use super::{Engine, Settings, trimmed};
+use super::{Engine, MeshSize, Settings, trimmed};
 use crate::effects::EFFECTS;
+use crate::engine::stable_dt::wave_speed_bound;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::device::{adapter_wanted_by_name, describe};
+use crate::hash::fnv1a;
 use crate::mesh::{BlockMesh, Mesh};
 use crate::model::Model;
+use crate::needle::{Phase, Tool};
 use crate::reading;
-use crate::scene::{Phase, Scene, Tool};
-use crate::solver::simulation::EngineChoice;
-use crate::solver::stable_dt::wave_speed_bound;
+use crate::scene::Scene;
+use crate::simulation::EngineChoice;
 
 /// Sample points of the displacement per axis, and the part of the block that they span.
 const SAMPLES: usize = 9;
@@ -279,16 +280,4 @@ pub(super) fn round4(value: f64) -> f64 {
 /// First line of a message that stands in the middle of a page.
 pub(super) fn first_line(text: &str) -> String {
     text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_string()
-}
-
-/// Fowler-Noll-Vo hash of texts, as 16 hexadecimal digits: the same on every machine and in every version of the compiler.
-pub(crate) fn fnv1a(texts: &[&str]) -> String {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    for text in texts {
-        // The end of a text counts, so that two texts are not one.
-        for byte in text.bytes().chain([0]) {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
-        }
-    }
-    format!("{hash:016x}")
 }

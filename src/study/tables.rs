@@ -10,7 +10,7 @@ use super::plan::{LeftOut, PlannedRun};
 use super::store::write_json;
 use super::{Axis, Settings};
 use crate::error::{Error, Result};
-use crate::output::whole_file;
+use crate::whole_file;
 
 /// Columns of `study.csv`; relative errors are fractions.
 const COLUMNS: [&str; 29] = [

@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use super::score::Score;
 use super::texts;
-use crate::output::whole_file;
+use crate::hash::fnv1a;
 use crate::reading::{self, Unread};
-use crate::study::subject::fnv1a;
+use crate::whole_file;
 use crate::{Error, Result};
 
 /// Folder of the history where nothing else is said.

@@ -29,7 +29,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::texts;
-use crate::scene::{Motion, Tissue};
+use crate::mesh::Tissue;
+use crate::needle::Motion;
 use crate::{Error, Result};
 
 /// Length of the needle for the swept area [m], whatever the scene says: the figure is comparable with Perk Tutor's.

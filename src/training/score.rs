@@ -7,9 +7,10 @@ use super::physical::{PhysicalFigures, Trust};
 use super::task::{self, GoalResult};
 use super::texts::{self, Better};
 use crate::observables::FrameRecord;
-use crate::output::tables::number;
-use crate::output::{OutputFolder, whole_file};
+use crate::output::OutputFolder;
+use crate::output::number::number;
 use crate::scene::Scene;
+use crate::whole_file;
 use crate::{Error, Result};
 
 /// One figure.

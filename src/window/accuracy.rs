@@ -5,17 +5,17 @@ use std::path::Path;
 use super::practice::Timing;
 use super::texts;
 use super::tuning::Tuning;
+use crate::engine::stable_dt::wave_speed_bound;
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::output::folder::safe_name;
 use crate::scene::Scene;
-use crate::solver::stable_dt::wave_speed_bound;
-use crate::study::Settings;
 use crate::study::advice::Candidate;
 use crate::study::analysis::Analysis;
-use crate::study::plan::{MeshSize, UnitCost};
+use crate::study::plan::UnitCost;
 use crate::study::runner::predicted_factor;
 use crate::study::store::Store;
+use crate::study::{MeshSize, Settings};
 
 /// What the sliders stand at, and what is known of it.
 pub struct Accuracy {

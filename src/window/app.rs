@@ -25,9 +25,10 @@ use super::practice::{Latency, Leader, Practice, Renewed, State};
 use super::scan::{self, Scan};
 use super::scene_view::{Area, Field, SceneView};
 use super::section::RestPlane;
+use super::source::Source;
 use super::texts;
 use super::tool_shape::{self, ToolPlace};
-use super::tuning::{Pace, Source};
+use super::tuning::Pace;
 use super::watch::Watch;
 use super::{PACES, ViewOptions};
 use crate::ending;
@@ -37,7 +38,7 @@ use crate::haptic::LoopTiming;
 use crate::reading;
 use crate::scene::Scene;
 use crate::session::Session;
-use crate::solver::change::Reach;
+use crate::simulation::change::Reach;
 use crate::training::history::{History, progress};
 use crate::training::score::Score;
 use crate::{Error, Result};
@@ -405,7 +406,7 @@ impl App {
         );
         let mut practice = practice;
         let model = practice.simulation.model.clone();
-        let engine = practice.simulation.engine().on_device();
+        let engine = practice.simulation.on_device();
         let engine = engine.ok_or_else(|| Error::Device("the window needs the engine of a device".into()))?;
         let view = SceneView::new(&gpu, engine, &model, config.format)?;
         let (low, high) = model.mesh.bounds();
@@ -621,7 +622,7 @@ impl Open {
     /// After a restart: the buffers are new.
     fn rebind(&mut self) -> Result<()> {
         let model = self.practice.simulation.model.clone();
-        if let Some(engine) = self.practice.simulation.engine().on_device()
+        if let Some(engine) = self.practice.simulation.on_device()
             && !self.view.take_model(&self.gpu, engine, &model)?
         {
             self.view = SceneView::new(&self.gpu, engine, &model, self.config.format)?;
@@ -655,7 +656,7 @@ impl Open {
     /// After a change of effects: the engine is new, the mesh and all that is drawn of it the same.
     fn take_buffers(&mut self) -> Result<()> {
         self.scan.close(&mut self.painter);
-        match self.practice.simulation.engine().on_device() {
+        match self.practice.simulation.on_device() {
             Some(engine) => self.view.take_buffers(&self.gpu, engine),
             None => Ok(()),
         }
@@ -855,7 +856,7 @@ impl Open {
     /// Draws the tissue on the canvas, and the panels where they were asked.
     fn draw(&mut self, encoder: &mut wgpu::CommandEncoder, panels: Option<Panels>) -> Result<()> {
         let place = self.place_tool();
-        if let Some(engine) = self.practice.simulation.engine().on_device() {
+        if let Some(engine) = self.practice.simulation.on_device() {
             engine.encode_fields(encoder);
         }
         let (size, view) = (self.canvas.size(), self.canvas.create_view(&Default::default()));
@@ -908,7 +909,7 @@ impl Open {
             *scale = panels::default_scale(scale.field);
             return Ok(());
         }
-        let Some(engine) = self.practice.simulation.engine().on_device() else { return Ok(()) };
+        let Some(engine) = self.practice.simulation.on_device() else { return Ok(()) };
         let Some(buffer) = engine.memory("drawn_nodes").and_then(Memory::buffer) else { return Ok(()) };
         let bytes = self.gpu.read_back(buffer)?;
         let lane = scale.field as usize;

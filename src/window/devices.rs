@@ -17,7 +17,7 @@ use super::texts;
 use crate::Error;
 use crate::Result;
 use crate::haptic::{ForceLoop, ForceTable, LoopTiming};
-use crate::scene::motion::HandPose;
+use crate::needle::motion::HandPose;
 
 /// Devices that come and go.
 #[derive(Default)]

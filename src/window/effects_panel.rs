@@ -5,7 +5,7 @@ use super::tuning::{Pace, Tuning};
 use crate::effects::parameter::{COUNT, Parameter};
 use crate::effects::{EFFECTS, Effect, switched};
 use crate::scene::Scene;
-use crate::solver::change::Reach;
+use crate::simulation::change::Reach;
 
 /// Width of a slider, in points.
 const SLIDER: f32 = 96.0;
@@ -68,7 +68,7 @@ pub fn saving(ui: &mut egui::Ui, tuning: &mut Tuning, name: &mut String) {
 /// One slider per component.
 fn sliders(ui: &mut egui::Ui, scene: &Scene, parameter: &Parameter, wishes: &mut Vec<String>) {
     let [low, high] = parameter.range;
-    for (index, value) in parameter.values(scene).into_iter().enumerate() {
+    for (index, value) in parameter.values(&scene.numbers()).into_iter().enumerate() {
         let mut wanted = value;
         let unit = if parameter.unit == "-" { String::new() } else { format!(" {}", parameter.unit) };
         let slider = egui::Slider::new(&mut wanted, low..=high)
@@ -80,7 +80,7 @@ fn sliders(ui: &mut egui::Ui, scene: &Scene, parameter: &Parameter, wishes: &mut
         let name = ui.small(parameter.name).id;
         if ui.add(slider).labelled_by(name).on_hover_text(format!("{}\n{}", parameter.key, parameter.source)).changed()
         {
-            wishes.extend(parameter.overrides(scene, index, wanted));
+            wishes.extend(parameter.overrides(&scene.numbers(), index, wanted));
         }
     }
 }

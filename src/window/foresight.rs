@@ -12,8 +12,8 @@ use std::thread::JoinHandle;
 use super::kernels_on_disk::Helper;
 use super::tuning::Tuning;
 use crate::effects::one_switch_away;
-use crate::solver::change::Reach;
-use crate::solver::simulation::{Purpose, Simulation};
+use crate::simulation::change::Reach;
+use crate::simulation::{Purpose, Simulation};
 
 /// What was made ready so far.
 #[derive(Default)]

@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::{DVec2, DVec3};
 
 use super::hand::{InputDevice, leant};
-use crate::scene::motion::HandPose;
+use crate::needle::motion::HandPose;
 
 /// Part of the way of a stick that means nothing: worn sticks rest there.
 const DEAD: f64 = 0.12;

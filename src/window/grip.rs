@@ -157,7 +157,7 @@ impl Sight<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::motion::HandPose;
+    use crate::needle::motion::HandPose;
     use crate::window::camera::Preset;
     use crate::window::hand::InputDevice;
 

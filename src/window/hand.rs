@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use glam::{DQuat, DVec3};
 
-use crate::scene::motion::HandPose;
+use crate::needle::motion::HandPose;
 
 /// A device that a hand holds: it says where the needle shall be, and is told what the needle feels.
 pub trait InputDevice {

@@ -10,11 +10,11 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::tuning::Source;
+use super::source::Source;
 use crate::commands::prepare::READY;
 use crate::effects::exactly;
 use crate::scene::Scene;
-use crate::solver::simulation::Purpose;
+use crate::simulation::Purpose;
 
 /// A scene file, and an override that names its effects.
 type Known = (PathBuf, String);

@@ -7,7 +7,7 @@ use super::hand::InputDevice;
 use super::practice::{Practice, State};
 use crate::error::Result;
 use crate::link::{LinkOptions, LinkServer, LinkState, Pose, RunState, WantedPose, basis_along};
-use crate::scene::motion::HandPose;
+use crate::needle::motion::HandPose;
 
 /// Cosine of the flattest direction that has a point of entry: 0.6 degrees above the surface.
 const FLATTEST: f64 = 0.01;

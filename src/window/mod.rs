@@ -31,6 +31,7 @@ pub mod reach;
 pub mod scan;
 pub mod scene_view;
 pub mod section;
+pub mod source;
 pub mod texts;
 pub mod tool_shape;
 pub mod tuning;

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::section::RestPlane;
-use crate::scene::motion::Motion;
+use crate::needle::motion::Motion;
 
 /// How far the slice stands beside the entry point, as a part of a fine cell: exactly on grid lines a section would run along cell
 /// faces.

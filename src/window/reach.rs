@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::model::Model;
-use crate::scene::motion::HandPose;
+use crate::needle::motion::HandPose;
 
 /// How far out of the tissue a hand may lead the tip [m].
 pub const OUTSIDE: f64 = 5e-3;

@@ -52,7 +52,7 @@ impl Scan {
         }
         let model = practice.simulation.model.clone();
         if self.open.is_none() {
-            let Some(engine) = practice.simulation.engine().on_device() else { return Ok(()) };
+            let Some(engine) = practice.simulation.on_device() else { return Ok(()) };
             let ultrasound = Ultrasound::new(gpu, engine, &model.mesh, &model.scene)?;
             let view = ultrasound.texture.create_view(&Default::default());
             let id = painter.register_native_texture(&gpu.device, &view, wgpu::FilterMode::Linear);

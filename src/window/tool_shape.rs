@@ -4,8 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::needle::centre_line::CentreLine;
-use crate::needle::lateral_axes;
-use crate::scene::{NeedleShape, TipShape, Tool};
+use crate::needle::{NeedleShape, TipShape, Tool, lateral_axes};
 
 /// Corners around the shaft, and rings along its bent part.
 const AROUND: usize = 24;
@@ -154,7 +153,7 @@ fn revolve(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::BoreShape;
+    use crate::needle::BoreShape;
 
     #[test]
     fn a_cone_begins_at_its_tip_and_is_as_thick_as_its_shaft() {

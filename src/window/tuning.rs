@@ -9,43 +9,12 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
 use super::kernels_on_disk::KernelsOnDisk;
-use crate::effects::parameter::with_overrides;
+use super::source::Source;
 use crate::gpu::Gpu;
-use crate::reading;
 use crate::scene::Scene;
-use crate::solver::change::{Change, Reach};
-use crate::solver::engine::Engine;
-use crate::solver::simulation::{Purpose, Simulation};
+use crate::simulation::change::{Change, Reach};
+use crate::simulation::{Purpose, RunEngine, Simulation};
 use crate::{Error, Result};
-
-/// A scene file as it was read, with what replaces its values.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Source {
-    pub path: PathBuf,
-    pub text: String,
-    pub overrides: Vec<String>,
-}
-
-impl Source {
-    /// # Errors
-    /// Those of [`Scene::load`], for a file that cannot be read too.
-    pub fn read(path: PathBuf, overrides: Vec<String>) -> Result<(Self, Scene)> {
-        let scene = Scene::load(&path, &overrides)?;
-        let text = reading::text(&path, reading::most::SCENE).map_err(|e| e.of(&path, "name a scene file"))?;
-        Ok((Source { path, text, overrides }, scene))
-    }
-
-    /// # Errors
-    /// Those of [`Scene::parse`].
-    pub fn scene(&self) -> Result<Scene> {
-        Scene::parse(&self.path, &self.text, &self.overrides)
-    }
-
-    /// The same with more overrides.
-    pub fn with(&self, more: &[String]) -> Self {
-        Source { overrides: with_overrides(&self.overrides, more), ..self.clone() }
-    }
-}
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +26,7 @@ struct Wanted {
 
 /// What a thread makes ready.
 enum Made {
-    Engine(Box<dyn Engine>),
+    Engine(RunEngine),
     Simulation(Box<Simulation>),
 }
 
@@ -174,7 +143,7 @@ impl Tuning {
         let text = crate::scene::edit::written(&self.source.text, &self.source.overrides)?;
         // Files that it names start from its folder: what cannot be read there is not written.
         Scene::parse(path, &text, &[])?;
-        crate::output::whole_file::write(path, text.as_bytes())
+        crate::whole_file::write(path, text.as_bytes())
     }
 
     /// Asks for another scene text, or for what is there to be made anew.

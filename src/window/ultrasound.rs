@@ -16,9 +16,9 @@ use super::section::{self, TissueCorner};
 use super::tool_shape::ToolPlace;
 use crate::gpu::{Gpu, GpuEngine};
 use crate::mesh::Mesh;
-use crate::needle::lateral_axes;
-use crate::scene::motion::Motion;
-use crate::scene::{NeedleShape, RegionShape, Scene, TipShape};
+use crate::needle::motion::Motion;
+use crate::needle::{NeedleShape, TipShape, lateral_axes};
+use crate::scene::{RegionShape, Scene};
 use crate::{Error, Result};
 
 const SHADER: &str = include_str!("../../shaders/render/ultrasound.wgsl");

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use stylet::effects::{adhesion, friction, mass_scaling, puncture};
+use stylet::engine::stable_dt::wave_speed_bound;
+use stylet::engine::{Engine, FrameSums};
 use stylet::material::ElasticLaw;
 use stylet::model::Model;
-use stylet::scene::{NeedleShape, Phase, Tool};
-use stylet::solver::engine::{Engine, FrameSums};
-use stylet::solver::stable_dt::wave_speed_bound;
+use stylet::needle::{NeedleShape, Phase, Tool};
 
 use crate::common::*;
 

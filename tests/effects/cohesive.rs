@@ -6,11 +6,12 @@ use glam::{DMat3, DVec3};
 use serde_json::Value;
 use stylet::effects::cohesive::{Law, Params, Plane};
 use stylet::effects::{mass_scaling, puncture};
+use stylet::engine::stable_dt::wave_speed_bound;
+use stylet::engine::{Engine, FrameSums, State};
 use stylet::material::ElasticLaw;
 use stylet::model::Model;
-use stylet::scene::{BoreShape, FaceDrive, NeedleShape, Phase, Tool};
-use stylet::solver::engine::{Engine, FrameSums, State};
-use stylet::solver::stable_dt::wave_speed_bound;
+use stylet::needle::{BoreShape, NeedleShape, Phase, Tool};
+use stylet::scene::FaceDrive;
 
 use crate::common::*;
 

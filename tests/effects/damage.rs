@@ -97,7 +97,7 @@ fn the_softening_cell_of_the_reference() {
         scene.material.density = 10.0;
         scene.solver.mass_damping = 300.0;
         let model = model(scene);
-        let dt = 0.6 * stylet::solver::stable_dt::wave_speed_bound(&model);
+        let dt = 0.6 * stylet::engine::stable_dt::wave_speed_bound(&model);
         let steps = (1.0 / dt / 400.0).ceil() as usize;
         let mut engines = engines(&model, dt, steps);
         let Some((_, e)) = engines.iter_mut().find(|e| e.0 == engine) else { continue };

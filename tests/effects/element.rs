@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
+use stylet::cpu::CpuEngine;
 use stylet::effects::puncture;
+use stylet::engine::elements::{CellStates, Elements};
+use stylet::engine::{Engine, State};
 use stylet::material::ElasticLaw;
 use stylet::model::Model;
-use stylet::scene::{NeedleShape, Phase, Scene, Tool};
-use stylet::solver::cpu::CpuEngine;
-use stylet::solver::elements::{CellStates, Elements};
-use stylet::solver::engine::{Engine, State};
+use stylet::needle::{NeedleShape, Phase, Tool};
+use stylet::scene::Scene;
 
 use crate::common::*;
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use stylet::effects::fibres;
+use stylet::engine::Engine;
 use stylet::model::Model;
-use stylet::solver::engine::Engine;
 
 use crate::common::*;
 
@@ -54,7 +54,7 @@ fn kernel_against_law_on_random_fields() {
     scene.effects.fibres = Some(fibres::Params { direction, k1: 1.0e3, k2: 0.5 });
     let with = Arc::new(Model::new(scene.clone(), graded_mesh([4, 5, 6])));
     let Some(mut gpu) = gpu_engine(&with, 1e-6, 1) else { return };
-    let mut cpu = stylet::solver::cpu::CpuEngine::new(with.clone(), 1e-6);
+    let mut cpu = stylet::cpu::CpuEngine::new(with.clone(), 1e-6);
     for (amplitude, seed) in [(0.02, 1), (0.2, 2), (0.5, 3)] {
         let mut random = Random(seed);
         let mut state = cpu.read_state().unwrap();
@@ -66,7 +66,7 @@ fn kernel_against_law_on_random_fields() {
         at_most(&format!("fibres, amplitude {amplitude}"), difference, 2e-5);
         let mut wrong = scene.clone();
         wrong.effects.fibres = Some(fibres::Params { direction, k1: 1.02e3, k2: 0.5 });
-        let mut wrong = stylet::solver::cpu::CpuEngine::new(Arc::new(Model::new(wrong, graded_mesh([4, 5, 6]))), 1e-6);
+        let mut wrong = stylet::cpu::CpuEngine::new(Arc::new(Model::new(wrong, graded_mesh([4, 5, 6]))), 1e-6);
         wrong.write_state(&gpu.read_state().unwrap()).unwrap();
         let difference = relative_difference(&gpu.internal_forces().unwrap(), &wrong.internal_forces().unwrap());
         assert!(amplitude < 0.1 || difference > 2e-5, "2 % of k1 would pass: {difference:e}");

@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use stylet::effects::{flexible_needle, friction, mass_scaling, puncture};
+use stylet::engine::{FramePlan, FrameSums, StepInput};
 use stylet::model::Model;
 use stylet::needle::centre_line::{CentreLine, ENTRY_COUNT};
+use stylet::needle::{Motion, NeedleShape, Phase, TipShape, Tool, Vibration};
 use stylet::observables::FrameRecord;
-use stylet::scene::{Motion, NeedleShape, Phase, Scene, TipShape, Tool, Vibration};
-use stylet::solver::engine::{FramePlan, FrameSums, StepInput};
-use stylet::solver::simulation::{EngineChoice, Simulation};
+use stylet::scene::Scene;
+use stylet::simulation::{EngineChoice, Simulation};
 
 use crate::common::*;
 
@@ -102,7 +103,7 @@ fn the_kernel_matches_the_f64_engine() {
         scene.effects.flexible_needle = Some(Default::default());
         let mesh = stylet::mesh::BlockMesh::for_scene(&scene);
         let model = Arc::new(Model::new(scene, mesh));
-        let dt = 0.5 * stylet::solver::stable_dt::wave_speed_bound(&model);
+        let dt = 0.5 * stylet::engine::stable_dt::wave_speed_bound(&model);
         let mut sums: Vec<(&str, FrameSums)> = Vec::new();
         for (name, mut engine) in engines(&model, dt, 400) {
             // Down to 3 mm with a straight needle, then a bent one.

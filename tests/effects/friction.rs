@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use stylet::effects::{friction, gravity, indentation, puncture};
+use stylet::engine::{Engine, FrameSums};
 use stylet::model::Model;
-use stylet::scene::{NeedleShape, Phase, Scene, Tool};
-use stylet::solver::engine::{Engine, FrameSums};
+use stylet::needle::{NeedleShape, Phase, Tool};
+use stylet::scene::Scene;
 
 use crate::common::*;
 

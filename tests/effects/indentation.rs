@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use stylet::effects::indentation;
+use stylet::engine::stable_dt::wave_speed_bound;
 use stylet::model::Model;
-use stylet::scene::{Phase, Scene, Tool};
-use stylet::solver::stable_dt::wave_speed_bound;
+use stylet::needle::{Phase, Tool};
+use stylet::scene::Scene;
 
 use crate::common::*;
 

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
-use stylet::effects::{damage, fibres, plasticity, viscoelastic};
+use stylet::cpu::CpuEngine;
+use stylet::effects::{TissueMaterial, damage, fibres, plasticity, viscoelastic};
+use stylet::engine::Engine;
 use stylet::material::{Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean, Ogden, Yeoh};
 use stylet::model::Model;
-use stylet::scene::{Region, RegionShape, Scene, TissueMaterial};
-use stylet::solver::cpu::CpuEngine;
-use stylet::solver::engine::Engine;
+use stylet::scene::{Region, RegionShape, Scene};
 
 use crate::common::*;
 
@@ -168,7 +168,7 @@ fn regions_and_all_effects_together() {
     }
     let (found, expected) = (gpu.read_state().unwrap(), cpu.read_state().unwrap());
     at_most("displacement", relative_difference(&found.displacement, &expected.displacement), 1e-4);
-    let alpha = |s: &stylet::solver::engine::State| s.points.iter().map(|p| p.plastic.alpha).fold(0.0, f64::max);
+    let alpha = |s: &stylet::engine::State| s.points.iter().map(|p| p.plastic.alpha).fold(0.0, f64::max);
     close("largest plastic strain", alpha(&found), alpha(&expected), 1e-3);
     at_most("internal forces of the states", force_difference(&mut gpu, &mut cpu), 1e-3);
 }

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use stylet::effects::mass_scaling;
+use stylet::engine::Engine;
+use stylet::engine::stable_dt::{power_iteration, wave_speed_bound};
 use stylet::model::Model;
 use stylet::scene::{FaceDrive, Scene};
-use stylet::solver::engine::Engine;
-use stylet::solver::stable_dt::{power_iteration, wave_speed_bound};
 
 use crate::common::*;
 

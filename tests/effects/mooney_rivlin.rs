@@ -1,9 +1,9 @@
 //! The elastic law: derivative of its energy, homogeneous reference states on both engines.
 
 use glam::DMat3;
+use stylet::engine::Engine;
 use stylet::material::ElasticLaw;
 use stylet::material::kinematics::{J_CONTINUATION, cofactor};
-use stylet::solver::engine::Engine;
 
 use crate::common::*;
 

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use stylet::effects::puncture::Cutting;
 use stylet::effects::{mass_scaling, puncture};
+use stylet::engine::stable_dt::wave_speed_bound;
+use stylet::engine::{Engine, FrameSums, State};
 use stylet::material::ElasticLaw;
 use stylet::model::Model;
-use stylet::scene::{Cutting, NeedleShape, Phase, Region, RegionShape, Scene, Tool};
-use stylet::solver::engine::{Engine, FrameSums, State};
-use stylet::solver::stable_dt::wave_speed_bound;
+use stylet::needle::{NeedleShape, Phase, Tool};
+use stylet::scene::{Region, RegionShape, Scene};
 
 use crate::common::*;
 

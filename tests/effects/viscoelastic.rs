@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use glam::DMat3;
 use stylet::effects::{mass_scaling, viscoelastic};
+use stylet::engine::Engine;
 use stylet::model::Model;
 use stylet::scene::{Face, FaceCondition, FaceDrive};
-use stylet::solver::engine::Engine;
 
 use crate::common::*;
 
@@ -91,7 +91,7 @@ fn slow_terms_keep_their_digits() {
 fn a_wrong_relaxation_time_does_not_pass() {
     let dt = 1e-3;
     let model = held_block(&[(0.25, 0.52)], 1.0);
-    let mut engine = stylet::solver::cpu::CpuEngine::new(model.clone(), dt);
+    let mut engine = stylet::cpu::CpuEngine::new(model.clone(), dt);
     let found = relaxation(&mut engine, &model, dt, &[0.5])[0];
     let expected = 0.75 + 0.25 * (-1.0f64).exp();
     assert!((found / expected - 1.0).abs() > 1e-3);
@@ -174,7 +174,7 @@ fn a_sheared_column_follows_ramp_and_hold() {
     scene.effects.mass_scaling = Some(mass_scaling::Params { factor: 40.0 });
     let model = model(scene);
     let dt = 2e-4;
-    assert!(dt < stylet::solver::stable_dt::wave_speed_bound(&model));
+    assert!(dt < stylet::engine::stable_dt::wave_speed_bound(&model));
     let times: Vec<f64> =
         ramp["t_s"].as_array().unwrap().iter().map(number).filter(|t| (0.4..11.0).contains(t)).collect();
     let stress = |t: f64| {
@@ -190,7 +190,7 @@ fn a_sheared_column_follows_ramp_and_hold() {
                 let steps = (target - step).min(1000) as usize;
                 sums = advance(engine.as_mut(), &model, dt, &mut step, steps);
             }
-            let sums: stylet::solver::engine::FrameSums = sums;
+            let sums: stylet::engine::FrameSums = sums;
             let found = sums.reactions[Face::ZMax as usize].x / 4e-6 / (model.materials[0].law.shear_modulus() * part);
             worst = worst.max((found / stress(*t) - 1.0).abs());
         }

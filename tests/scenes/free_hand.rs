@@ -2,9 +2,9 @@
 
 use super::muscle_biopsy::{axial, curve_difference};
 use super::*;
+use stylet::needle::NeedleShape;
 use stylet::needle::free_path::{END_FADE, faded_at_end};
 use stylet::needle::gap::Profile;
-use stylet::scene::NeedleShape;
 
 const COARSE: &str = "tissue.cell_size_mm=1.0";
 const DRAWN_OUT: &str = "motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 7.0}, \
@@ -115,8 +115,8 @@ fn both_engines_pass_planes_on_a_free_path() {
 #[test]
 fn a_motion_decides_how_its_path_is_found() {
     let scene = load("free_hand/sideways.toml", &[COARSE]);
-    assert!(stylet::model::has_free_path(&scene));
-    assert!(!stylet::model::has_free_path(&load("free_hand/stop_and_go.toml", &[COARSE])));
+    assert!(scene.has_free_path());
+    assert!(!load("free_hand/stop_and_go.toml", &[COARSE]).has_free_path());
     let simulation = Simulation::new(scene, EngineChoice::Cpu).unwrap();
     assert!(simulation.notices.iter().any(|n| n.contains("free path")), "{:?}", simulation.notices);
 }

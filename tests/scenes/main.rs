@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use glam::DVec3;
+use stylet::engine::State;
 use stylet::gpu::Gpu;
 use stylet::observables::FrameRecord;
 use stylet::output::{CurveFigures, Summary};
 use stylet::scene::{Face, Scene};
-use stylet::solver::engine::State;
-use stylet::solver::simulation::{EngineChoice, Simulation};
+use stylet::simulation::{EngineChoice, Simulation};
 
 mod effects;
 mod free_hand;

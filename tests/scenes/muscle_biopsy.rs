@@ -1,13 +1,13 @@
 //! The main job and its variants: mesh, grid lines, oblique entry, engine, repetition.
 
 use super::*;
+use stylet::engine::stable_dt::wave_speed_bound;
+use stylet::engine::{Engine, FramePlan, FrameSums, StepInput};
 use stylet::gpu::GpuEngine;
 use stylet::mesh::BlockMesh;
 use stylet::model::Model;
-use stylet::scene::Phase;
-use stylet::solver::engine::{Engine, FramePlan, FrameSums, StepInput};
-use stylet::solver::simulation::choose_step;
-use stylet::solver::stable_dt::wave_speed_bound;
+use stylet::needle::Phase;
+use stylet::simulation::choose_step;
 
 const SCENE: &str = "muscle_biopsy.toml";
 const INSERTION: &str = "motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 12.0}]";

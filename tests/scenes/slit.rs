@@ -72,8 +72,8 @@ fn no_tissue_is_left_in_the_needle() {
 #[test]
 fn a_bevel_in_a_slit_creates_no_energy() {
     let mut scene = load(SCENE, &[&cell(0.8), NO_PICTURES, IN_AND_BACK]);
-    let Some(stylet::scene::Tool::Needle(needle)) = &mut scene.tool else { panic!("no needle") };
-    needle.tip = stylet::scene::TipShape::Bevel { heading: 0.0 };
+    let Some(stylet::needle::Tool::Needle(needle)) = &mut scene.tool else { panic!("no needle") };
+    needle.tip = stylet::needle::TipShape::Bevel { heading: 0.0 };
     let mut simulation = Simulation::new(scene, best_engine()).unwrap();
     let mut records = Vec::new();
     while let Some(record) = simulation.next_frame().unwrap() {

@@ -8,11 +8,11 @@ use std::sync::OnceLock;
 use glam::DVec3;
 use rayon::prelude::*;
 use stylet::effects::{EFFECTS, EffectSet, mass_scaling};
+use stylet::engine::Stage;
 use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose, compose_without_effects};
 use stylet::gpu::engine::{Features, LAWS, defines, stages};
 use stylet::gpu::kernel::{BindingKind, Reflected, reflect};
 use stylet::gpu::structs::layouts;
-use stylet::solver::step::Stage;
 
 /// Features of a block of Mooney-Rivlin tissue.
 fn scene(loaded_faces: bool, driven_faces: bool) -> Features {

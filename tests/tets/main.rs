@@ -5,7 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
-use stylet::effects::{damage, fibres, gravity, mass_scaling, plasticity, viscoelastic};
+use stylet::cpu::CpuEngine;
+use stylet::effects::{TissueMaterial, damage, fibres, gravity, mass_scaling, plasticity, viscoelastic};
+use stylet::engine::elements::{CellStates, Elements};
+use stylet::engine::stable_dt::{power_iteration, wave_speed_bound};
+use stylet::engine::{Engine, FrameSums, State};
 use stylet::material::ElasticLaw;
 use stylet::mesh::import::{LengthUnit, read};
 use stylet::mesh::tets::TetMesh;
@@ -13,12 +17,8 @@ use stylet::mesh::{BlockMesh, Mesh};
 use stylet::model::Model;
 use stylet::observables::FrameRecord;
 use stylet::output::Summary;
-use stylet::scene::{Face, FaceDrive, Region, RegionShape, Scene, Support, TissueMaterial};
-use stylet::solver::cpu::CpuEngine;
-use stylet::solver::elements::{CellStates, Elements};
-use stylet::solver::engine::{Engine, FrameSums, State};
-use stylet::solver::simulation::{EngineChoice, Simulation};
-use stylet::solver::stable_dt::{power_iteration, wave_speed_bound};
+use stylet::scene::{Face, FaceDrive, Region, RegionShape, Scene, Support};
+use stylet::simulation::{EngineChoice, Simulation};
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -3,13 +3,14 @@
 use plotters::style::{BLACK, RGBColor, WHITE};
 
 use super::CaseResults;
+use crate::needle::{NeedleShape, TipShape, Tool};
 use crate::observables::{ForcePart, ForceParts};
 use crate::output::chart::{Curve, FINER, GREEN, INWARD, OUTWARD, rgb};
 use crate::output::curve::{DROP_FRACTION, DROP_TRAVEL, ForceDrop, sudden_drops};
 use crate::output::page::{document, escape, figure, numbers, picture, table, words};
 use crate::output::plot::{Area, Mark, Plot, legend_dot, legend_line, legend_row, legend_swatch};
 use crate::output::summary::Status;
-use crate::scene::{NeedleShape, Scene, TipShape, Tool};
+use crate::scene::Scene;
 use crate::{Error, Result};
 
 /// Folder of the scenes in the repository.

@@ -1,12 +1,13 @@
 //! The effects of a scene: which are on, what they need, their parameters.
 
+use super::super::FaceCondition;
 use super::super::file::*;
-use super::super::{FaceCondition, Motion, NeedleShape, TissueMaterial, Tool};
 use super::{Check, MM, Within, parameters};
 use crate::effects::mass_scaling::Loading;
-use crate::effects::{self, EFFECTS, EffectSet};
+use crate::effects::{self, EFFECTS, EffectSet, TissueMaterial};
 use crate::material::four_digits;
 use crate::needle::beam::{BeamParams, Section};
+use crate::needle::{Motion, NeedleShape, Tool};
 
 impl Check<'_> {
     pub(super) fn effects(

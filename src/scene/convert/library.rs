@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::document::Document;
 use super::super::file::{CuttingTable, LibraryFile, LibraryMaterial, MaterialTable};
-use super::super::presets::TissuePreset;
+use super::super::tissue_preset::TissuePreset;
 use super::Check;
 
 /// Reads and checks a library; the error is the rendered text of all problems, with the name of the library.

@@ -1,9 +1,10 @@
 //! A tissue material of a scene or a library: its forms, its stability and what is stated twice.
 
 use super::super::file::{LawWord, MaterialTable};
-use super::super::presets::TissuePreset;
-use super::super::{TissueMaterial, presets};
+use super::super::presets;
+use super::super::tissue_preset::TissuePreset;
 use super::{Check, KPA, MM, Within, library};
+use crate::effects::TissueMaterial;
 use crate::material::{
     Demiray, ElasticLaw, Isochoric, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict, four_digits, ripple_growth_time,
 };

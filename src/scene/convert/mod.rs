@@ -28,6 +28,7 @@ use super::file::*;
 use super::*;
 use crate::material::four_digits;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
+use crate::needle::Phase;
 use crate::reading::{self, Unread};
 
 const MM: f64 = 1e-3;

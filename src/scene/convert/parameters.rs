@@ -3,11 +3,12 @@
 
 use glam::DVec3;
 
+use super::super::Region;
 use super::super::file::*;
-use super::super::presets::TissuePreset;
-use super::super::{Cutting, Region, TissueMaterial};
+use super::super::tissue_preset::TissuePreset;
 use super::{Check, KPA, MM, Within};
-use crate::effects::{self, EffectSet, damage, fibres, plasticity, viscoelastic};
+use crate::effects::puncture::Cutting;
+use crate::effects::{self, EffectSet, TissueMaterial, damage, fibres, plasticity, viscoelastic};
 use crate::material::four_digits;
 
 /// The plastic displacement that Lv et al. 2022 print without a unit, read as mm [m].

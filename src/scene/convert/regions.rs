@@ -3,14 +3,15 @@
 use glam::DVec3;
 
 use super::super::file::*;
-use super::super::presets::TissuePreset;
-use super::super::{Region, RegionShape, Tissue, TissueMaterial, Tool};
+use super::super::tissue_preset::TissuePreset;
+use super::super::{Region, RegionShape};
 use super::mesh::list_tags;
 use super::parameters::{all_materials, cutting, damage_limit, preset_cutting, written_cutting};
 use super::{Check, MM, Within};
-use crate::effects::EffectSet;
+use crate::effects::{EffectSet, TissueMaterial};
 use crate::material::four_digits;
-use crate::mesh::{Mesh, TetMesh};
+use crate::mesh::{Mesh, TetMesh, Tissue};
+use crate::needle::Tool;
 
 /// Most regions of a scene: the shaders hold 16 materials, and one is the tissue's own.
 const LARGEST_REGION_COUNT: usize = 15;

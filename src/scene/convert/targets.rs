@@ -2,9 +2,10 @@
 
 use glam::DVec3;
 
+use super::super::Target;
 use super::super::file::SceneFile;
-use super::super::{Target, Tissue};
 use super::{Check, MM, Within};
+use crate::mesh::Tissue;
 
 /// Most targets of a scene: what is read back after every frame stays small.
 const LARGEST_TARGET_COUNT: usize = 64;

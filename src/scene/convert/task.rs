@@ -3,8 +3,9 @@
 use glam::DVec3;
 
 use super::super::file::{CylinderTable, GoalKind, GoalTable, SceneFile, SphereShapeTable, TaskTable};
-use super::super::{Goal, Obstacle, Target, Task, Tool};
+use super::super::{Goal, Obstacle, Target, Task};
 use super::{Check, MM, Within};
+use crate::needle::Tool;
 
 /// Most goals of a task: more cannot be kept in mind with a needle in the hand.
 const LARGEST_GOAL_COUNT: usize = 16;

@@ -3,10 +3,11 @@
 use glam::DVec3;
 
 use super::super::file::*;
-use super::super::motion::Placement;
-use super::super::{BoreShape, Motion, NeedleShape, Phase, TipShape, Tool, Vibration, presets};
+use super::super::needles;
 use super::{Check, MM, Within};
 use crate::material::four_digits;
+use crate::needle::motion::Placement;
+use crate::needle::{BoreShape, Motion, NeedleShape, Phase, TipShape, Tool, Vibration};
 
 impl Check<'_> {
     pub(super) fn tool(&mut self, file: &SceneFile) -> Option<Tool> {
@@ -42,13 +43,13 @@ impl Check<'_> {
     fn needle(&mut self, table: &NeedleTable) -> NeedleShape {
         let (mut name, mut diameter, mut inner_diameter) = (String::new(), MM, 0.0);
         match (&table.gauge, table.outer_diameter_mm) {
-            (Some(gauge), None) => match presets::needle(gauge) {
+            (Some(gauge), None) => match needles::needle(gauge) {
                 Some(preset) => {
                     (name, diameter) = (preset.gauge.clone(), preset.outer_diameter);
                     inner_diameter = preset.inner_diameter;
                 }
                 None => {
-                    let names: Vec<&str> = presets::needles().iter().map(|p| p.gauge.as_str()).collect();
+                    let names: Vec<&str> = needles::needles().iter().map(|p| p.gauge.as_str()).collect();
                     let meant = format!("{gauge}G");
                     if names.contains(&meant.as_str()) {
                         self.problems.report(
@@ -83,7 +84,7 @@ impl Check<'_> {
         let shape = NeedleShape { tip, bore, inner_diameter, length, ..steel };
         match &table.material {
             None => shape,
-            Some(NeedleMaterialEntry::Preset(name)) => match presets::needle_material(name) {
+            Some(NeedleMaterialEntry::Preset(name)) => match needles::needle_material(name) {
                 Some(m) => NeedleShape {
                     material: name.clone(),
                     youngs_modulus: m.youngs_modulus,
@@ -91,7 +92,7 @@ impl Check<'_> {
                     ..shape
                 },
                 None => {
-                    let names: Vec<&str> = presets::needle_materials().iter().map(|m| m.name.as_str()).collect();
+                    let names: Vec<&str> = needles::needle_materials().iter().map(|m| m.name.as_str()).collect();
                     self.unknown_name("needle.material", "needle material", name, &names);
                     shape
                 }

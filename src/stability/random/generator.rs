@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use super::numbers::{Numbers, list, written};
 use super::{MOST_CELL_STEPS, MOST_CELLS};
+use crate::engine::stable_dt::wave_speed_bound;
 use crate::material::ElasticLaw;
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::scene::{Scene, presets};
-use crate::solver::simulation::choose_step;
-use crate::solver::stable_dt::wave_speed_bound;
+use crate::scene::{Scene, needles, presets};
+use crate::simulation::choose_step;
 
 /// Part of the scenes that are drawn within what a user would do; whether a scene is so is then measured, not remembered.
 const TAME: f64 = 0.75;
@@ -171,7 +171,7 @@ impl Draft {
 
     /// A needle goes into a block.
     fn needle(&mut self, n: &mut Numbers, tame: bool) {
-        let gauges: Vec<&presets::NeedlePreset> = presets::needles().iter().collect();
+        let gauges: Vec<&needles::NeedlePreset> = needles::needles().iter().collect();
         let gauge = gauges[n.below(if tame { 7 } else { gauges.len() })];
         let by_gauge = n.chance(0.7);
         let diameter = if by_gauge { gauge.outer_diameter * 1e3 } else { n.between(0.8, 2.2) };
@@ -974,7 +974,7 @@ impl Phase {
 
 /// Least failure displacement for which no cell of the fine zone snaps back, `sigma h/E` of the worst material [m].
 fn least_failure(scene: &Scene) -> f64 {
-    let worst = |material: &crate::scene::TissueMaterial| {
+    let worst = |material: &crate::effects::TissueMaterial| {
         let flow = material.plasticity.or(scene.effects.plasticity).unwrap_or_default();
         let onset = material.damage.or(scene.effects.damage).unwrap_or_default().onset;
         (flow.yield_stress + flow.hardening * onset) / material.law.youngs_modulus()

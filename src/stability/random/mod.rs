@@ -37,7 +37,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::gpu::Gpu;
-use crate::solver::simulation::EngineChoice;
+use crate::simulation::EngineChoice;
 use crate::{Error, Result};
 
 pub use generator::RandomScene;

@@ -2,13 +2,15 @@
 
 use std::f64::consts::PI;
 
+use crate::effects::TissueMaterial;
 use crate::effects::cohesive::Law;
 use crate::effects::mass_scaling::{FEWEST_PASSAGES, Loading, MOST_MACH};
 use crate::effects::puncture::{MOST_PRESSURE_OVER_BULK, MOST_PRESSURE_OVER_YOUNG};
 use crate::material::{Isochoric, Verdict};
 use crate::model::Model;
-use crate::scene::{Face, RegionShape, Scene, TissueMaterial, Tool};
-use crate::solver::advice::{COARSEST, MOST_JUMP, edge_jump, mean_edge, puncture_pressure};
+use crate::needle::Tool;
+use crate::scene::{Face, RegionShape, Scene};
+use crate::simulation::advice::{COARSEST, MOST_JUMP, edge_jump, mean_edge, puncture_pressure};
 
 /// Largest speed of a tool [m/s].
 const MOST_SPEED: f64 = 0.2;
@@ -139,12 +141,12 @@ fn needle(model: &Model, materials: &[&TissueMaterial], not: &mut impl FnMut(boo
     if motion.is_free() {
         let (from, to) = motion.reach(scene.tissue.size.z);
         let sideways = (to - from).truncate().max_element();
-        let moved = motion.phases.iter().any(|p| matches!(p, crate::scene::Phase::Move { .. }));
+        let moved = motion.phases.iter().any(|p| matches!(p, crate::needle::Phase::Move { .. }));
         not(!moved || sideways <= 2.0 * needle.radius + motion.deepest(), "dragged sideways".into());
     }
     not(motion.phases.len() <= 4, "many phases".into());
     let turned = motion.phases.iter().any(|p| match p {
-        crate::scene::Phase::Turn { direction, .. } => direction.angle_between(motion.direction) > 10f64.to_radians(),
+        crate::needle::Phase::Turn { direction, .. } => direction.angle_between(motion.direction) > 10f64.to_radians(),
         _ => false,
     });
     not(!turned, "turned by more than 10 degrees in the tissue".into());

@@ -18,7 +18,7 @@ use crate::gpu::Gpu;
 use crate::model::Model;
 use crate::observables::FrameRecord;
 use crate::scene::Scene;
-use crate::solver::simulation::Simulation;
+use crate::simulation::Simulation;
 use crate::verdict::{Quantity, Verdict};
 
 /// Wall time that a scene may take beside its steps, and so many times the time that they are expected to take.

@@ -18,7 +18,7 @@ const RAISED_AT_REST: f64 = 4.0;
 ///
 /// A run takes this one times the safety factor. With mass scaling the mass of nodes in contact and around squeezed cells
 /// is raised for as long as they are stiffer, by contact alone at most four times; without, contact counts here in full, and
-/// the step follows the cells ([`super::stiffening`]).
+/// the step follows the cells ([`crate::simulation::stiffening`]).
 pub fn wave_speed_bound(model: &Model) -> f64 {
     let rest = vec![DVec3::ZERO; model.mesh.node_count()];
     let mut bound = stiffness_bounds(model, &rest);

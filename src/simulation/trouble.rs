@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use super::simulation::Simulation;
+use super::Simulation;
 use crate::error::Error;
-use crate::observables::FrameRecord;
-use crate::verdict::{Quantity, Trouble};
+use crate::observables::{FrameRecord, Trouble};
+use crate::verdict::Quantity;
 
 impl Simulation {
     /// The error of a run that is stopped after the frame of `record`. It names no cure: nobody has tried one yet.

@@ -7,17 +7,17 @@ mod needle_contact;
 mod slit_contact;
 mod tip;
 
-pub use cohesive_forces::TORN_REACH;
-
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::checkpoint::{EngineImage, foreign_image};
-use super::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
-use super::engine::{ContactState, Engine, EngineInfo, FramePlan, FrameSums, State, StepInput, WATCHED_STEP_RATIO};
 use crate::effects::adhesion::Bond;
+use crate::engine::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
+use crate::engine::{
+    ContactState, Engine, EngineImage, EngineInfo, FramePlan, FrameSums, State, StepInput, WATCHED_STEP_RATIO,
+    foreign_image,
+};
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
 use crate::model::Model;

@@ -4,11 +4,12 @@
 
 use glam::DVec3;
 
+use crate::effects::TissueMaterial;
 use crate::effects::mass_scaling::{AUTO_MACH, AUTO_PASSAGES, FEWEST_PASSAGES, Loading, MOST_MACH};
 use crate::effects::puncture::{MOST_PRESSURE_OVER_BULK, MOST_PRESSURE_OVER_YOUNG};
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::scene::{Face, Scene, TissueMaterial};
+use crate::scene::{Face, Scene};
 
 /// Cells over the diameter of a needle beyond which a scene is told that they are coarse: there hourglass shapes held a fifth of the
 /// internal energy.

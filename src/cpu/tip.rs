@@ -5,10 +5,10 @@ use glam::DVec3;
 use super::CpuEngine;
 use crate::effects::adhesion::{self, Bond};
 use crate::effects::puncture::{self, advance_limit};
+use crate::engine::elements::{CORNERS, CellStates};
 use crate::mesh::BlockMesh;
 use crate::model::PuncturePlan;
 use crate::needle::ToolPose;
-use crate::solver::elements::{CORNERS, CellStates};
 
 /// An anchor at the material coordinate of the tip.
 struct PlacedAnchor {

@@ -1,18 +1,9 @@
-//! What both engines offer, and what passes between them and the run.
-
-use std::sync::Arc;
+//! What passes between a run and its engine in a frame: the input of every step, and sums.
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
-use super::checkpoint::EngineImage;
-use crate::effects::adhesion::Bond;
-use crate::error::Result;
-use crate::gpu::GpuEngine;
-use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
-use crate::needle::free_path::FreeTip;
 use crate::needle::{Kinematics, ToolPose};
 use crate::scene::Face;
 
@@ -173,122 +164,4 @@ pub struct FrameSums {
     pub not_finite: bool,
     /// Total: displacement of every target [m].
     pub targets: Vec<DVec3>,
-}
-
-/// The state that both engines can give and take, in f64 and SI, node order of the mesh.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct State {
-    /// Displacement u [m].
-    pub displacement: Vec<DVec3>,
-    /// Velocity v at the last half step [m/s].
-    pub velocity: Vec<DVec3>,
-    /// Remaining stiffness per cell; empty without `puncture`.
-    pub stiffness: Vec<f64>,
-    /// Material coordinate of the tip [m].
-    pub tip_coordinate: f64,
-    /// Tip on a free path; at rest on a planned one.
-    pub tip: FreeTip,
-    /// Marked sample points per cell of the box of a free path, bit = x + 4 y + 16 z; empty on a planned one.
-    pub cut_samples: Vec<u64>,
-    /// Tissue that sticks to the tip.
-    pub bond: Bond,
-    /// Memory per contact node: stretch of the stick spring [m], overlap at activation [m], axial position at
-    /// activation [m]; `touching` tells whether the last two are set.
-    pub contact: Vec<ContactState>,
-    /// Damage D of every pair of copies that may separate.
-    pub pairs: Vec<f64>,
-    /// History per cell; empty without `plasticity` and `viscoelastic`.
-    pub points: Vec<PointState>,
-}
-
-impl State {
-    /// True where both are states of one model.
-    pub fn fits(&self, other: &State) -> bool {
-        let sizes = |s: &State| {
-            [
-                s.displacement.len(),
-                s.velocity.len(),
-                s.stiffness.len(),
-                s.cut_samples.len(),
-                s.contact.len(),
-                s.pairs.len(),
-                s.points.len(),
-            ]
-        };
-        sizes(self) == sizes(other)
-    }
-}
-
-/// Memory of one contact node.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct ContactState {
-    pub stick: DVec3,
-    pub overlap: f64,
-    pub axial_on: f64,
-    pub touching: bool,
-    /// True while it is pressed by the full shaft.
-    pub on_shaft: bool,
-    /// On a free path: distance r0 from the axis where the tip passed [m], and whether it has.
-    pub rest_radius: f64,
-    pub passed: bool,
-    /// Held by its springs at the last step [J].
-    pub stored: f64,
-    /// Force of the contact damping at the last step [N].
-    pub damping: DVec3,
-}
-
-impl ContactState {
-    /// Takes the damping force of a step; dissipated in the last step of `dt` [J], in which the node moved with `v` past the tool: its
-    /// mean force times the way. Forces belong to the beginnings of steps, velocities to their middles.
-    pub fn damped(&mut self, force: DVec3, v: DVec3, dt: f64) -> f64 {
-        let before = std::mem::replace(&mut self.damping, force);
-        -0.5 * dt * (before + force).dot(v)
-    }
-}
-
-/// What an engine tells about itself.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct EngineInfo {
-    /// `gpu` or `cpu`.
-    pub engine: String,
-    pub adapter: String,
-    pub driver: String,
-    /// Bytes of all buffers on the device (or of the arrays of the CPU engine).
-    pub device_bytes: u64,
-    /// True for a software adapter.
-    pub software: bool,
-}
-
-/// A solver that can advance a model. Frames are started in order; results come in the same order, possibly a
-/// frame or two later.
-pub trait Engine: Send {
-    fn info(&self) -> &EngineInfo;
-    /// The engine on a device, for those who draw from its buffers.
-    fn on_device(&self) -> Option<&GpuEngine> {
-        None
-    }
-    /// Starts one frame. Returns as soon as the work is submitted.
-    fn start_frame(&mut self, plan: &FramePlan) -> Result<()>;
-    /// The next finished frame. With `wait`, blocks until one is there; `None` when none is under way (or
-    /// finished, without `wait`).
-    fn collect(&mut self, wait: bool) -> Result<Option<FrameSums>>;
-    /// Takes the constants of `model`, which has the mesh and the effects of the present one, and steps of `dt` [s], `steps` of them in
-    /// a frame; the state stays. Call it between frames. False where other buffers or kernels would be needed; nothing has changed then.
-    fn retune(&mut self, model: Arc<Model>, dt: f64, steps: usize) -> Result<bool>;
-    /// The present state (waits for all frames under way).
-    fn read_state(&mut self) -> Result<State>;
-    /// Replaces the state, for tests, resumed runs and bisecting.
-    fn write_state(&mut self, state: &State) -> Result<()>;
-    /// Everything between two frames, exactly (waits for all frames under way).
-    fn save(&mut self) -> Result<EngineImage>;
-    /// Goes back to an image of the same model and time step.
-    ///
-    /// # Errors
-    /// `Error::Input` where the image is that of another engine or model.
-    fn restore(&mut self, image: &EngineImage) -> Result<()>;
-    /// Loses the device, as when a driver resets it, to see what follows: every later call fails with `Error::Device`. Nothing on
-    /// an engine without one.
-    fn lose_device(&mut self) {}
-    /// Internal nodal forces of the present displacement, `f_int` [N] (the tissue pushes the node with -f_int).
-    fn internal_forces(&mut self) -> Result<Vec<DVec3>>;
 }

@@ -1,9 +1,10 @@
 //! A cure is tried before it is named: the run again from an image, with a shorter step or another number of the scene.
 
+use super::Simulation;
 use super::checkpoint::Checkpoint;
-use super::simulation::Simulation;
 use crate::error::Result;
-use crate::scene::{Scene, Tool};
+use crate::needle::Tool;
+use crate::scene::Scene;
 
 /// What may cure a run.
 #[derive(Debug, Clone, PartialEq)]

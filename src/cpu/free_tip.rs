@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::CpuEngine;
 use crate::effects::puncture::{advance_limit, share_beyond};
+use crate::engine::elements::CORNERS;
 use crate::material::kinematics::cofactor;
 use crate::mesh::BlockMesh;
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
@@ -11,7 +12,6 @@ use crate::needle::ToolPose;
 use crate::needle::free_path::{
     FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SLACK, SLIP_CAP, SOFTENING_RATE, TURNING, anchor_offset,
 };
-use crate::solver::elements::CORNERS;
 
 /// A material point in the deformed mesh.
 struct MaterialPlace {

@@ -4,12 +4,12 @@ use glam::DVec3;
 
 use super::slit_contact::SlitContact;
 use super::{ContactSums, CpuEngine};
+use crate::engine::{ContactState, State};
 use crate::model::{ANCHOR_COUNT, ContactSurface, PuncturePlan};
 use crate::needle::centre_line::Bend;
 use crate::needle::free_path::{END_FADE, FreeTip, PASSED_MARGIN, WATCHED, faded_at_end};
 use crate::needle::gap::{Overlap, Profile};
 use crate::needle::{ToolPose, swing};
-use crate::solver::engine::{ContactState, State};
 
 impl CpuEngine {
     /// Stage `needle_contact`: nodes of the ring that the tip has passed stay outside the opened path (potential

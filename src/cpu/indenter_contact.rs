@@ -4,11 +4,10 @@ use glam::DVec3;
 
 use super::{ContactSums, CpuEngine};
 use crate::effects::indentation::{Plan, penetration};
+use crate::engine::State;
 use crate::model::{ContactNode, Model};
-use crate::needle::ToolPose;
 use crate::needle::slit::{POINTS, weights};
-use crate::scene::Tool;
-use crate::solver::engine::State;
+use crate::needle::{Tool, ToolPose};
 
 impl CpuEngine {
     /// Stage `indenter_contact`: penalty contact of the top face with a sphere or a flat punch.

@@ -1,17 +1,9 @@
-//! A simulation between two frames, exactly: a run that goes on from it gives the same numbers bit for bit on the same
-//! adapter.
-
-use std::collections::VecDeque;
+//! What an engine holds between two frames, exactly.
 
 use serde::{Deserialize, Serialize};
 
-use super::clock::Clock;
-use super::engine::State;
-use super::stiffening::DueStep;
+use super::state::State;
 use crate::error::Error;
-use crate::needle::flexible::NeedleImage;
-use crate::observables::Recorder;
-use crate::verdict::Judge;
 
 /// What an engine holds between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,24 +12,6 @@ pub enum EngineImage {
     Gpu { buffers: Vec<(String, Vec<u8>)>, gravity_work: f64 },
     /// The state, and the plastic and damage dissipation that earlier frames have told [J].
     Cpu { state: Box<State>, booked: (f64, f64) },
-}
-
-/// What a simulation holds between two frames.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Checkpoint {
-    /// Frames that were collected, and steps before the next one.
-    pub frames: u64,
-    pub steps: u64,
-    /// Steps of the frames, and more of them that are due.
-    pub(super) clock: Clock,
-    pub(super) due_steps: VecDeque<DueStep>,
-    pub(super) stiffening_told: bool,
-    pub engine: EngineImage,
-    pub(super) recorder: Recorder,
-    pub(super) needle: Option<NeedleImage>,
-    pub(super) judge: Judge,
-    pub(super) unbalanced_frames: u64,
-    pub(super) buckling_told: bool,
 }
 
 impl EngineImage {

@@ -1,15 +1,15 @@
 //! The step follows the stiffness of the state: cells that are stretched or squeezed, and contact, are stiffer than at rest.
 //!
-//! Every engine tells the largest `k dt^2 / (4 m)` of its nodes near the limit 1 ([`super::engine::FrameSums::step_ratio`]). With
+//! Every engine tells the largest `k dt^2 / (4 m)` of its nodes near the limit 1 ([`crate::engine::FrameSums::step_ratio`]). With
 //! mass scaling the mass of a node is raised with its stiffness; without, or where that has reached its limit, later frames take
 //! more steps. A run never goes back to longer steps. A step that the scene writes itself stays as it is.
 
 use serde::{Deserialize, Serialize};
 
-use super::clock::Clock;
-use super::simulation::{AHEAD, Simulation};
+use super::flexible_needle::FlexibleNeedle;
+use super::{AHEAD, LONGEST_LED, RunEngine, Simulation};
+use crate::engine::clock::Clock;
 use crate::error::Result;
-use crate::needle::flexible::FlexibleNeedle;
 use crate::observables::FrameRecord;
 use crate::scene::MOST_STEPS_PER_FRAME;
 
@@ -75,7 +75,7 @@ impl Simulation {
         let steps = clock.steps_per_frame as usize;
         if clock.dt != self.clock.dt && !self.engine.retune(self.model.clone(), clock.dt, steps)? {
             let state = self.engine.read_state()?;
-            let mut engine = super::change::engine(
+            let mut engine = RunEngine::new(
                 &self.model,
                 self.device(),
                 clock.dt,
@@ -86,7 +86,7 @@ impl Simulation {
             self.engine = engine;
         }
         let end = match self.purpose.led {
-            true => super::simulation::LONGEST_LED,
+            true => LONGEST_LED,
             false => self.model.duration(),
         };
         self.clock = clock;

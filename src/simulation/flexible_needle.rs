@@ -3,14 +3,15 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::beam::{Beam, HubPose, Loads, NodeSpring, TimeRule};
-use super::centre_line::{CentreLine, ENTRY_COUNT};
-use super::{Kinematics, ToolPose};
+use super::Simulation;
 use crate::effects::flexible_needle::Params;
+use crate::engine::{FramePlan, FrameSums};
 use crate::material_point::Material;
 use crate::model::Model;
-use crate::observables::NeedleRecord;
-use crate::solver::engine::{FramePlan, FrameSums};
+use crate::needle::beam::{Beam, HubPose, Loads, NodeSpring, TimeRule};
+use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
+use crate::needle::{Kinematics, ToolPose};
+use crate::observables::{FrameRecord, NeedleRecord};
 
 /// How far the table reaches beyond the deepest point [m].
 const BEYOND: f64 = 5e-3;
@@ -343,4 +344,44 @@ fn ring_stiffness(shear_modulus: f64, radius: f64, outer: f64) -> f64 {
     let ratio = (outer / radius).max(2.0);
     let square = ratio * ratio;
     4.0 * std::f64::consts::PI * shear_modulus / (ratio.ln() - (square - 1.0) / (square + 1.0))
+}
+
+impl Simulation {
+    /// The beam's answer to the loads of the frame that was collected last.
+    pub(super) fn answer_of_the_needle(&mut self, sums: &mut FrameSums) -> NeedleRecord {
+        let (clock, dt, last) = (&self.clock, self.clock.dt, self.total_steps.max(1));
+        let end = |frame: u64| clock.time_of(clock.first_step(frame + 1).min(last));
+        let next = (self.collected < self.frames)
+            .then(|| (end(self.collected), end(self.collected) - clock.time_of(clock.first_step(self.collected))));
+        let broken = sums.not_finite || !sums.needle_loads.iter().all(|l| l.is_finite());
+        match (&mut self.needle, &self.kinematics) {
+            // Loads of a broken state mean nothing; the run stops right after.
+            (Some(needle), Some(tool)) if !broken => needle.answer(tool, sums, f64::from(sums.steps) * dt, next),
+            _ => NeedleRecord::default(),
+        }
+    }
+
+    /// Notices about a needle that has buckled or whose beam was not in balance.
+    pub(super) fn tell_of_the_needle(&mut self, record: &FrameRecord) {
+        let bent = &record.needle;
+        if bent.buckled && !self.buckling_told {
+            self.buckling_told = true;
+            self.notices.push(format!(
+                "the needle buckles at a depth of {:.2} mm: {:.3} N of compression, {:.2} mm from its axis, its tip {:.2} mm behind; take a thicker or stiffer needle or a shorter flexible_needle.free_length_mm",
+                record.depth * 1e3,
+                bent.compression,
+                bent.largest_offset * 1e3,
+                bent.retreat * 1e3
+            ));
+        }
+        if bent.unbalanced {
+            self.unbalanced_frames += 1;
+            if self.unbalanced_frames == 1 {
+                self.notices.push(format!(
+                    "the flexible needle did not find its balance at {:.4} s; its shape there is the best one found",
+                    record.time
+                ));
+            }
+        }
+    }
 }

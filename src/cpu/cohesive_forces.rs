@@ -3,11 +3,9 @@
 use glam::DVec3;
 
 use super::CpuEngine;
+use crate::effects::cohesive::TORN_REACH;
 use crate::needle::ToolPose;
 use crate::separation::FacePair;
-
-/// Overlap and slip of torn faces, in cells, beyond which they do not touch any more.
-pub const TORN_REACH: f64 = 0.3;
 
 impl CpuEngine {
     /// Traction of every pair on its two copies, damage by opening, by the tip and by the shaft.

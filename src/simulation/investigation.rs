@@ -2,9 +2,10 @@
 
 use glam::DVec3;
 
+use super::Simulation;
 use super::checkpoint::Checkpoint;
-use super::engine::{FramePlan, State};
-use super::simulation::Simulation;
+use super::fields::snapshot;
+use crate::engine::{FramePlan, State};
 use crate::error::Result;
 use crate::model::Model;
 use crate::observables::{FieldSnapshot, FrameRecord};
@@ -126,8 +127,7 @@ impl Simulation {
         let at = steps.last().copied().unwrap_or_default();
         let record = FrameRecord { frame, step: at.step, time: at.time, ..Default::default() };
         let line = self.needle.as_ref().map(|needle| needle.centre_line());
-        let mut fields =
-            super::simulation::snapshot(&self.model, self.kinematics.as_ref(), &record, state.clone(), line);
+        let mut fields = snapshot(&self.model, self.kinematics.as_ref(), &record, state.clone(), line);
         fields.depth = self.kinematics.as_ref().map_or(0.0, |k| k.pose(at.time).depth);
         Ok(locate(&self.model, &state, fields, steps, sign, frame))
     }

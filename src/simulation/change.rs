@@ -7,18 +7,20 @@
 
 use std::sync::Arc;
 
-use super::engine::{ContactState, Engine, FramePlan, FrameSums, State, StepInput};
-use super::simulation::{Purpose, Simulation, choose_step};
-use super::stable_dt::wave_speed_bound;
+use super::flexible_needle::FlexibleNeedle;
+use super::start::{choose_step, sizes, too_many_steps};
+use super::{LONGEST_LED, Purpose, RunEngine, Simulation};
+use crate::cpu::CpuEngine;
+use crate::engine::clock::Clock;
+use crate::engine::stable_dt::wave_speed_bound;
+use crate::engine::{ContactState, Engine, FramePlan, FrameSums, State, StepInput};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuEngine};
 use crate::material::Verdict;
 use crate::material_point::PointState;
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::needle::flexible::FlexibleNeedle;
 use crate::scene::{MOST_STEPS_PER_FRAME, Scene};
-use crate::solver::cpu::CpuEngine;
 
 /// A step is kept while it is at most so much shorter than the one that a scene would get.
 const KEPT_STEP: f64 = 1.25;
@@ -54,9 +56,9 @@ impl Change {
     ///
     /// # Errors
     /// As [`GpuEngine::new`].
-    pub fn engine(&self) -> Result<Box<dyn Engine>> {
+    pub fn engine(&self) -> Result<RunEngine> {
         let most_steps = self.purpose.most_steps(self.steps_per_frame);
-        engine(&self.model, self.device.as_ref(), self.dt, most_steps, self.purpose.drawn)
+        RunEngine::new(&self.model, self.device.as_ref(), self.dt, most_steps, self.purpose.drawn)
     }
 
     fn gpu_engine(&self, gpu: &Gpu) -> Result<GpuEngine> {
@@ -85,20 +87,6 @@ impl Change {
     }
 }
 
-/// An engine for this model on this device, without one the CPU engine.
-pub(super) fn engine(
-    model: &Arc<Model>,
-    device: Option<&Gpu>,
-    dt: f64,
-    most_steps: usize,
-    drawn: bool,
-) -> Result<Box<dyn Engine>> {
-    Ok(match device {
-        Some(gpu) => Box::new(GpuEngine::for_purpose(model.clone(), gpu.clone(), dt, most_steps, drawn)?),
-        None => Box::new(CpuEngine::new(model.clone(), dt)),
-    })
-}
-
 impl Simulation {
     /// Thinks a changed scene through; nothing has changed yet.
     ///
@@ -123,7 +111,7 @@ impl Simulation {
         let stable_dt = wave_speed_bound(&model);
         let (mut dt, mut steps_per_frame) = choose_step(&model, stable_dt);
         if steps_per_frame > MOST_STEPS_PER_FRAME {
-            return Err(super::simulation::too_many_steps(&model.scene, stable_dt, steps_per_frame));
+            return Err(too_many_steps(&model.scene, stable_dt, steps_per_frame));
         }
         let same_frames = model.scene.solver.frame_rate == now.solver.frame_rate;
         if same_frames && model.scene.solver.time_step.is_none() && self.dt() <= dt && dt <= KEPT_STEP * self.dt() {
@@ -160,7 +148,7 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Simulation::retune`].
-    pub fn adopt(&mut self, change: &Change, mut engine: Box<dyn Engine>) -> Result<()> {
+    pub fn adopt(&mut self, change: &Change, mut engine: RunEngine) -> Result<()> {
         self.between_frames()?;
         let before = self.measured()?;
         let state = self.engine.read_state()?;
@@ -195,16 +183,16 @@ impl Simulation {
     fn adopted(&mut self, change: &Change, before: Option<FrameSums>) -> Result<()> {
         if (change.dt, change.steps_per_frame) != (self.clock.dt, self.clock.steps_per_frame) {
             self.clock = match self.collected {
-                0 => super::clock::Clock::new(change.dt, change.steps_per_frame),
+                0 => Clock::new(change.dt, change.steps_per_frame),
                 frame => self.clock.changed(frame, change.dt, change.steps_per_frame),
             };
         }
         self.stable_dt = change.stable_dt;
         self.model = change.model.clone();
-        self.judge.change(super::simulation::sizes(&self.model));
+        self.judge.change(sizes(&self.model));
         self.due_steps.clear();
         let end = match self.purpose.led {
-            true => super::simulation::LONGEST_LED,
+            true => LONGEST_LED,
             false => self.model.duration(),
         };
         self.total_steps = self.clock.steps_until(end);

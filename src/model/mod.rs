@@ -1,0 +1,293 @@
+//! What is constant during a run: mesh, masses, loads, and what the chosen effects prepare once, one file for each of them.
+
+mod contact;
+mod free_path;
+mod indentation;
+mod puncture;
+mod slit;
+
+use glam::DVec3;
+
+pub use contact::{ContactNode, ContactSurface};
+pub use free_path::FreePlan;
+pub use puncture::{
+    ANCHOR_COUNT, LARGEST_ANCHOR_COUNT, LARGEST_SEGMENT_COUNT, PathCell, PathSegment, PuncturePlan, TipAnchor,
+};
+
+use crate::effects::{EffectSet, TissueMaterial, cohesive};
+use crate::material_point::Material;
+use crate::mesh::{Mesh, TissuePoint};
+use crate::needle::{Kinematics, PlannedPath};
+use crate::scene::{Face, FaceCondition, RegionShape, Scene};
+use crate::separation::Separation;
+
+/// Most materials of one scene; the last index is that of the last region.
+pub const LARGEST_MATERIAL_COUNT: usize = 16;
+
+/// Largest way of a node in one step, part of the smallest edge. With 0.05 tissue that snaps off a needle loses twice the energy
+/// (`free_hand/reinsertion.toml` in its usual step: 8.5 against 3.7 %); with 0.25 squeezed cells outrun the masses that are raised for
+/// them, and a block that is let go from 0.4 of its height triples its energy.
+const SPEED_PER_STEP: f64 = 0.1;
+
+/// Everything constant.
+#[derive(Debug, Clone)]
+pub struct Model {
+    pub scene: Scene,
+    pub mesh: Mesh,
+    /// Materials with the effects that are on: the scene's own, then one per region.
+    pub materials: Vec<Material>,
+    /// Index into `materials` per cell; empty where there is one material only.
+    pub cell_material: Vec<u8>,
+    /// Per node: bits 0..2 held or driven components x, y, z; bits 3..8 the faces that it lies on.
+    pub node_flags: Vec<u32>,
+    pub effects: EffectSet,
+    pub kinematics: Option<Kinematics>,
+    /// Nodal mass including the uniform mass scaling [kg].
+    pub node_mass: Vec<f64>,
+    /// Nodal dead load at full ramp [N]; empty without tractions.
+    pub node_load: Vec<DVec3>,
+    /// Time over which the loads grow [s].
+    pub load_ramp: f64,
+    pub puncture: Option<PuncturePlan>,
+    pub indentation: Option<crate::effects::indentation::Plan>,
+    /// Faces that may separate, and copies that are tied.
+    pub separation: Separation,
+    /// Their law; `None` without the effect.
+    pub cohesion: Option<cohesive::Law>,
+    /// Nodes that a tool may touch, ascending in the node index; empty without contact.
+    pub contact_nodes: Vec<ContactNode>,
+    /// Where the targets of the scene lie in the block.
+    pub targets: Vec<TissuePoint>,
+}
+
+impl Model {
+    /// Prepares a scene. The mesh is built from the scene by `BlockMesh::for_scene`.
+    pub fn new(scene: Scene, mesh: impl Into<Mesh>) -> Self {
+        let mesh = mesh.into();
+        let scaling = scene.effects.mass_scaling.map_or(1.0, |m| m.factor);
+        let materials: Vec<Material> = std::iter::once(&scene.material)
+            .chain(scene.regions.iter().map(|r| &r.material))
+            .map(|m| constants(m, &scene.effects))
+            .collect();
+        let cell_material = if scene.regions.is_empty() { Vec::new() } else { assign_materials(&scene, &mesh) };
+        let node_mass = nodal_masses(&mesh, &materials, &cell_material, scaling);
+        let (node_load, load_ramp) = nodal_loads(&scene, &mesh);
+        let targets = mesh.as_block().map_or(Vec::new(), |block| {
+            scene.targets.iter().map(|target| TissuePoint::new(block, target.position)).collect()
+        });
+        let kinematics = (!scene.motion.phases.is_empty()).then(|| Kinematics::new(&scene.motion));
+        let mut model = Model {
+            effects: scene.effects.clone(),
+            node_flags: node_flags(&scene, &mesh),
+            materials,
+            cell_material,
+            node_mass,
+            node_load,
+            load_ramp,
+            kinematics,
+            puncture: None,
+            indentation: None,
+            separation: Separation::default(),
+            cohesion: None,
+            contact_nodes: Vec::new(),
+            targets,
+            scene,
+            mesh,
+        };
+        model.plan_separation();
+        model.plan_puncture();
+        model.plan_indentation();
+        model
+    }
+
+    /// Uniform mass scaling S.
+    pub fn mass_scaling(&self) -> f64 {
+        self.effects.mass_scaling.map_or(1.0, |m| m.factor)
+    }
+
+    /// Density including mass scaling [kg/m^3].
+    pub fn scaled_density(&self) -> f64 {
+        self.scene.material.density * self.mass_scaling()
+    }
+
+    /// P-wave speed at the scaled density [m/s].
+    pub fn scaled_wave_speed(&self) -> f64 {
+        (self.scene.material.law.p_wave_modulus() / self.scaled_density()).sqrt()
+    }
+
+    /// Index into `materials` of a cell.
+    pub fn material_index(&self, cell: usize) -> usize {
+        self.cell_material.get(cell).map_or(0, |m| usize::from(*m))
+    }
+
+    /// Material of a cell.
+    pub fn material(&self, cell: usize) -> &Material {
+        &self.materials[self.material_index(cell)]
+    }
+
+    /// True where cells remember something.
+    pub fn has_history(&self) -> bool {
+        self.effects.plasticity.is_some() || self.effects.viscoelastic.is_some()
+    }
+
+    /// Largest number of Prony terms of a material.
+    pub fn prony_term_count(&self) -> usize {
+        self.materials.iter().filter_map(|m| m.viscoelastic.as_ref()).map(|v| v.terms.len()).max().unwrap_or(0)
+    }
+
+    /// Largest nodal speed that is let through: a tenth of the smallest edge per step, of tetrahedra of the smallest
+    /// V^(1/3), so that one flat cell does not slow down the whole mesh [m/s].
+    pub fn speed_limit(&self, dt: f64) -> f64 {
+        let size = match &self.mesh {
+            Mesh::Block(_) => self.mesh.smallest_edge(),
+            Mesh::Tets(tets) => (0..tets.tets.len()).map(|t| tets.volume(t)).fold(f64::INFINITY, f64::min).cbrt(),
+        };
+        SPEED_PER_STEP * size / dt
+    }
+
+    /// The planned path, if the tool is a needle that cuts.
+    fn planned_path(&self) -> Option<PlannedPath> {
+        let motion = &self.scene.motion;
+        let cuts = self.effects.puncture.is_some() && self.scene.needle().is_some() && !self.scene.has_free_path();
+        cuts.then_some(PlannedPath { entry: motion.entry, direction: motion.direction })
+    }
+
+    /// True where the mesh follows the bore of a hollow needle.
+    pub fn has_bore(&self) -> bool {
+        self.mesh.as_block().is_some_and(|block| block.bore.is_some())
+    }
+
+    /// True where a node is held against a surface of this kind.
+    pub fn has_surface(&self, wanted: impl Fn(&ContactSurface) -> bool) -> bool {
+        self.contact_nodes.iter().any(|c| wanted(&c.surface))
+    }
+
+    /// Simulated length of the run [s].
+    pub fn duration(&self) -> f64 {
+        match &self.kinematics {
+            Some(k) => k.duration(),
+            None => self.scene.solver.duration.unwrap_or(0.0),
+        }
+    }
+
+    /// Conditions of the faces.
+    pub fn faces(&self) -> &[FaceCondition; 6] {
+        &self.scene.faces
+    }
+
+    /// Which displacement components of a node are held or driven by a face.
+    pub fn fixed_components(&self, node: usize) -> [bool; 3] {
+        std::array::from_fn(|a| self.node_flags[node] >> a & 1 == 1)
+    }
+
+    /// True where a node lies on a face of the bounding box.
+    pub fn lies_on(&self, node: usize, face: Face) -> bool {
+        self.node_flags[node] >> (3 + face as usize) & 1 == 1
+    }
+
+    /// True where a face moves by prescription.
+    pub fn has_driven_faces(&self) -> bool {
+        self.scene.faces.iter().any(|f| f.drive.is_some())
+    }
+
+    /// Centre of a face at rest [m].
+    pub fn face_centre(&self, face: Face) -> DVec3 {
+        let (low, high) = self.mesh.bounds();
+        let mut centre = 0.5 * (low + high);
+        centre[face.axis()] = if face.is_max() { high } else { low }[face.axis()];
+        centre
+    }
+}
+
+/// A material with the effects that are on; what it does not state itself comes from the scene's tables.
+fn constants(material: &TissueMaterial, effects: &EffectSet) -> Material {
+    Material {
+        law: material.law,
+        density: material.density,
+        plasticity: effects.plasticity.map(|p| material.plasticity.unwrap_or(p)),
+        fibres: effects.fibres.map(|p| material.fibres.unwrap_or(p)),
+        viscoelastic: effects.viscoelastic.clone().map(|p| material.viscoelastic.clone().unwrap_or(p)),
+        damage: effects.damage.map(|p| material.damage.unwrap_or(p)),
+    }
+}
+
+/// Material of every cell: the last region that holds its centre, else the scene's own.
+fn assign_materials(scene: &Scene, mesh: &Mesh) -> Vec<u8> {
+    let holds = |shape: &RegionShape, cell: usize| match (shape, mesh) {
+        (RegionShape::MeshTag(name), Mesh::Tets(tets)) => tets.regions[tets.tags[cell] as usize] == *name,
+        _ => shape.contains(mesh.cell_centre(cell)),
+    };
+    (0..mesh.cell_count())
+        .map(|cell| scene.regions.iter().rposition(|r| holds(&r.shape, cell)).map_or(0, |i| i as u8 + 1))
+        .collect()
+}
+
+/// Lumped masses [kg].
+fn nodal_masses(mesh: &Mesh, materials: &[Material], cell_material: &[u8], scaling: f64) -> Vec<f64> {
+    let mut mass = vec![0.0; mesh.node_count()];
+    for cell in 0..mesh.cell_count() {
+        let density = materials[cell_material.get(cell).map_or(0, |m| usize::from(*m))].density * scaling;
+        let nodes = mesh.cell_nodes(cell);
+        let share = density * mesh.cell_volume(cell) / nodes.len() as f64;
+        for node in nodes.iter() {
+            mass[*node] += share;
+        }
+    }
+    mass
+}
+
+/// Held components and faces of every node. A node of a tetrahedral mesh lies on a face where it lies on the bounding
+/// box, within a millionth of its diagonal.
+fn node_flags(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
+    let (low, high) = mesh.bounds();
+    let near = 1e-6 * (high - low).length();
+    let fixed_bits = |fixed: [bool; 3]| (0..3).map(|a| u32::from(fixed[a]) << a).sum::<u32>();
+    let mut flags: Vec<u32> = (0..mesh.node_count())
+        .map(|node| {
+            let x = mesh.rest_position(node);
+            let on = |face: &Face| {
+                let plane = if face.is_max() { high } else { low }[face.axis()];
+                (x[face.axis()] - plane).abs() <= near
+            };
+            Face::ALL
+                .into_iter()
+                .filter(on)
+                .fold(0, |flags, face| flags | 1 << (3 + face as usize) | fixed_bits(scene.faces[face as usize].fixed))
+        })
+        .collect();
+    if let Mesh::Tets(tets) = mesh {
+        for support in &scene.supports {
+            for node in tets.node_sets.get(&support.set).into_iter().flatten() {
+                flags[*node as usize] |= fixed_bits(support.fixed);
+            }
+        }
+    }
+    flags
+}
+
+/// Nodal forces of all face tractions at full ramp [N], and the ramp time [s].
+fn nodal_loads(scene: &Scene, mesh: &Mesh) -> (Vec<DVec3>, f64) {
+    let Some(mesh) = mesh.as_block() else { return (Vec::new(), 0.0) };
+    let loaded: Vec<Face> = Face::ALL.into_iter().filter(|&f| scene.faces[f as usize].traction.is_some()).collect();
+    if loaded.is_empty() {
+        return (Vec::new(), 0.0);
+    }
+    let mut load = vec![DVec3::ZERO; mesh.node_count()];
+    let mut ramp: f64 = 0.0;
+    for face in loaded {
+        let condition = &scene.faces[face as usize];
+        let traction = condition.traction.unwrap_or_default();
+        ramp = ramp.max(condition.traction_ramp);
+        let axis = face.axis();
+        let plane = if face.is_max() { mesh.nodes()[axis] - 1 } else { 0 };
+        let lines = &mesh.lines[axis];
+        let half =
+            0.5 * if face.is_max() { lines[lines.len() - 1] - lines[lines.len() - 2] } else { lines[1] - lines[0] };
+        for (node, force) in load.iter_mut().enumerate() {
+            if mesh.node_coordinates(node)[axis] == plane {
+                *force += traction * (mesh.node_volume(node) / half);
+            }
+        }
+    }
+    (load, ramp)
+}

@@ -1,0 +1,325 @@
+//! What the effect `puncture` prepares: the planned path, its tip forces, tip springs, cells and contact.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::{ContactNode, ContactSurface, FreePlan, Model};
+use crate::effects::puncture;
+use crate::effects::puncture::Cutting;
+use crate::mesh::{BlockMesh, Bore};
+use crate::needle::gap::Profile;
+use crate::needle::slit::REFERENCE_EDGE;
+use crate::needle::{NeedleShape, PlannedPath, Tool, lateral_axes};
+use crate::scene::Scene;
+
+/// Most stretches of one path.
+pub const LARGEST_SEGMENT_COUNT: usize = 16;
+
+/// Number of tip springs of a solid needle on a path without a slit: one on the axis, 6 at R/2, 12 at R.
+pub const ANCHOR_COUNT: usize = 19;
+
+/// Most tip springs: those of a cutting ring.
+pub const LARGEST_ANCHOR_COUNT: usize = 24;
+
+/// Distance of the tip springs of a cutting ring from its edge, on either side [m].
+const CUTTING_RING: f64 = 0.2e-3;
+
+/// A cell that the opened path passes through.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathCell {
+    pub cell: u32,
+    /// Part of the stiffness that is left once the tip has passed, from the fraction phi of the volume within a0 of the axis.
+    pub left: f64,
+    /// Smallest and largest s0 of that part [m].
+    pub axial_start: f64,
+    pub axial_end: f64,
+}
+
+/// A material line parallel to the path, on which one tip spring is anchored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TipAnchor {
+    /// Point where the line enters the top face [m].
+    pub surface: DVec3,
+    /// Axial coordinate of that point relative to the entry point [m]; 0 for a perpendicular entry.
+    pub axial_offset: f64,
+}
+
+/// A stretch of the path through one material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathSegment {
+    /// Material coordinate at which it begins [m].
+    pub start: f64,
+    pub cutting: Cutting,
+    /// Length over which the threshold falls from F_pun to F_cut [m].
+    pub transition_length: f64,
+    /// A layer with a puncture energy of its own.
+    pub membrane: bool,
+}
+
+/// What the effect `puncture` prepares.
+#[derive(Debug, Clone)]
+pub struct PuncturePlan {
+    /// At least one, ascending.
+    pub segments: Vec<PathSegment>,
+    pub params: puncture::Params,
+    pub needle: NeedleShape,
+    /// Its outer surface in the frame of the tip.
+    pub profile: Profile,
+    pub path: PlannedPath,
+    pub anchors: Vec<TipAnchor>,
+    /// Material coordinate at which the path leaves the block through the bottom [m].
+    pub exit: f64,
+    pub cells: Vec<PathCell>,
+    /// Contact stiffness k of a face that separates [N/m].
+    pub contact_stiffness: f64,
+    /// Contact stiffness of the ring around the opened path, per rest volume [N/m^4].
+    pub ring_stiffness_per_volume: f64,
+    /// Time constant of the damping at the points of a slit: damping over stiffness [s].
+    pub face_damping: f64,
+    /// The path is not planned but found while the tip moves.
+    pub free: Option<FreePlan>,
+}
+
+impl PuncturePlan {
+    /// Contact stiffness per area at the points of a slit, kappa [Pa/m].
+    pub fn face_stiffness(&self) -> f64 {
+        self.contact_stiffness / REFERENCE_EDGE.powi(2)
+    }
+
+    /// Contact stiffness of a node in the ring around the opened path, of full weight where `weight` is 1 [N/m].
+    pub fn ring_stiffness(&self, contact: &ContactNode, weight: f64) -> f64 {
+        self.ring_stiffness_per_volume * contact.share * weight
+    }
+
+    /// Tip force at which the tip advances at the coordinate a [N]: from F_pun of the material that it enters down to
+    /// F_cut over the transition length; over the last transition length before the bottom it fades to nothing, since a spring
+    /// that ended at once would throw the tissue back.
+    pub fn threshold(&self, a: f64) -> f64 {
+        let PathSegment { start, cutting, transition_length, .. } = self.segment(a);
+        let entry = (1.0 - (a - start) / transition_length).max(0.0);
+        let left = ((self.exit - a) / self.params.transition_length).clamp(0.0, 1.0);
+        (cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * entry) * left
+    }
+
+    /// The stretch of the path at the coordinate a [m].
+    pub fn segment(&self, a: f64) -> PathSegment {
+        self.segments[self.segments.partition_point(|s| s.start <= a).max(1) - 1]
+    }
+}
+
+impl Model {
+    /// Stiffness of a penalty contact at a node of a separated face, `factor (K + 4/3 mu) l^2 / h` with the
+    /// reference length l = 0.6 mm [N/m]: a finer mesh penetrates less.
+    pub(super) fn contact_stiffness(&self, factor: f64) -> f64 {
+        let h = self.scene.tissue.cell_size;
+        factor * self.scene.material.law.p_wave_modulus() * REFERENCE_EDGE * REFERENCE_EDGE / h
+    }
+
+    /// Contact stiffness of the ring around an opened path per rest volume, `factor (K + 4/3 mu) / l^2`, the same on every
+    /// mesh [N/m^4].
+    pub(super) fn ring_stiffness_per_volume(&self, factor: f64) -> f64 {
+        factor * self.scene.material.law.p_wave_modulus() / (REFERENCE_EDGE * REFERENCE_EDGE)
+    }
+
+    pub(super) fn plan_puncture(&mut self) {
+        let (Some(params), Some(Tool::Needle(needle))) = (self.effects.puncture, &self.scene.tool) else {
+            return;
+        };
+        let needle = needle.clone();
+        if self.scene.has_free_path() {
+            self.plan_free_path(params, needle);
+            return;
+        }
+        let path = PlannedPath { entry: self.scene.motion.entry, direction: self.scene.motion.direction };
+        let deepest = self.scene.motion.deepest();
+        let Some(mesh) = self.mesh.as_block() else { return };
+        // Faces that separate need no softened path; the core of a hollow needle is severed cell by cell.
+        let cells = match (&self.cohesion, mesh.bore) {
+            (Some(_), Some(bore)) => core_cells(mesh, &bore, deepest),
+            (Some(_), None) => Vec::new(),
+            (None, _) => path_cells(mesh, &path, &params, deepest),
+        };
+        let exit = self.scene.tissue.size.z / -path.direction.z;
+        let surfaces = self.separated_surfaces(&path);
+        // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the needle radius.
+        let anchor_reach = needle.radius + self.scene.tissue.cell_size * 1.5;
+        let cohesive = self.cohesion.is_some();
+        self.contact_nodes = (0..mesh.node_count())
+            .filter_map(|node| {
+                let (r0, s0) = path.material_coordinates(mesh.rest_position(node));
+                let surface = surfaces.get(&(node as u32)).copied().unwrap_or(ContactSurface::OpenedPath);
+                let in_ring = params.ring_weight(r0) > 0.0;
+                let on_slit = matches!(surface, ContactSurface::Slit { .. });
+                let on_face = surface != ContactSurface::OpenedPath;
+                let pushed = on_slit || s0 < deepest && if cohesive { on_face } else { in_ring };
+                let carries = r0 < anchor_reach && s0 < deepest + 2.0 * self.scene.tissue.cell_size;
+                let carrier = ContactNode::carrier(node, r0, s0, mesh.node_volume(node));
+                (pushed || carries).then_some(ContactNode { pushed, surface, ..carrier })
+            })
+            .collect();
+        self.join_slit_faces();
+        // As the nodes of a face would be damped, each with a half of the masses of its cells.
+        let h = self.scene.tissue.cell_size;
+        let contact_stiffness = self.contact_stiffness(params.contact_stiffness_factor);
+        let face_mass = 0.5 * self.scaled_density() * h.powi(3);
+        self.puncture = Some(PuncturePlan {
+            segments: path_segments(&self.scene, &params, &path, exit),
+            exit,
+            anchors: tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
+            cells,
+            contact_stiffness,
+            ring_stiffness_per_volume: self.ring_stiffness_per_volume(params.contact_stiffness_factor),
+            face_damping: 2.0 * params.contact_damping * (face_mass / contact_stiffness).sqrt(),
+            params,
+            profile: Profile::new(&needle, path.direction),
+            needle,
+            path,
+            free: None,
+        });
+    }
+
+    /// Largest part of the tip springs that one node can carry: where the anchors are in the first cells of the path.
+    pub fn largest_spring_share(&self) -> f64 {
+        let (Some(plan), Some(mesh)) = (&self.puncture, self.mesh.as_block()) else { return 0.0 };
+        let anchors = match plan.anchors.is_empty() {
+            true => tip_anchors(&plan.path, &plan.needle, false),
+            false => plan.anchors.clone(),
+        };
+        let h = self.scene.tissue.cell_size;
+        let mut largest: f64 = 0.0;
+        for part in 0..8 {
+            let mut shares: HashMap<usize, f64> = HashMap::new();
+            for anchor in &anchors {
+                let x = anchor.surface + plan.path.direction * (h * f64::from(part) / 4.0);
+                let ([i, j, k], at) = mesh.locate(x);
+                let weight = |corner: usize, a: usize| if corner >> a & 1 == 1 { at[a] } else { 1.0 - at[a] };
+                for corner in 0..8 {
+                    let node = mesh.node_index(i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2));
+                    let share: f64 = (0..3).map(|a| weight(corner, a)).product();
+                    *shares.entry(node).or_default() += share / anchors.len() as f64;
+                }
+            }
+            largest = shares.values().fold(largest, |a, b| a.max(*b));
+        }
+        largest
+    }
+}
+
+/// Stretches of the path with their own tip forces, from the materials that its axis passes through on its way to the
+/// bottom at `exit` [m].
+fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, exit: f64) -> Vec<PathSegment> {
+    const STEP: f64 = 2.0e-5;
+    let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
+    let mut starts: Vec<(f64, Option<usize>)> = Vec::new();
+    for i in 0..(exit / STEP).ceil().max(1.0) as usize {
+        // The surface itself belongs to what lies under it.
+        let a = i as f64 * STEP;
+        let x = path.entry + path.direction * (a + 0.5 * STEP);
+        let region = scene.regions.iter().rposition(|r| r.shape.contains(x));
+        if starts.last().is_none_or(|(_, last)| *last != region) {
+            starts.push((a, region));
+        }
+    }
+    let ends = starts.iter().skip(1).map(|s| s.0).chain([exit]);
+    starts
+        .iter()
+        .zip(ends)
+        .take(LARGEST_SEGMENT_COUNT)
+        .map(|(&(start, region), end)| {
+            let material = region.map_or(&scene.material, |r| &scene.regions[r].material);
+            let mut cutting = material.cutting.unwrap_or(own);
+            let mut transition_length = params.transition_length;
+            if let Some(energy) = material.membrane_energy {
+                transition_length = transition_length.min(end - start);
+                cutting.puncture_force = cutting.cutting_force + 2.0 * energy / transition_length;
+            }
+            PathSegment { start, cutting, transition_length, membrane: material.membrane_energy.is_some() }
+        })
+        .collect()
+}
+
+/// Lines on which the tip springs are anchored: one on the axis, 6 at R/2, 12 at R. Before a slit none lies on its plane,
+/// where it would pull at one side; a cutting ring has 12 on either side of its edge.
+fn tip_anchors(path: &PlannedPath, needle: &NeedleShape, cohesive: bool) -> Vec<TipAnchor> {
+    let (e1, e2) = lateral_axes(path.direction);
+    let turn = if cohesive { std::f64::consts::TAU / 24.0 } else { 0.0 };
+    let ring = |count: usize, r: f64| {
+        (0..count).map(move |i| {
+            let angle = std::f64::consts::TAU * i as f64 / count as f64 + turn;
+            (e1 * angle.cos() + e2 * angle.sin()) * r
+        })
+    };
+    let radius = needle.radius;
+    let offsets: Vec<DVec3> = match needle.bore.filter(|_| cohesive) {
+        Some(bore) => ring(12, bore.edge - CUTTING_RING).chain(ring(12, bore.edge + CUTTING_RING)).collect(),
+        None => {
+            let centre = (!cohesive).then_some(DVec3::ZERO);
+            centre.into_iter().chain(ring(6, 0.5 * radius)).chain(ring(12, radius)).collect()
+        }
+    };
+    offsets
+        .into_iter()
+        .map(|o| {
+            // The line entry + o + t s meets z = 0 at s = -o.z / t.z.
+            let axial_offset = -o.z / path.direction.z;
+            TipAnchor { surface: path.entry + o + path.direction * axial_offset, axial_offset }
+        })
+        .collect()
+}
+
+/// Cells that lie partly within a0 of the path, with the volume fraction found from 10^3 sample points.
+fn path_cells(mesh: &BlockMesh, path: &PlannedPath, params: &puncture::Params, deepest: f64) -> Vec<PathCell> {
+    const SAMPLES: usize = 10;
+    let radius = params.softened_radius;
+    (0..mesh.cell_count())
+        .filter_map(|cell| {
+            let size = mesh.cell_size(cell);
+            let low = mesh.rest_position(mesh.cell_nodes(cell)[0]);
+            let (r_mid, s_mid) = path.material_coordinates(low + 0.5 * size);
+            let reach = 0.5 * size.length();
+            if r_mid > radius + reach || s_mid > deepest + reach {
+                return None;
+            }
+            let (mut inside, mut start, mut end) = (0usize, f64::INFINITY, f64::NEG_INFINITY);
+            for n in 0..SAMPLES.pow(3) {
+                let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
+                let at = DVec3::new(part(n % SAMPLES), part(n / SAMPLES % SAMPLES), part(n / SAMPLES.pow(2)));
+                let (r0, s0) = path.material_coordinates(low + at * size);
+                if r0 < radius {
+                    inside += 1;
+                    start = start.min(s0);
+                    end = end.max(s0);
+                }
+            }
+            (inside > 0 && start < deepest).then_some(PathCell {
+                cell: cell as u32,
+                left: params.stiffness_left(inside as f64 / SAMPLES.pow(3) as f64),
+                axial_start: start,
+                axial_end: end,
+            })
+        })
+        .collect()
+}
+
+/// Cells of the core that a hollow needle can cut out, with the range of s0 of their layer.
+fn core_cells(mesh: &BlockMesh, bore: &Bore, deepest: f64) -> Vec<PathCell> {
+    let ring = bore.radius * (1.0 + 1e-9);
+    (0..mesh.cell_count())
+        .filter(|cell| !mesh.is_gap(*cell))
+        .filter_map(|cell| {
+            let at = mesh.cell_coordinates(cell);
+            let inside = (0..2).all(|a| {
+                let from_axis = [mesh.lines[a][at[a]], mesh.lines[a][at[a] + 1]].map(|x| (x - bore.centre[a]).abs());
+                from_axis[0].max(from_axis[1]) <= ring
+            });
+            let (start, end) = (-mesh.lines[2][at[2] + 1], -mesh.lines[2][at[2]]);
+            (inside && start < deepest).then_some(PathCell {
+                cell: cell as u32,
+                left: 0.0,
+                axial_start: start,
+                axial_end: end,
+            })
+        })
+        .collect()
+}

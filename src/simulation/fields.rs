@@ -1,0 +1,96 @@
+//! Fields of the tissue at one moment, in f64.
+
+use glam::DMat3;
+
+use super::Simulation;
+use crate::engine::State;
+use crate::engine::elements::{CellShape, CellStates, Elements};
+use crate::error::Result;
+use crate::material::von_mises;
+use crate::material_point::PointState;
+use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::needle::centre_line::CentreLine;
+use crate::needle::{Kinematics, ToolPose};
+use crate::observables::{FieldSnapshot, FrameRecord, cells_in_needle};
+
+impl Simulation {
+    /// Fields of the present state; call it right after a frame registered with [`Simulation::stop_after`].
+    pub fn snapshot(&mut self, record: &FrameRecord) -> Result<FieldSnapshot> {
+        let state = self.engine.read_state()?;
+        let line = self.needle.as_ref().map(|needle| needle.centre_line());
+        Ok(snapshot(&self.model, self.kinematics.as_ref(), record, state, line))
+    }
+}
+
+/// H = F - I at the centre of every cell.
+pub(super) fn displacement_gradients(mesh: &Mesh, state: &State) -> Vec<DMat3> {
+    (0..mesh.cell_count())
+        .map(|cell| {
+            let shape = CellShape::new(mesh, cell);
+            shape.displacement_gradient(&shape.gather(&state.displacement))
+        })
+        .collect()
+}
+
+/// Stresses and Jacobians of a state, in f64; `line`: the centre-line of a bent needle then.
+pub fn snapshot(
+    model: &Model,
+    kinematics: Option<&Kinematics>,
+    record: &FrameRecord,
+    state: State,
+    line: Option<CentreLine>,
+) -> FieldSnapshot {
+    let elements = Elements::new(model);
+    let gradients = displacement_gradients(&model.mesh, &state);
+    let mut fields = FieldSnapshot {
+        frame: record.frame,
+        time: record.time,
+        depth: record.depth,
+        axial_force: record.force.axial,
+        centre_line: line,
+        ..Default::default()
+    };
+    let pose = kinematics.map(|k| {
+        let pose = k.pose(record.time);
+        // The tip of a bent needle stays behind.
+        ToolPose { tip: pose.tip - pose.direction * record.needle.retreat, ..pose }
+    });
+    fields.tool_pose = pose.map(|pose| (pose.tip, pose.direction));
+    let cuts = pose.filter(|_| model.puncture.is_some());
+    fields.cells_in_needle = cuts.map(|pose| cells_in_needle(model, &state, &pose, line.as_ref()));
+    let targets = model.scene.targets.iter().zip(&model.targets);
+    fields.targets = targets.map(|(target, point)| target.position + point.value(&state.displacement)).collect();
+    let states = CellStates { points: &state.points, stiffness: &state.stiffness };
+    let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
+    let fresh = PointState::default();
+    for (cell, h) in gradients.into_iter().enumerate() {
+        let f = DMat3::IDENTITY + h;
+        let j = f.determinant();
+        let material = model.material(cell);
+        let point = states.point(cell).unwrap_or(&fresh);
+        let damage = material.degradation(point, model.mesh.cell_volume(cell).cbrt());
+        let intact = states.remaining(cell) * (1.0 - damage);
+        let volumetric = averaged.as_ref().map_or_else(|| material.volumetric(h, intact), |a| a[cell]);
+        // An inverted cell has no Cauchy stress; its J tells.
+        let sigma = match j > 0.0 {
+            true => material.stress(h, volumetric, intact, point) * f.transpose() * (1.0 / j),
+            false => DMat3::ZERO,
+        };
+        fields.von_mises.push(von_mises(sigma));
+        fields.jacobian.push(j);
+        fields.pressure.push(-(sigma.x_axis.x + sigma.y_axis.y + sigma.z_axis.z) / 3.0);
+        if model.effects.plasticity.is_some() {
+            fields.plastic_strain.push(point.plastic.alpha);
+        }
+        if model.effects.damage.is_some() {
+            fields.damage.push(damage);
+        }
+    }
+    if !model.cell_material.is_empty() {
+        fields.material = model.cell_material.iter().map(|m| f64::from(*m)).collect();
+    }
+    fields.displacement = state.displacement;
+    fields.stiffness = state.stiffness;
+    fields
+}
