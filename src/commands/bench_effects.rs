@@ -18,6 +18,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::compose::{compose, compose_without_effects};
 use crate::gpu::engine::{Features, defines, stages};
+use crate::material::LAWS;
 use crate::model::Model;
 use crate::scene::{Motion, Phase, Scene, Tool};
 use crate::solver::simulation::EngineChoice;
@@ -160,7 +161,7 @@ fn cost(keys: &[&str], beside: &[&str], low: bool, gpu: Option<&Gpu>) -> Result<
 /// True where every bare stage is composed to the text that shaders without any effect would give.
 pub fn off_is_absent() -> Result<bool> {
     let none = EffectSet::default();
-    for laws in ["neo_hookean", "mooney_rivlin", "yeoh", "ogden", "demiray"] {
+    for law in &LAWS {
         let features = Features {
             loaded_faces: false,
             driven_faces: false,
@@ -170,7 +171,7 @@ pub fn off_is_absent() -> Result<bool> {
             free_path: false,
             drawn: true,
             tetrahedra: false,
-            laws: BTreeSet::from([laws]),
+            laws: BTreeSet::from([law.key]),
         };
         let defines = defines(&none, &features);
         for stage in stages(&none, &features) {

@@ -1,8 +1,7 @@
 //! What a wave finds: bound of the tangent for the stable step, verdicts against the acoustic tensor.
 
 use glam::{DMat3, DVec3};
-use nalgebra::{Matrix3, SymmetricEigen};
-use stylet::material::kinematics::cofactor;
+use stylet::material::kinematics::{cofactor, symmetric_eigen};
 use stylet::material::{ElasticLaw, Isochoric, Verdict};
 
 use crate::*;
@@ -24,9 +23,8 @@ fn acoustic_tensor(tangent: &[DMat3; 9], n: DVec3) -> DMat3 {
 }
 
 fn eigenvalues(q: DMat3) -> (f64, f64) {
-    let symmetric = (q + q.transpose()) * 0.5;
-    let values = SymmetricEigen::new(Matrix3::from_column_slice(&symmetric.to_cols_array())).eigenvalues;
-    (values.min(), values.max())
+    let (values, _) = symmetric_eigen((q + q.transpose()) * 0.5);
+    (values.into_iter().fold(f64::INFINITY, f64::min), values.into_iter().fold(f64::NEG_INFINITY, f64::max))
 }
 
 /// Directions spread over a hemisphere, the coordinate axes among them.
