@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::effects::parameter::Parameter;
 use crate::effects::{EFFECTS, Effect};
 use crate::engine::Stage;
-use crate::material::four_digits;
+use crate::material::{LAWS, Law, four_digits};
 use crate::observables::ForceParts;
 use crate::output::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, SAMPLE_TABLE, TARGET_TABLE};
 use crate::output::sample::SAMPLE_COLUMNS;
@@ -49,6 +49,7 @@ pub fn parts(root: &Path) -> Result<Vec<Part>> {
         Part::new("verdict.md", "bounds", bound_table()),
         Part::new("stages.md", "stages", stage_tables()),
         Part::new("files.md", "columns", columns()),
+        Part::new("laws.md", "laws", law_table()),
     ];
     for effect in &EFFECTS {
         let page = format!("effects/{}.md", effect.key);
@@ -91,6 +92,14 @@ fn effect_table() -> String {
         [key, effect.summary.into(), effect.source.into(), effect.cost.into()]
     };
     table(["effect", "what", "source", "cost"], EFFECTS.iter().map(row))
+}
+
+fn law_table() -> String {
+    let row = |law: &Law| {
+        let constants = law.constants.iter().map(|constant| code(constant.key)).collect::<Vec<_>>().join(", ");
+        [code(law.key), format!("`{}` [{}]", law.energy, law.source), constants, law.stable.into()]
+    };
+    table(["`law`", "`W_iso`", "constants in a scene", "stable for every deformation where"], LAWS.iter().map(row))
 }
 
 fn head(effect: &Effect) -> String {

@@ -1,5 +1,5 @@
 // Mooney-Rivlin law; constants x: c10, y: c01 [Pa]. Formulas in src/material/mooney_rivlin.rs.
-fn mooney_rivlin_slopes(c: vec4<f32>) -> Slopes {
+fn mooney_rivlin_slopes(c: vec4<f32>, i1: f32) -> Slopes {
     return Slopes(c.x, c.y, 0.0);
 }
 

@@ -1,4 +1,6 @@
 // The elastic law of a material: isochoric stress and energy. Formulas in src/material/mod.rs.
+// `#for law ... #end` repeats its lines for every law of the scene; `$law` is the stem of its files. A law of the invariants gives
+// `$law_slopes` and `$law_energy`, one of the principal stretches `$law_stress` and `$law_energy`.
 #import shared/kinematics
 
 struct Material {
@@ -9,7 +11,7 @@ struct Material {
     shear_modulus: f32,
     // Hourglass modulus kappa 3.11 mu0 [Pa].
     hourglass: f32,
-    // 0 neo-Hookean, 1 Mooney-Rivlin, 2 Yeoh, 3 Ogden, 4 Demiray.
+    // Place of the law in `material::LAWS`, `$number` below.
     law: u32,
 }
 
@@ -37,21 +39,9 @@ struct IsochoricStress {
     turned_tangent: f32,
 }
 
-#ifdef NEO_HOOKEAN
-#import materials/neo_hookean
-#endif
-#ifdef MOONEY_RIVLIN
-#import materials/mooney_rivlin
-#endif
-#ifdef YEOH
-#import materials/yeoh
-#endif
-#ifdef OGDEN
-#import materials/ogden
-#endif
-#ifdef DEMIRAY
-#import materials/demiray
-#endif
+#for law
+#import materials/$law
+#end
 
 fn material_of(cell: u32) -> u32 {
 #ifdef REGIONS
@@ -68,34 +58,16 @@ fn isochoric_slopes(material: Material, i1: f32) -> Slopes {
 #ifdef SEVERAL_LAWS
     var s = Slopes(0.0, 0.0, 0.0);
     switch material.law {
-#ifdef NEO_HOOKEAN
-        case 0u: { s = neo_hookean_slopes(c); }
-#endif
-#ifdef MOONEY_RIVLIN
-        case 1u: { s = mooney_rivlin_slopes(c); }
-#endif
-#ifdef YEOH
-        case 2u: { s = yeoh_slopes(c, i1); }
-#endif
-#ifdef DEMIRAY
-        case 4u: { s = demiray_slopes(c, i1); }
-#endif
+#for invariant law
+        case $number: { s = $law_slopes(c, i1); }
+#end
         default: {}
     }
     return s;
 #else
-#ifdef NEO_HOOKEAN
-    return neo_hookean_slopes(c);
-#endif
-#ifdef MOONEY_RIVLIN
-    return mooney_rivlin_slopes(c);
-#endif
-#ifdef YEOH
-    return yeoh_slopes(c, i1);
-#endif
-#ifdef DEMIRAY
-    return demiray_slopes(c, i1);
-#endif
+#for invariant law
+    return $law_slopes(c, i1);
+#end
 #endif
 }
 
@@ -225,14 +197,26 @@ fn invariant_stress(material: Material, H: mat3x3<f32>) -> IsochoricStress {
 fn isochoric_stress(material: Material, H: mat3x3<f32>) -> IsochoricStress {
 #ifdef INVARIANT_LAWS
     var out = invariant_stress(material, H);
-#ifdef OGDEN
-    if (material.law == 3u) {
-        out = ogden_stress(material.constants, H);
+#for stretch law
+    if (material.law == $number) {
+        out = $law_stress(material.constants, H);
     }
-#endif
+#end
     return out;
 #else
-    return ogden_stress(material.constants, H);
+#ifdef SEVERAL_LAWS
+    var out: IsochoricStress;
+#for stretch law
+    if (material.law == $number) {
+        out = $law_stress(material.constants, H);
+    }
+#end
+    return out;
+#else
+#for stretch law
+    return $law_stress(material.constants, H);
+#end
+#endif
 #endif
 }
 
@@ -260,21 +244,12 @@ fn isochoric_energy(material: Material, H: mat3x3<f32>) -> f32 {
         i1 = continued_measure(3.0 + i1_3, 1.0 + dj, false).value - 3.0;
         i2 = continued_measure(3.0 + i2_3, 1.0 + dj, true).value - 3.0;
     }
-#ifdef NEO_HOOKEAN
-    energy = select(energy, neo_hookean_energy(c, i1), material.law == 0u);
+#for invariant law
+    energy = select(energy, $law_energy(c, i1, i2), material.law == $number);
+#end
 #endif
-#ifdef MOONEY_RIVLIN
-    energy = select(energy, mooney_rivlin_energy(c, i1, i2), material.law == 1u);
-#endif
-#ifdef YEOH
-    energy = select(energy, yeoh_energy(c, i1), material.law == 2u);
-#endif
-#ifdef DEMIRAY
-    energy = select(energy, demiray_energy(c, i1), material.law == 4u);
-#endif
-#endif
-#ifdef OGDEN
-    energy = select(energy, ogden_energy(c, H, dj), material.law == 3u);
-#endif
+#for stretch law
+    energy = select(energy, $law_energy(c, H, dj), material.law == $number);
+#end
     return energy;
 }

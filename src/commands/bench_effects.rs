@@ -18,6 +18,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::compose::{compose, compose_without_effects};
 use crate::gpu::engine::{Features, defines, stages};
+use crate::material::LAWS;
 use crate::model::Model;
 use crate::needle::{Motion, Phase, Tool};
 use crate::scene::Scene;
@@ -161,7 +162,7 @@ fn cost(keys: &[&str], beside: &[&str], low: bool, gpu: Option<&Gpu>) -> Result<
 /// True where every bare stage is composed to the text that shaders without any effect would give.
 pub fn off_is_absent() -> Result<bool> {
     let none = EffectSet::default();
-    for laws in ["neo_hookean", "mooney_rivlin", "yeoh", "ogden", "demiray"] {
+    for law in &LAWS {
         let features = Features {
             loaded_faces: false,
             driven_faces: false,
@@ -171,7 +172,7 @@ pub fn off_is_absent() -> Result<bool> {
             free_path: false,
             drawn: true,
             tetrahedra: false,
-            laws: BTreeSet::from([laws]),
+            laws: BTreeSet::from([law.key]),
         };
         let defines = defines(&none, &features);
         for stage in stages(&none, &features) {

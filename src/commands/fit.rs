@@ -13,8 +13,8 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::material::Mode;
-use crate::material::fit::{Fit, LAWS, LawFit, Point, best_stable, fit_all, nominal_stress};
-use crate::material::{ElasticLaw, Isochoric, Verdict, describe_verdict};
+use crate::material::fit::{Fit, LawFit, Point, best_stable, fit_all, nominal_stress};
+use crate::material::{ElasticLaw, Isochoric, LAWS, Verdict, describe_verdict};
 use crate::output::fit_chart::fit_chart;
 use crate::output::folder::probe;
 use crate::reading;
@@ -154,9 +154,9 @@ fn check_options(options: &FitOptions) -> Result<()> {
         ));
     }
     if let Some(law) = &options.law
-        && !LAWS.contains(&law.as_str())
+        && !LAWS.iter().any(|l| l.key == law)
     {
-        return Err(Error::input(format!("`{law}` is no law"), format!("use one of {}", LAWS.join(", "))));
+        return Err(Error::input(format!("`{law}` is no law"), format!("use one of {}", LAWS.map(|l| l.key).join(", "))));
     }
     if options.files.is_empty() {
         return Err(Error::input("no file was given", format!("give a CSV file with the header `{EXAMPLE}`")));

@@ -2,18 +2,18 @@
 
 use std::fmt::Write;
 use std::path::PathBuf;
+use std::sync::LazyLock;
 
-use clap::{Args, ValueEnum};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, ValueEnum, value_parser};
 use glam::DVec3;
 use serde::Serialize;
 
 use crate::effects::viscoelastic::{LARGEST_TERM_COUNT, Term};
 use crate::effects::{damage, fibres, plasticity, viscoelastic};
 use crate::error::{Error, Result};
-use crate::material::{
-    Continuation, Demiray, ElasticLaw, Isochoric, Mode, MooneyRivlin, NeoHookean, Ogden, Verdict, Yeoh,
-    describe_verdict, four_digits,
-};
+use crate::material::law::{Constant, constants, owners};
+use crate::material::{Continuation, ElasticLaw, LAWS, LawWord, Mode, Verdict, describe_verdict, four_digits};
 use crate::material_point::Material;
 use crate::material_test::{self, Leg, Protocol, Row};
 use crate::output::material_chart::material_chart;
@@ -36,37 +36,18 @@ pub struct MaterialArgs {
     /// Tissue preset, e.g. across-fibre; or give constants, or --scene
     preset: Option<String>,
     /// Elastic law of the constants [default: mooney_rivlin]
-    #[arg(long, value_enum, help_heading = "Constants")]
-    law: Option<LawName>,
-    /// neo_hookean, mooney_rivlin, yeoh
-    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
-    c10_kpa: Option<f64>,
-    /// mooney_rivlin
-    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
-    c01_kpa: Option<f64>,
-    /// yeoh
-    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
-    c20_kpa: Option<f64>,
-    /// yeoh
-    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
-    c30_kpa: Option<f64>,
-    /// ogden, demiray: shear modulus at rest
-    #[arg(long, value_name = "KPA", allow_negative_numbers = true, help_heading = "Constants")]
-    mu_kpa: Option<f64>,
-    /// ogden: exponent
-    #[arg(long, allow_negative_numbers = true, help_heading = "Constants")]
-    alpha: Option<f64>,
-    /// demiray: exponent
-    #[arg(long, allow_negative_numbers = true, help_heading = "Constants")]
-    b: Option<f64>,
+    #[arg(long, value_parser = law_parser(), help_heading = CONSTANTS)]
+    law: Option<LawWord>,
+    #[command(flatten)]
+    constants: LawConstants,
     /// Poisson's ratio at rest; fixes the bulk modulus
-    #[arg(long, value_name = "NU", conflicts_with = "bulk_modulus_kpa", help_heading = "Constants")]
+    #[arg(long, value_name = "NU", conflicts_with = "bulk_modulus_kpa", help_heading = CONSTANTS)]
     poisson_ratio: Option<f64>,
     /// Bulk modulus K = 2/D
-    #[arg(long, value_name = "KPA", help_heading = "Constants")]
+    #[arg(long, value_name = "KPA", help_heading = CONSTANTS)]
     bulk_modulus_kpa: Option<f64>,
     /// Compute constants that are unstable at rest instead of refusing them
-    #[arg(long, help_heading = "Constants")]
+    #[arg(long, help_heading = CONSTANTS)]
     allow_unstable: bool,
     /// Take material and effects from a scene file
     #[arg(long, value_name = "FILE", conflicts_with = "preset")]
@@ -143,14 +124,81 @@ pub struct MaterialArgs {
     svg: Option<PathBuf>,
 }
 
-#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
-#[value(rename_all = "snake_case")]
-enum LawName {
-    NeoHookean,
-    MooneyRivlin,
-    Yeoh,
-    Ogden,
-    Demiray,
+/// Heading of the constants in the help.
+const CONSTANTS: &str = "Constants";
+
+/// The words of the table of laws.
+fn law_parser() -> impl TypedValueParser<Value = LawWord> {
+    let word = |key: String| LawWord::ALL.into_iter().find(|word| word.law().key == key);
+    PossibleValuesParser::new(LAWS.iter().map(|law| law.key)).try_map(move |key| word(key).ok_or("no law"))
+}
+
+/// A constant of the table of laws as an option: id and name of its value.
+struct ConstantOption {
+    constant: &'static Constant,
+    /// `c10-kpa`
+    long: String,
+    /// `KPA`, or its letter.
+    value_name: String,
+    /// The laws that have it, and what it is.
+    help: String,
+}
+
+/// One option per constant of the laws.
+static CONSTANT_OPTIONS: LazyLock<Vec<ConstantOption>> = LazyLock::new(|| {
+    let option = |constant: &'static Constant| {
+        let laws = owners(constant.key).map(|law| law.key).collect::<Vec<_>>().join(", ");
+        let unit = if constant.key.ends_with("_kpa") { "kpa" } else { constant.key };
+        ConstantOption {
+            constant,
+            long: constant.key.replace('_', "-"),
+            value_name: unit.to_uppercase(),
+            help: if constant.what.is_empty() { laws } else { format!("{laws}: {}", constant.what) },
+        }
+    };
+    constants().into_iter().map(option).collect()
+});
+
+/// The constants that are given, with their keys.
+#[derive(Debug, Default)]
+struct LawConstants(Vec<(&'static str, f64)>);
+
+impl Args for LawConstants {
+    fn augment_args(command: Command) -> Command {
+        command.args(CONSTANT_OPTIONS.iter().map(|option| {
+            Arg::new(option.constant.key)
+                .long(option.long.as_str())
+                .value_name(option.value_name.as_str())
+                .value_parser(value_parser!(f64))
+                .allow_negative_numbers(true)
+                .help(option.help.as_str())
+                .help_heading(CONSTANTS)
+        }))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for LawConstants {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        let given = |option: &ConstantOption| {
+            let key = option.constant.key;
+            matches.get_one::<f64>(key).map(|value| (key, *value))
+        };
+        Ok(LawConstants(CONSTANT_OPTIONS.iter().filter_map(given).collect()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+/// The option of a constant.
+fn option(key: &str) -> String {
+    format!("--{}", key.replace('_', "-"))
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
@@ -321,8 +369,8 @@ fn number(option: &str, value: f64, low: f64, high: f64) -> Result<f64> {
 }
 
 fn subject(args: &MaterialArgs) -> Result<Subject> {
-    let given = given_constants(args);
-    if let (Some((option, _)), true) = (given.first(), args.preset.is_some() || args.scene.is_some()) {
+    if let (Some((key, _)), true) = (args.constants.0.first(), args.preset.is_some() || args.scene.is_some()) {
+        let option = option(key);
         let other = if args.scene.is_some() { "a scene" } else { "a preset" };
         return Err(Error::input(
             format!("{option} beside {other}: one of them decides the law"),
@@ -333,7 +381,7 @@ fn subject(args: &MaterialArgs) -> Result<Subject> {
         (Some(name), _) => from_preset(name)?,
         (None, Some(path)) => from_scene(args, path)?,
         (None, None) => {
-            let law = from_constants(args, &given)?;
+            let law = from_constants(args)?;
             Subject { name: format!("{} (constants)", law.isochoric.key()), material: elastic(law) }
         }
     };
@@ -392,21 +440,8 @@ fn from_scene(args: &MaterialArgs, path: &std::path::Path) -> Result<Subject> {
     Ok(Subject { name, material })
 }
 
-/// The constants on the command line with their options.
-fn given_constants(args: &MaterialArgs) -> Vec<(&'static str, f64)> {
-    let all = [
-        ("--c10-kpa", args.c10_kpa),
-        ("--c01-kpa", args.c01_kpa),
-        ("--c20-kpa", args.c20_kpa),
-        ("--c30-kpa", args.c30_kpa),
-        ("--mu-kpa", args.mu_kpa),
-        ("--alpha", args.alpha),
-        ("--b", args.b),
-    ];
-    all.into_iter().filter_map(|(option, value)| value.map(|v| (option, v))).collect()
-}
-
-fn from_constants(args: &MaterialArgs, given: &[(&'static str, f64)]) -> Result<ElasticLaw> {
+fn from_constants(args: &MaterialArgs) -> Result<ElasticLaw> {
+    let given = &args.constants.0;
     if given.is_empty() {
         let names: Vec<&str> = presets::tissues().iter().map(|p| p.name.as_str()).collect();
         return Err(Error::input(
@@ -417,36 +452,26 @@ fn from_constants(args: &MaterialArgs, given: &[(&'static str, f64)]) -> Result<
             ),
         ));
     }
-    let law = args.law.unwrap_or(LawName::MooneyRivlin);
-    let (key, needed, optional): (_, &[&str], &[&str]) = match law {
-        LawName::NeoHookean => ("neo_hookean", &["--c10-kpa"], &[]),
-        LawName::MooneyRivlin => ("mooney_rivlin", &["--c10-kpa", "--c01-kpa"], &[]),
-        LawName::Yeoh => ("yeoh", &["--c10-kpa"], &["--c20-kpa", "--c30-kpa"]),
-        LawName::Ogden => ("ogden", &["--mu-kpa", "--alpha"], &[]),
-        LawName::Demiray => ("demiray", &["--mu-kpa", "--b"], &[]),
-    };
-    let list = needed.iter().chain(optional).copied().collect::<Vec<_>>().join(", ");
-    for (option, value) in given {
-        if !needed.contains(option) && !optional.contains(option) {
+    let law = args.law.unwrap_or(LawWord::MooneyRivlin).law();
+    let list = law.keys().into_iter().map(option).collect::<Vec<_>>().join(", ");
+    for (key, value) in given {
+        let option = option(key);
+        if !law.keys().contains(key) {
             return Err(Error::input(
-                format!("{option} is no constant of the law {key}"),
+                format!("{option} is no constant of the law {}", law.key),
                 format!("its constants: {list}; or choose another --law"),
             ));
         }
-        number(option, *value, -1e6, 1e6)?;
+        number(&option, *value, -1e6, 1e6)?;
     }
-    let value = |option: &str| given.iter().find(|(o, _)| *o == option).map_or(0.0, |(_, v)| *v);
-    if let Some(missing) = needed.iter().find(|n| !given.iter().any(|(o, _)| o == *n)) {
-        return Err(Error::input(format!("the law {key} needs {missing}"), format!("its constants: {list}")));
+    let value = |key: &str| given.iter().find(|(k, _)| *k == key).map(|(_, v)| *v);
+    if let Some(missing) = law.constants.iter().find(|c| !c.or_zero && value(c.key).is_none()) {
+        return Err(Error::input(
+            format!("the law {} needs {}", law.key, option(missing.key)),
+            format!("its constants: {list}"),
+        ));
     }
-    let pa = |option: &str| value(option) * KPA;
-    let isochoric = match law {
-        LawName::NeoHookean => Isochoric::NeoHookean(NeoHookean { c10: pa("--c10-kpa") }),
-        LawName::MooneyRivlin => Isochoric::MooneyRivlin(MooneyRivlin { c10: pa("--c10-kpa"), c01: pa("--c01-kpa") }),
-        LawName::Yeoh => Isochoric::Yeoh(Yeoh { c10: pa("--c10-kpa"), c20: pa("--c20-kpa"), c30: pa("--c30-kpa") }),
-        LawName::Ogden => Isochoric::Ogden(Ogden { mu: pa("--mu-kpa"), alpha: value("--alpha") }),
-        LawName::Demiray => Isochoric::Demiray(Demiray { mu: pa("--mu-kpa"), b: value("--b") }),
-    };
+    let isochoric = law.with(|key| value(key).unwrap_or_default());
     match bulk_modulus(args, isochoric.shear_modulus())? {
         Some(bulk_modulus) => Ok(ElasticLaw { isochoric, bulk_modulus }),
         None => Err(Error::input(

@@ -1,13 +1,18 @@
-//! The text composer of the shaders: `#import`, `#ifdef`, `#ifndef`, `#else`, `#endif`.
+//! The text composer of the shaders: `#import`, `#ifdef`, `#ifndef`, `#else`, `#endif`, `#for`, `#end`.
 //!
-//! A file is included once, where it is first imported. Unknown files, names and stray directives are errors.
-//! Compiler messages are mapped back to file and line.
+//! A file is included once, where it is first imported. `#for law ... #end` repeats its lines for every elastic law whose key is
+//! among the defines, in the order of [`LAWS`]: `$law` is its key, `$number` its place; `#for invariant law` and `#for stretch law`
+//! are those of one [`Form`]. So the dispatch stands in WGSL, once for all laws. Unknown files, names and stray directives are
+//! errors. Compiler messages are mapped back to file and line.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
 use crate::error::{Error, Result};
+use crate::material::law::Form;
+use crate::material::{LAWS, Law};
 use crate::reading;
 
 /// Every shader file by its path under `shaders/`, without extension.
@@ -94,7 +99,7 @@ pub const SOURCES: &[(&str, &str)] = &[
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 19] = [
+pub const SCENE_DEFINES: [&str; 14] = [
     "TIED",
     "SLIT",
     "BORE",
@@ -107,11 +112,6 @@ pub const SCENE_DEFINES: [&str; 19] = [
     "TETRAHEDRA",
     "HISTORY",
     "VARYING_STIFFNESS",
-    "NEO_HOOKEAN",
-    "MOONEY_RIVLIN",
-    "YEOH",
-    "OGDEN",
-    "DEMIRAY",
     "INVARIANT_LAWS",
     "SEVERAL_LAWS",
 ];
@@ -219,6 +219,46 @@ fn without_effect_blocks(text: &str) -> String {
     out
 }
 
+/// The lines of a text with their numbers (from 1), those between `#for` and `#end` once per law that is meant; or what is wrong in
+/// which line.
+fn repeated<'a>(
+    text: &'a str,
+    defines: &BTreeSet<&'static str>,
+) -> std::result::Result<Vec<(usize, Cow<'a, str>)>, (usize, String)> {
+    let mut out = Vec::new();
+    let mut lines = text.lines().enumerate().map(|(n, line)| (n + 1, line));
+    while let Some((number, line)) = lines.next() {
+        let Some(meant) = line.trim().strip_prefix("#for ") else {
+            out.push((number, line.into()));
+            continue;
+        };
+        let form = match meant.trim() {
+            "law" => None,
+            "invariant law" => Some(Form::Invariants),
+            "stretch law" => Some(Form::Stretches),
+            other => return Err((number, format!("unknown list `{other}` in #for"))),
+        };
+        let mut ended = false;
+        let mut body = Vec::new();
+        for (number, line) in lines.by_ref() {
+            ended = line.trim() == "#end";
+            if ended {
+                break;
+            }
+            body.push((number, line));
+        }
+        if !ended {
+            return Err((number, "#for without #end".into()));
+        }
+        let wanted = |law: &Law| defines.contains(law.key) && form.is_none_or(|form| form == law.form);
+        for (place, law) in LAWS.iter().enumerate().filter(|(_, law)| wanted(law)) {
+            let filled = |line: &str| line.replace("$law", law.key).replace("$number", &format!("{place}u"));
+            out.extend(body.iter().map(|(number, line)| (*number, filled(line).into())));
+        }
+    }
+    Ok(out)
+}
+
 fn compose_from(files: &[(&'static str, &str)], root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed> {
     let mut out = Composed { source: String::new(), origin: Vec::new() };
     let mut included = BTreeSet::new();
@@ -247,7 +287,12 @@ fn include(
     }
     // One entry per open #ifdef: (active, seen #else, line).
     let mut open: Vec<(bool, bool, usize)> = Vec::new();
-    for (number, line) in text.lines().enumerate().map(|(n, l)| (n + 1, l)) {
+    let lines = match repeated(text, defines) {
+        Ok(lines) => lines,
+        Err((line, message)) => return fail(file, line, message),
+    };
+    for (number, line) in &lines {
+        let (number, line) = (*number, &**line);
         let active = open.iter().all(|o| o.0);
         let Some(directive) = line.trim_start().strip_prefix('#') else {
             if active {
@@ -300,6 +345,10 @@ mod tests {
         ("name", "#ifdef PUNCTUER\n#endif\n"),
         ("word", "#include b\n"),
         ("missing", "\n#import nowhere\n"),
+        ("laws", "#for law\nlet $law = $number;\n#end\n#for stretch law\n#import b\n#end\n"),
+        ("list", "#for effect\n#end\n"),
+        ("endless", "\n#for law\n"),
+        ("end", "#end\n"),
     ];
 
     #[test]
@@ -313,6 +362,15 @@ mod tests {
     }
 
     #[test]
+    fn lines_are_repeated_for_the_laws_of_the_scene() {
+        let composed = compose_from(FILES, "laws", &BTreeSet::from(["yeoh", "mooney_rivlin"])).unwrap();
+        assert_eq!(composed.source, "let mooney_rivlin = 1u;\nlet yeoh = 2u;\n");
+        assert_eq!([composed.place(1), composed.place(2)], ["shaders/laws.wgsl:2", "shaders/laws.wgsl:2"]);
+        let composed = compose_from(FILES, "laws", &BTreeSet::from(["ogden"])).unwrap();
+        assert_eq!(composed.source, "let ogden = 3u;\nlet b = 1;\n");
+    }
+
+    #[test]
     fn mistakes_name_file_and_line() {
         for (root, expected) in [
             ("stray", "stray #endif"),
@@ -320,6 +378,9 @@ mod tests {
             ("name", "unknown name `PUNCTUER`"),
             ("word", "unknown directive #include"),
             ("missing", "missing.wgsl:2: unknown import `nowhere`"),
+            ("list", "list.wgsl:1: unknown list `effect` in #for"),
+            ("endless", "endless.wgsl:2: #for without #end"),
+            ("end", "unknown directive #end"),
         ] {
             let error = compose_from(FILES, root, &BTreeSet::new()).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");

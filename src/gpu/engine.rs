@@ -21,7 +21,8 @@ use crate::effects::cohesive::TORN_REACH;
 use crate::engine::elements::{HOURGLASS_MODULUS, PrismBase};
 use crate::engine::{ContactState, Engine, EngineImage, EngineInfo, FramePlan, FrameSums, Stage, State, foreign_image};
 use crate::error::{Error, Result};
-use crate::material::Isochoric;
+use crate::material::law::Form;
+use crate::material::{LAWS, Law};
 use crate::material_point::{Material as Constants, PointState};
 use crate::mesh::BlockMesh;
 use crate::model::{
@@ -86,15 +87,6 @@ impl Features {
     }
 }
 
-/// Elastic laws with the names that their files are chosen by; the place is `Material.law` of the shaders.
-pub const LAWS: [(&str, &str); 5] = [
-    ("neo_hookean", "NEO_HOOKEAN"),
-    ("mooney_rivlin", "MOONEY_RIVLIN"),
-    ("yeoh", "YEOH"),
-    ("ogden", "OGDEN"),
-    ("demiray", "DEMIRAY"),
-];
-
 /// Effects of tools, which work on the block only.
 const BLOCK_EFFECTS: [&str; 6] = ["cohesive", "puncture", "adhesion", "indentation", "friction", "flexible_needle"];
 
@@ -126,10 +118,12 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     // The bulk stiffness of a cell is not that of all others.
     define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || effects.damage.is_some()));
     define("HISTORY", effects.plasticity.is_some() || effects.viscoelastic.is_some() || effects.damage.is_some());
-    for (key, name) in LAWS {
-        define(name, features.laws.contains(key));
+    // Its key chooses a law: `#for law`.
+    for law in &LAWS {
+        define(law.key, features.laws.contains(law.key));
     }
-    define("INVARIANT_LAWS", features.laws.iter().any(|key| *key != "ogden"));
+    let of_invariants = |law: &Law| law.form == Form::Invariants && features.laws.contains(law.key);
+    define("INVARIANT_LAWS", LAWS.iter().any(of_invariants));
     define("SEVERAL_LAWS", features.laws.len() > 1);
     defines
 }
@@ -1039,20 +1033,12 @@ fn per_material<T: Copy>(model: &Model, entry: impl Fn(&Constants) -> T) -> Vec<
 
 fn material(model: &Model, m: &Constants) -> Material {
     let law = &m.law;
-    let constants = match law.isochoric {
-        Isochoric::NeoHookean(l) => [l.c10, 0.0, 0.0],
-        Isochoric::MooneyRivlin(l) => [l.c10, l.c01, 0.0],
-        Isochoric::Yeoh(l) => [l.c10, l.c20, l.c30],
-        Isochoric::Ogden(l) => [l.mu, l.alpha, 0.0],
-        Isochoric::Demiray(l) => [l.mu, l.b, 0.0],
-    };
-    let number = LAWS.iter().position(|(key, _)| *key == law.isochoric.key());
     Material {
-        constants: vec4(DVec3::from(constants)),
+        constants: law.isochoric.values().map(|constant| constant as f32),
         bulk_modulus: law.bulk_modulus as f32,
         shear_modulus: law.shear_modulus() as f32,
         hourglass: (model.scene.solver.hourglass_stiffness * HOURGLASS_MODULUS * law.shear_modulus()) as f32,
-        law: number.expect("the table of laws holds every law") as u32,
+        law: law.isochoric.word() as u32,
     }
 }
 

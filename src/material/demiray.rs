@@ -7,7 +7,26 @@
 //! finite for every F; at b = 7 that is a uniaxial stretch of 1.8, where the stress is 2e4 times the initial one.
 //! `mu0 = mu`. Source: Demiray 1972; isochoric split: `src/material/mod.rs`; continuation: this project.
 
-use super::{Slopes, Verdict};
+use super::law::{Constant, Constants, Form, Law, Search};
+use super::{InvariantLaw, Isochoric, Slopes, Verdict};
+
+pub const LAW: Law = Law {
+    key: "demiray",
+    name: "Demiray",
+    energy: "mu/(2 b) (exp(b e) - 1)",
+    source: "Demiray1972",
+    form: Form::Invariants,
+    constants: &[Constant::stress("mu_kpa", "shear modulus at rest"), Constant::number("b", "exponent", 100.0)],
+    stable: "mu > 0, b > 0",
+    way_out: "write mu_kpa > 0 and b > 0",
+    build: |c| Isochoric::Demiray(Demiray { mu: c[0], b: c[1] }),
+    example: [4000.0, 1.9, 0.0, 0.0],
+    search: Search::Exponent { starts: &[-1.0, 0.1, 1.0, 5.0, 20.0, 80.0], edges: &[LEAST_FITTED_B] },
+    colour: [0, 114, 178],
+};
+
+/// Smallest exponent b of a stable fit: below it the law is neo-Hookean to 1e-3 at stretches that samples reach.
+const LEAST_FITTED_B: f64 = 1e-3;
 
 /// Exponent at which exponential laws continue as polynomials.
 pub const LARGEST_EXPONENT: f64 = 10.0;
@@ -32,22 +51,12 @@ pub struct Demiray {
 }
 
 impl Demiray {
+    pub fn values(&self) -> Constants {
+        [self.mu, self.b, 0.0, 0.0]
+    }
+
     pub fn shear_modulus(&self) -> f64 {
         self.mu
-    }
-
-    /// True where the exponential is continued, for `e = I1bar - 3`.
-    pub fn is_capped(&self, e: f64) -> bool {
-        self.b * e > LARGEST_EXPONENT
-    }
-
-    pub fn energy(&self, e: f64) -> f64 {
-        0.5 * self.mu / self.b * capped_exponential(self.b * e).0
-    }
-
-    pub fn slopes(&self, e: f64) -> Slopes {
-        let (_, first, second) = capped_exponential(self.b * e);
-        Slopes { w1: 0.5 * self.mu * first, w2: 0.0, w11: 0.5 * self.mu * self.b * second }
     }
 
     /// W is convex and growing in I1bar for mu > 0, b > 0, hence polyconvex.
@@ -57,5 +66,20 @@ impl Demiray {
         } else {
             Verdict::Unstable
         }
+    }
+}
+
+impl InvariantLaw for Demiray {
+    fn energy(&self, e: f64, _i2: f64) -> f64 {
+        0.5 * self.mu / self.b * capped_exponential(self.b * e).0
+    }
+
+    fn slopes(&self, e: f64) -> Slopes {
+        let (_, first, second) = capped_exponential(self.b * e);
+        Slopes { w1: 0.5 * self.mu * first, w2: 0.0, w11: 0.5 * self.mu * self.b * second }
+    }
+
+    fn is_capped(&self, e: f64) -> bool {
+        self.b * e > LARGEST_EXPONENT
     }
 }

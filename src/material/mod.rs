@@ -6,8 +6,8 @@
 //! P_iso = 2 w1 a F + 2 w2 b (I1 F - F C) + (w1 dI1bar/dJ + w2 dI2bar/dJ) cof F
 //! ```
 //! with `w1 = dW_iso/dI1bar`, `w2 = dW_iso/dI2bar`, `a = dI1bar/dI1`, `b = dI2bar/dI2`. For J >= 0.3 `I1bar = J^(-2/3) I1` and
-//! `I2bar = J^(-4/3) I2`; below they continue as `kinematics::isochoric_measure`. Ogden's law alone needs the principal
-//! stretches; its form is in `ogden`.
+//! `I2bar = J^(-4/3) I2`; below they continue as `kinematics::isochoric_measure` (`invariants`). Ogden's law alone needs the
+//! principal stretches; its form is in `ogden`. What else the program knows about a law stands in its entry `LAW` (`law`).
 //!
 //! What the continuation holds, for every law and all constants that are stable for every deformation: W is twice
 //! differentiable and finite for every F, inverted ones included; W >= 0, and W_iso >= 0 with its least value at a pure
@@ -16,41 +16,37 @@
 //! small pulls its edges inwards: no finite energy can do without that. Constants with a limited range keep W >= 0 within it.
 //! Source: the split of Flory 1961; penalty as in [Lv2022] Eq. 1, kappa = 2/D; continuation: this project.
 
+#[macro_use]
+pub mod law;
+
 pub mod demiray;
 pub mod fit;
+pub mod invariants;
 pub mod kinematics;
+pub mod least_squares;
 pub mod mode;
 pub mod mooney_rivlin;
 pub mod neo_hookean;
 pub mod ogden;
 pub mod yeoh;
 
-pub use demiray::Demiray;
+pub use invariants::{InvariantLaw, Slopes};
+pub use law::{Constants, IsochoricLaw, Law};
 pub use mode::Mode;
-pub use mooney_rivlin::MooneyRivlin;
-pub use neo_hookean::NeoHookean;
-pub use ogden::Ogden;
-pub use yeoh::Yeoh;
 
 use glam::{DMat3, DVec3};
-use kinematics::{
-    J_CONTINUATION, cofactor, double_dot, invariants, is_measure_continued, isochoric_measure, jacobian_minus_one,
-};
+use kinematics::{cofactor, double_dot, jacobian_minus_one};
+
+laws! {
+    neo_hookean::NeoHookean,
+    mooney_rivlin::MooneyRivlin,
+    yeoh::Yeoh,
+    ogden::Ogden,
+    demiray::Demiray,
+}
 
 /// Largest stretch that a numerical verdict looks at.
 pub const LARGEST_STRETCH: f64 = 6.0;
-
-/// Degrees m of `J^-m I1` and `J^-m I2`.
-const FIRST: f64 = 2.0 / 3.0;
-const SECOND: f64 = 4.0 / 3.0;
-
-/// Derivatives of W_iso by `I1bar` and `I2bar` [Pa]: `w1`, `w2`, and `w11 = d^2 W/dI1bar^2`.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Slopes {
-    pub w1: f64,
-    pub w2: f64,
-    pub w11: f64,
-}
 
 /// What the constants mean for stability.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,72 +61,27 @@ pub enum Verdict {
     Unstable,
 }
 
-/// The isochoric part of a law.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Isochoric {
-    NeoHookean(NeoHookean),
-    MooneyRivlin(MooneyRivlin),
-    Yeoh(Yeoh),
-    Ogden(Ogden),
-    Demiray(Demiray),
-}
-
 impl Isochoric {
+    /// What the program knows about the law.
+    pub fn law(&self) -> &'static Law {
+        self.word().law()
+    }
+
     /// Name in scene files and outputs: the stem of its files.
     pub fn key(&self) -> &'static str {
-        match self {
-            Isochoric::NeoHookean(_) => "neo_hookean",
-            Isochoric::MooneyRivlin(_) => "mooney_rivlin",
-            Isochoric::Yeoh(_) => "yeoh",
-            Isochoric::Ogden(_) => "ogden",
-            Isochoric::Demiray(_) => "demiray",
-        }
+        self.law().key
     }
 
     /// Constants with the keys and units of a scene file: stresses in kPa, exponents without a unit.
     pub fn constants(&self) -> Vec<(&'static str, f64)> {
-        let kpa = 1e-3;
-        match self {
-            Isochoric::NeoHookean(l) => vec![("c10_kpa", l.c10 * kpa)],
-            Isochoric::MooneyRivlin(l) => vec![("c10_kpa", l.c10 * kpa), ("c01_kpa", l.c01 * kpa)],
-            Isochoric::Yeoh(l) => {
-                vec![("c10_kpa", l.c10 * kpa), ("c20_kpa", l.c20 * kpa), ("c30_kpa", l.c30 * kpa)]
-            }
-            Isochoric::Ogden(l) => vec![("mu_kpa", l.mu * kpa), ("alpha", l.alpha)],
-            Isochoric::Demiray(l) => vec![("mu_kpa", l.mu * kpa), ("b", l.b)],
-        }
+        self.law().constants.iter().zip(self.values()).map(|(c, value)| (c.key, c.shown(value))).collect()
     }
+}
 
-    /// Ground-state shear modulus mu0 [Pa].
-    pub fn shear_modulus(&self) -> f64 {
-        match self {
-            Isochoric::NeoHookean(l) => l.shear_modulus(),
-            Isochoric::MooneyRivlin(l) => l.shear_modulus(),
-            Isochoric::Yeoh(l) => l.shear_modulus(),
-            Isochoric::Ogden(l) => l.shear_modulus(),
-            Isochoric::Demiray(l) => l.shear_modulus(),
-        }
-    }
-
-    /// Slopes for `I1bar - 3` and `I2bar - 3`; `None` for Ogden's law, which is no function of them.
-    fn slopes(&self, i1: f64) -> Option<Slopes> {
-        match self {
-            Isochoric::NeoHookean(l) => Some(l.slopes()),
-            Isochoric::MooneyRivlin(l) => Some(l.slopes()),
-            Isochoric::Yeoh(l) => Some(l.slopes(i1)),
-            Isochoric::Ogden(_) => None,
-            Isochoric::Demiray(l) => Some(l.slopes(i1)),
-        }
-    }
-
-    pub fn verdict(&self) -> Verdict {
-        match self {
-            Isochoric::NeoHookean(l) => l.verdict(),
-            Isochoric::MooneyRivlin(l) => l.verdict(),
-            Isochoric::Yeoh(l) => l.verdict(),
-            Isochoric::Ogden(l) => l.verdict(),
-            Isochoric::Demiray(l) => l.verdict(),
-        }
+impl LawWord {
+    /// What the program knows about the law.
+    pub fn law(self) -> &'static Law {
+        &LAWS[self as usize]
     }
 }
 
@@ -229,54 +180,17 @@ impl ElasticLaw {
 
     /// Isochoric energy density for the displacement gradient H = F - I [J/m^3].
     pub fn isochoric_energy(&self, h: DMat3) -> f64 {
-        let f = DMat3::IDENTITY + h;
-        let j = 1.0 + jacobian_minus_one(h);
-        let (i1, i2) = invariants(f);
-        let i1 = isochoric_measure(i1, j, FIRST).value - 3.0;
-        let i2 = isochoric_measure(i2, j, SECOND).value - 3.0;
-        match &self.isochoric {
-            Isochoric::NeoHookean(l) => l.energy(i1),
-            Isochoric::MooneyRivlin(l) => l.energy(i1, i2),
-            Isochoric::Yeoh(l) => l.energy(i1),
-            Isochoric::Ogden(l) => l.energy(h),
-            Isochoric::Demiray(l) => l.energy(i1),
-        }
+        self.isochoric.isochoric_energy(h)
     }
 
     /// Isochoric first Piola-Kirchhoff stress P_iso for H = F - I [Pa].
     pub fn isochoric_stress(&self, h: DMat3) -> DMat3 {
-        if let Isochoric::Ogden(l) = &self.isochoric {
-            return l.isochoric_stress(h);
-        }
-        let f = DMat3::IDENTITY + h;
-        let j = 1.0 + jacobian_minus_one(h);
-        let (i1, i2) = invariants(f);
-        let (first, second) = (isochoric_measure(i1, j, FIRST), isochoric_measure(i2, j, SECOND));
-        let s = self.isochoric.slopes(first.value - 3.0).unwrap_or_default();
-        let c = f.transpose() * f;
-        f * (2.0 * s.w1 * first.by_s)
-            + (f * i1 - f * c) * (2.0 * s.w2 * second.by_s)
-            + cofactor(f) * (s.w1 * first.by_j + s.w2 * second.by_j)
+        self.isochoric.isochoric_stress(h)
     }
 
     /// Where the isochoric law is no longer the one that its name says, for H = F - I; `None` where it is.
     pub fn continuation(&self, h: DMat3) -> Option<Continuation> {
-        let j = 1.0 + jacobian_minus_one(h);
-        let (i1, i2) = invariants(DMat3::IDENTITY + h);
-        let first = is_measure_continued(i1, j, FIRST);
-        let is_flat = match &self.isochoric {
-            Isochoric::MooneyRivlin(l) => l.c10 != 0.0 && first || l.c01 != 0.0 && is_measure_continued(i2, j, SECOND),
-            Isochoric::Ogden(l) => l.is_flat(h),
-            _ => first,
-        };
-        match &self.isochoric {
-            _ if is_flat => Some(Continuation::Volume),
-            Isochoric::Ogden(l) if l.is_thin(h) => Some(Continuation::Stretch),
-            Isochoric::Demiray(l) if l.is_capped(isochoric_measure(i1, j, FIRST).value - 3.0) => {
-                Some(Continuation::Exponent)
-            }
-            _ => None,
-        }
+        self.isochoric.continuation(h)
     }
 
     /// Energy density W for H = F - I [J/m^3].
@@ -298,105 +212,10 @@ impl ElasticLaw {
     }
 
     /// Bound of the isochoric tangent modulus for the stable step: of what a wave finds, `m N : d2W_iso/dF2 : m N` for a unit vector
-    /// m and any N, together with the bulk modulus, `(kappa + turned) |cof F N|^2 + straight |N|^2`. At rest `turned` is 4/3 mu0,
-    /// and exact, as in every pure change of volume.
-    ///
-    /// Along a wave F + t m N has `dJ/dt = m.u`, u = cof F N; with y = m.F N the second derivative of `a I1` is
-    /// `a'' I1 (m.u)^2 - 4 |a'| (m.u) y + 2 a`. F N has the part J/|u|^2 along u, which makes the first line, and across u at most
-    /// `J (l1^2 - l3^2)/(2 l1 l3)` times |N|^2/|u| (Kantorovich's inequality). The same for `b I2`, whose terms have
-    /// `q = I1 - |F N|^2`, and across u at most 0.58 times the largest `|li^2 - lj^2| lk^3`:
-    /// ```text
-    /// turned   = w1 (a'' I1 - c1/g) + w2 (b'' I2 - c2 (I1 - l1^2)/g),  g = (l1 l2)^2
-    /// c1 = 4 |a'| J - 2 a,  c2 = 4 |b'| J - 2 b
-    /// straight = |w1| |a'| (l1^2 - l3^2) l2 + 1.16 |w2| |b'| max |li^2 - lj^2| lk^3 + w11 |dI1bar/dF|^2
-    ///            + (2 w1 a + 2 w2 b l1^2 - (kappa + turned) (J/l1)^2)+
-    /// ```
-    /// the last term for waves across their direction. The eigenvalues l1^2 of C and g of cof C are bounded by Gershgorin's circles. The
-    /// same as in the kernel; below J = 0.3 `straight` is at least what turning inside out adds. Source: this project; the bound
-    /// is compared with the acoustic tensor in `tests/material/waves.rs`. Strains below [`SMALL_STRAIN`] have a simpler bound, found by
-    /// sampling and compared there, too. Ogden's law has its own form.
+    /// m and any N, together with the bulk modulus, `(kappa + turned) |cof F N|^2 + straight |N|^2`.
     pub fn tangent_bound(&self, h: DMat3) -> TangentBound {
-        if let Isochoric::Ogden(l) = &self.isochoric {
-            return TangentBound { straight: l.tangent_bound(h), turned: 0.0 };
-        }
-        let f = DMat3::IDENTITY + h;
-        let j = 1.0 + jacobian_minus_one(h);
-        let (i1, i2) = invariants(f);
-        let (first, second) = (isochoric_measure(i1, j, FIRST), isochoric_measure(i2, j, SECOND));
-        let s = self.isochoric.slopes(first.value - 3.0).unwrap_or_default();
-        // |2 a F + dI1bar/dJ cof F|^2, with F : cof F = 3 J.
-        let gradient_squared = 4.0 * first.by_s * (first.by_s * i1 + 3.0 * first.by_j * j) + first.by_j.powi(2) * i2;
-        let stiffening = s.w11.max(0.0) * gradient_squared.max(0.0);
-        let c = f.transpose() * f;
-        let strain = largest_strain(c);
-        if strain < SMALL_STRAIN {
-            let w = s.w1.abs() + s.w2.abs();
-            let turned = 8.0 / 3.0 * (s.w1 + s.w2 + 6.0 * strain * w);
-            return TangentBound { straight: 3.2 * strain * w + stiffening, turned };
-        }
-        let cof = cofactor(f);
-        let (largest, area) =
-            (largest_eigenvalue_bound(c).min(i1), largest_eigenvalue_bound(cof.transpose() * cof).min(i2).max(1e-12));
-        let least = (j * j / area).min(largest);
-        let middle = (i1 - largest - least).clamp(least, largest);
-        let (a, b) = (first.by_s, second.by_s);
-        let (fall_a, fall_b) = (first.by_j.abs() / i1.max(1e-6), second.by_j.abs() / i2.max(1e-6));
-        let (c1, c2) = (2.0 * a - 4.0 * fall_a * j.max(0.0), 2.0 * b - 4.0 * fall_b * j.max(0.0));
-        let turned =
-            s.w1 * (first.by_jj + c1.min(0.0) / area) + s.w2 * (second.by_jj + c2.min(0.0) * (i1 - largest) / area);
-        let turned = turned.max(0.0);
-        let [l1, l2, l3] = [largest, middle, least].map(f64::sqrt);
-        let across =
-            ((largest - least) * l2.powi(3)).max((middle - least) * l1.powi(3)).max((largest - middle) * l3.powi(3));
-        let sideways = 2.0 * s.w1 * a + 2.0 * s.w2 * b * largest;
-        let mut straight = s.w1.abs() * fall_a * (largest - least) * l2
-            + 1.16 * s.w2.abs() * fall_b * across
-            + s.w1 * c1.max(0.0)
-            + s.w2 * c2.max(0.0) * (i1 - least)
-            + (sideways - (self.bulk_modulus + turned) * j * j / largest.max(1e-12)).max(0.0);
-        if j < J_CONTINUATION {
-            // Inside out, both terms of a wave along its direction add.
-            let inside_out = 4.0 * (-j).max(0.0);
-            let of_first = 2.0 * a + inside_out * fall_a;
-            let of_second = 2.0 * b + inside_out * fall_b;
-            straight = straight.max(s.w1 * of_first + s.w2 * of_second * i1);
-        }
-        TangentBound { straight: straight.max(0.0) + stiffening, turned }
+        self.isochoric.tangent_bound(h, self.bulk_modulus)
     }
-}
-
-/// Strain e up to which the tangent bound is `turned = 8/3 (w1 + w2) (1 + 6 e)`, `straight = 3.2 e (w1 + w2)`: most cells of a block, and
-/// far fewer operations.
-const SMALL_STRAIN: f64 = 0.1;
-
-/// Largest change of a diagonal entry of C, and twice the largest entry beside the diagonal.
-fn largest_strain(c: DMat3) -> f64 {
-    let along = DVec3::new(c.x_axis.x, c.y_axis.y, c.z_axis.z) - DVec3::ONE;
-    let beside = DVec3::new(c.x_axis.y, c.y_axis.z, c.z_axis.x);
-    along.abs().max_element() + 2.0 * beside.abs().max_element()
-}
-
-/// Bound of the largest eigenvalue of a symmetric matrix: the largest sum of absolute values of a row (Gershgorin).
-fn largest_eigenvalue_bound(c: DMat3) -> f64 {
-    [c.x_axis, c.y_axis, c.z_axis].map(|row| row.abs().element_sum()).into_iter().fold(0.0, f64::max)
-}
-
-/// Stretch up to which a law of I1bar alone is elliptic: `w1 > 0` and `w1 + 2 w11 (l_max - l_min)^2 > 0` in every
-/// isochoric state whose largest stretch it is. (The largest square of `a.F N` over unit vectors with `a.F^-T N = 0` is
-/// `(l_max - l_min)^2`.)
-fn stable_range(slopes: &dyn Fn(f64) -> Slopes) -> Verdict {
-    const STEP: f64 = 1e-3;
-    /// States between uniaxial tension (0) and equibiaxial tension (1) that are looked at.
-    const STATES: i32 = 16;
-    let elliptic = |l: f64, state: i32| {
-        let middle = l.powf(-0.5 + 1.5 * f64::from(state) / f64::from(STATES));
-        let least = 1.0 / (l * middle);
-        let w = slopes(l * l + middle * middle + least * least - 3.0);
-        w.w1 > 0.0 && w.w1 + 2.0 * w.w11 * (l - least).powi(2) > 0.0
-    };
-    let mut stretches = (1..).map(|i| 1.0 + f64::from(i) * STEP).take_while(|l| *l < LARGEST_STRETCH);
-    let limit = stretches.find(|l| !(0..=STATES).all(|state| elliptic(*l, state)));
-    limit.map_or(Verdict::Stable, Verdict::StableBelow)
 }
 
 /// A number for a message: four significant digits, no trailing zeros.

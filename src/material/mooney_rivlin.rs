@@ -5,7 +5,23 @@
 //! ```
 //! `mu0 = 2 (c10 + c01)`. Source: Rivlin 1948; [Lv2022] Eq. 1 with N = 1; isochoric split: `src/material/mod.rs`.
 
-use super::{Slopes, Verdict};
+use super::law::{Constant, Constants, Form, Law, Search};
+use super::{InvariantLaw, Isochoric, Slopes, Verdict};
+
+pub const LAW: Law = Law {
+    key: "mooney_rivlin",
+    name: "Mooney-Rivlin",
+    energy: "c10 e + c01 (I2bar - 3)",
+    source: "Rivlin1948",
+    form: Form::Invariants,
+    constants: &[Constant::stress("c10_kpa", ""), Constant::stress("c01_kpa", "")],
+    stable: "neither negative, c10 + c01 > 0; with one negative: up to a stretch limit",
+    way_out: "write c10_kpa and c01_kpa that are >= 0 with a sum > 0",
+    build: |c| Isochoric::MooneyRivlin(MooneyRivlin { c10: c[0], c01: c[1] }),
+    example: [2300.0, 1000.0, 0.0, 0.0],
+    search: Search::Linear,
+    colour: [213, 94, 0],
+};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MooneyRivlin {
@@ -16,17 +32,12 @@ pub struct MooneyRivlin {
 }
 
 impl MooneyRivlin {
+    pub fn values(&self) -> Constants {
+        [self.c10, self.c01, 0.0, 0.0]
+    }
+
     pub fn shear_modulus(&self) -> f64 {
         2.0 * (self.c10 + self.c01)
-    }
-
-    /// W_iso for `I1bar - 3` and `I2bar - 3` [J/m^3].
-    pub fn energy(&self, i1: f64, i2: f64) -> f64 {
-        self.c10 * i1 + self.c01 * i2
-    }
-
-    pub fn slopes(&self) -> Slopes {
-        Slopes { w1: self.c10, w2: self.c01, ..Slopes::default() }
     }
 
     /// Waves in an isochoric state obey rho v^2 = 2 l_i^2 (c10 + c01 l_k^2).
@@ -41,5 +52,15 @@ impl MooneyRivlin {
         } else {
             Verdict::Stable
         }
+    }
+}
+
+impl InvariantLaw for MooneyRivlin {
+    fn energy(&self, i1: f64, i2: f64) -> f64 {
+        self.c10 * i1 + self.c01 * i2
+    }
+
+    fn slopes(&self, _i1: f64) -> Slopes {
+        Slopes { w1: self.c10, w2: self.c01, ..Slopes::default() }
     }
 }

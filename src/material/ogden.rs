@@ -15,9 +15,29 @@
 
 use glam::{DMat3, DVec3};
 
-use super::Verdict;
 use super::kinematics::{
     J_CONTINUATION, cofactor, is_measure_continued, isochoric_measure, jacobian_minus_one, symmetric_eigen,
+};
+use super::law::{Constant, Constants, Form, IsochoricLaw, Law, Search};
+use super::{Continuation, Isochoric, Mode, TangentBound, Verdict};
+
+pub const LAW: Law = Law {
+    key: "ogden",
+    name: "Ogden",
+    energy: "2 mu/alpha^2 (sum of isochoric stretches^alpha - 3)",
+    source: "Ogden1972",
+    form: Form::Stretches,
+    constants: &[Constant::stress("mu_kpa", "shear modulus at rest"), Constant::number("alpha", "exponent", 50.0)],
+    stable: "mu > 0, abs(alpha) >= 1; else up to a limit",
+    way_out: "write mu_kpa > 0 and an alpha other than 0; |alpha| >= 1 is stable everywhere",
+    build: |c| Isochoric::Ogden(Ogden { mu: c[0], alpha: c[1] }),
+    example: [6600.0, 3.7, 0.0, 0.0],
+    search: Search::Exponent {
+        starts: &[-30.0, -12.0, -5.0, -2.0, -0.5, 0.5, 2.0, 5.0, 12.0, 30.0],
+        // |alpha| = 1 is the edge of the stable exponents.
+        edges: &[-1.0, 1.0],
+    },
+    colour: [204, 121, 167],
 };
 
 /// Eigenvalue of C, and product of two of them, below which phi continues as a polynomial where |alpha| < 2.
@@ -46,6 +66,10 @@ pub struct Ogden {
 }
 
 impl Ogden {
+    pub fn values(&self) -> Constants {
+        [self.mu, self.alpha, 0.0, 0.0]
+    }
+
     pub fn shear_modulus(&self) -> f64 {
         self.mu
     }
@@ -105,13 +129,13 @@ impl Ogden {
     }
 
     /// True where M is continued.
-    pub fn is_flat(&self, h: DMat3) -> bool {
+    fn is_flat(&self, h: DMat3) -> bool {
         let sum = self.sum(DMat3::IDENTITY + h);
         is_measure_continued(sum.value, 1.0 + jacobian_minus_one(h), self.degree())
     }
 
     /// True where phi is continued.
-    pub fn is_thin(&self, h: DMat3) -> bool {
+    fn is_thin(&self, h: DMat3) -> bool {
         let [x, y, z] = self.sum(DMat3::IDENTITY + h).c;
         let (least, low) = if self.alpha > 0.0 {
             (x.min(y).min(z), SMALLEST_EIGENVALUE)
@@ -119,46 +143,6 @@ impl Ogden {
             ((x * y).min(y * z).min(z * x), SMALLEST_PRODUCT)
         };
         self.alpha.abs() < 2.0 && least < low
-    }
-
-    /// W_iso for H = F - I [J/m^3].
-    pub fn energy(&self, h: DMat3) -> f64 {
-        let sum = self.sum(DMat3::IDENTITY + h);
-        let measure = isochoric_measure(sum.value, 1.0 + jacobian_minus_one(h), self.degree());
-        2.0 * self.mu / self.alpha.powi(2) * (measure.value - 3.0)
-    }
-
-    /// P_iso for H = F - I [Pa].
-    pub fn isochoric_stress(&self, h: DMat3) -> DMat3 {
-        let f = DMat3::IDENTITY + h;
-        let sum = self.sum(f);
-        let measure = isochoric_measure(sum.value, 1.0 + jacobian_minus_one(h), self.degree());
-        let n = sum.directions;
-        let slope = n * DMat3::from_diagonal(DVec3::from(sum.by_c)) * n.transpose();
-        (f * slope * (2.0 * measure.by_s) + cofactor(f) * measure.by_j) * (2.0 * self.mu / self.alpha.powi(2))
-    }
-
-    /// Bound of the isochoric tangent modulus [Pa]: the largest second derivative of W_iso by one principal stretch,
-    /// ```text
-    /// 2 mu/alpha^2 (dM/dS d2S/dl_i^2 + 4 d2M/dSdJ J dS/dc_i + d2M/dJ2 c_j c_k)
-    /// ```
-    /// A scan over rank-one directions finds no stiffer one while J stays near 1. At rest it is 4/3 mu0. Below J = 0.3 the
-    /// second term counts only where it is positive, inside out, and shear of small stretches, `2 dM/dS dS/dc_i`, counts, too;
-    /// with kappa it is at least 0.7 of the stiffest wave there (`tests/material/waves.rs`).
-    pub fn tangent_bound(&self, h: DMat3) -> f64 {
-        let sum = self.sum(DMat3::IDENTITY + h);
-        let j = 1.0 + jacobian_minus_one(h);
-        let measure = isochoric_measure(sum.value, j, self.degree());
-        let is_below = j < J_CONTINUATION;
-        // J d2M/dSdJ.
-        let mixed = if is_below { (j * measure.by_j / sum.value).max(0.0) } else { -self.degree() * measure.by_s };
-        let along = |i: usize| {
-            let others = sum.c[(i + 1) % 3] * sum.c[(i + 2) % 3];
-            let straight = if is_below { sum.by_stretch[i].max(2.0 * sum.by_c[i]) } else { sum.by_stretch[i] };
-            measure.by_s * straight + 4.0 * mixed * sum.by_c[i] + measure.by_jj * others
-        };
-        let largest = along(0).max(along(1)).max(along(2)).max(0.0);
-        2.0 * self.mu / self.alpha.powi(2) * largest
     }
 
     /// Elliptic for every deformation where mu > 0 and |alpha| >= 1; else while
@@ -186,5 +170,62 @@ impl Ogden {
             }
         }
         Verdict::StableBelow((low / 3.0).exp())
+    }
+}
+
+impl IsochoricLaw for Ogden {
+    fn isochoric_energy(&self, h: DMat3) -> f64 {
+        let sum = self.sum(DMat3::IDENTITY + h);
+        let measure = isochoric_measure(sum.value, 1.0 + jacobian_minus_one(h), self.degree());
+        2.0 * self.mu / self.alpha.powi(2) * (measure.value - 3.0)
+    }
+
+    fn isochoric_stress(&self, h: DMat3) -> DMat3 {
+        let f = DMat3::IDENTITY + h;
+        let sum = self.sum(f);
+        let measure = isochoric_measure(sum.value, 1.0 + jacobian_minus_one(h), self.degree());
+        let n = sum.directions;
+        let slope = n * DMat3::from_diagonal(DVec3::from(sum.by_c)) * n.transpose();
+        (f * slope * (2.0 * measure.by_s) + cofactor(f) * measure.by_j) * (2.0 * self.mu / self.alpha.powi(2))
+    }
+
+    /// Bound of the isochoric tangent modulus [Pa]: the largest second derivative of W_iso by one principal stretch,
+    /// ```text
+    /// 2 mu/alpha^2 (dM/dS d2S/dl_i^2 + 4 d2M/dSdJ J dS/dc_i + d2M/dJ2 c_j c_k)
+    /// ```
+    /// A scan over rank-one directions finds no stiffer one while J stays near 1. At rest it is 4/3 mu0. Below J = 0.3 the
+    /// second term counts only where it is positive, inside out, and shear of small stretches, `2 dM/dS dS/dc_i`, counts, too;
+    /// with kappa it is at least 0.7 of the stiffest wave there (`tests/material/waves.rs`).
+    fn tangent_bound(&self, h: DMat3, _bulk_modulus: f64) -> TangentBound {
+        let sum = self.sum(DMat3::IDENTITY + h);
+        let j = 1.0 + jacobian_minus_one(h);
+        let measure = isochoric_measure(sum.value, j, self.degree());
+        let is_below = j < J_CONTINUATION;
+        // J d2M/dSdJ.
+        let mixed = if is_below { (j * measure.by_j / sum.value).max(0.0) } else { -self.degree() * measure.by_s };
+        let along = |i: usize| {
+            let others = sum.c[(i + 1) % 3] * sum.c[(i + 2) % 3];
+            let straight = if is_below { sum.by_stretch[i].max(2.0 * sum.by_c[i]) } else { sum.by_stretch[i] };
+            measure.by_s * straight + 4.0 * mixed * sum.by_c[i] + measure.by_jj * others
+        };
+        let largest = along(0).max(along(1)).max(along(2)).max(0.0);
+        TangentBound { straight: 2.0 * self.mu / self.alpha.powi(2) * largest, turned: 0.0 }
+    }
+
+    fn continuation(&self, h: DMat3) -> Option<Continuation> {
+        if self.is_flat(h) { Some(Continuation::Volume) } else { self.is_thin(h).then_some(Continuation::Stretch) }
+    }
+
+    /// The closed forms in the stretches; those in the invariants are at [`crate::material::fit`], too.
+    fn nominal_stress(&self, mode: Mode, x: f64) -> f64 {
+        let (mu, alpha) = (self.mu, self.alpha);
+        let l = if mode == Mode::Shear { mode.principal_stretches(x)[0] } else { x };
+        let powers = match mode {
+            Mode::Uniaxial => l.powf(alpha - 1.0) - l.powf(-0.5 * alpha - 1.0),
+            Mode::Equibiaxial => l.powf(alpha - 1.0) - l.powf(-2.0 * alpha - 1.0),
+            Mode::Planar => l.powf(alpha - 1.0) - l.powf(-alpha - 1.0),
+            Mode::Shear => (l.powf(alpha) - l.powf(-alpha)) / (l + 1.0 / l),
+        };
+        2.0 * mu / alpha * powers
     }
 }

@@ -5,7 +5,28 @@
 //! ```
 //! `mu0 = 2 c10`. Source: Yeoh 1993; isochoric split: `src/material/mod.rs`.
 
-use super::{Slopes, Verdict, stable_range};
+use super::invariants::stable_range;
+use super::law::{Constant, Constants, Form, Law, Search};
+use super::{InvariantLaw, Isochoric, Slopes, Verdict};
+
+pub const LAW: Law = Law {
+    key: "yeoh",
+    name: "Yeoh",
+    energy: "c10 e + c20 e^2 + c30 e^3",
+    source: "Yeoh1993",
+    form: Form::Invariants,
+    constants: &[
+        Constant::stress("c10_kpa", ""),
+        Constant::stress("c20_kpa", "").or_zero(),
+        Constant::stress("c30_kpa", "").or_zero(),
+    ],
+    stable: "c10 > 0, none negative; else up to a limit, found from the acoustic tensor",
+    way_out: "write c10_kpa > 0; c20_kpa and c30_kpa >= 0 are stable everywhere, negative ones need allow_limited = true",
+    build: |c| Isochoric::Yeoh(Yeoh { c10: c[0], c20: c[1], c30: c[2] }),
+    example: [2500.0, 900.0, 300.0, 0.0],
+    search: Search::Linear,
+    colour: [0, 158, 115],
+};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Yeoh {
@@ -16,20 +37,12 @@ pub struct Yeoh {
 }
 
 impl Yeoh {
+    pub fn values(&self) -> Constants {
+        [self.c10, self.c20, self.c30, 0.0]
+    }
+
     pub fn shear_modulus(&self) -> f64 {
         2.0 * self.c10
-    }
-
-    pub fn energy(&self, e: f64) -> f64 {
-        e * (self.c10 + e * (self.c20 + e * self.c30))
-    }
-
-    pub fn slopes(&self, e: f64) -> Slopes {
-        Slopes {
-            w1: self.c10 + e * (2.0 * self.c20 + 3.0 * e * self.c30),
-            w2: 0.0,
-            w11: 2.0 * self.c20 + 6.0 * e * self.c30,
-        }
     }
 
     /// Stable for every deformation where no constant is negative (W convex and growing in I1bar: polyconvex), else
@@ -42,6 +55,20 @@ impl Yeoh {
             Verdict::Stable
         } else {
             stable_range(&|e| self.slopes(e))
+        }
+    }
+}
+
+impl InvariantLaw for Yeoh {
+    fn energy(&self, e: f64, _i2: f64) -> f64 {
+        e * (self.c10 + e * (self.c20 + e * self.c30))
+    }
+
+    fn slopes(&self, e: f64) -> Slopes {
+        Slopes {
+            w1: self.c10 + e * (2.0 * self.c20 + 3.0 * e * self.c30),
+            w2: 0.0,
+            w11: 2.0 * self.c20 + 6.0 * e * self.c30,
         }
     }
 }

@@ -25,14 +25,6 @@ const LETTER: u32 = 8;
 const DASH: (u32, u32) = (8, 5);
 const CURVE_POINTS: u32 = 400;
 
-// Colours that people with colour-blindness tell apart (Okabe and Ito 2008).
-const LAWS: [(&str, &str, RGBColor); 5] = [
-    ("neo_hookean", "neo-Hookean", RGBColor(86, 180, 233)),
-    ("mooney_rivlin", "Mooney-Rivlin", RGBColor(213, 94, 0)),
-    ("yeoh", "Yeoh", RGBColor(0, 158, 115)),
-    ("ogden", "Ogden", RGBColor(204, 121, 167)),
-    ("demiray", "Demiray", RGBColor(0, 114, 178)),
-];
 const MEASURED: RGBColor = RGBColor(90, 90, 90);
 
 type ChartResult<T> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -82,8 +74,9 @@ pub fn fit_chart(title: &str, points: &[Point], fits: &[LawFit], best: Option<&s
 fn lines(fits: &[LawFit], best: Option<&str>) -> Vec<Line> {
     let mut lines = Vec::new();
     for fit in fits {
-        let law = LAWS.iter().find(|(key, ..)| *key == fit.key);
-        let (name, colour) = law.map_or((fit.key, BLACK), |(_, name, colour)| (*name, *colour));
+        let Some(law) = fit.stable.or(fit.unconstrained).map(|fit| fit.law.law()) else { continue };
+        let [red, green, blue] = law.colour;
+        let (name, colour) = (law.name, RGBColor(red, green, blue));
         let label = |rms: f64, what: &str| format!("{name}, rms {:.3} kPa{what}", rms * 1e-3);
         if let Some(stable) = fit.stable {
             let (width, what) = if best == Some(fit.key) { (3, " (best stable)") } else { (2, "") };

@@ -8,6 +8,7 @@ use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::{Deserialize, Deserializer};
 
 use super::words;
+use crate::material::LawWord;
 
 /// A Stylet scene.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -87,17 +88,66 @@ pub struct TissueTable {
     pub accept_size: Option<bool>,
 }
 
-/// Names of the elastic laws.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum LawWord {
-    NeoHookean,
-    MooneyRivlin,
-    Yeoh,
-    Ogden,
-    Demiray,
+/// A table with the constants of all laws between its other keys: each stands here once. The tests of `convert/material.rs` compare them
+/// with `material::LAWS`.
+macro_rules! with_law_constants {
+    ($($table:tt)*) => {
+        table_of_a_law! {
+            [
+                /// First constant c10 of neo_hookean, mooney_rivlin and yeoh [kPa].
+                c10_kpa
+                /// Second constant c01 of mooney_rivlin [kPa].
+                c01_kpa
+                /// Second constant c20 of yeoh [kPa].
+                c20_kpa
+                /// Third constant c30 of yeoh [kPa].
+                c30_kpa
+                /// Shear modulus at rest mu of ogden and demiray [kPa].
+                mu_kpa
+                /// Exponent alpha of ogden.
+                alpha
+                /// Exponent b of demiray.
+                b
+            ]
+            $($table)*
+        }
+    };
 }
 
+/// The struct, with the constants where `..constants;` stands in it, and what is written of them.
+macro_rules! table_of_a_law {
+    (
+        [$(#[$text:meta] $key:ident)+]
+        $(#[$meta:meta])*
+        pub struct $Table:ident { $($(#[$before_meta:meta])* pub $before:ident: $Before:ty,)+ ..constants; $($rest:tt)* }
+    ) => {
+        $(#[$meta])*
+        pub struct $Table {
+            $($(#[$before_meta])* pub $before: $Before,)+
+            $(#[$text] pub $key: Option<f64>,)+
+            $($rest)*
+        }
+
+        impl $Table {
+            /// The constants of all laws with their keys, as written.
+            pub fn constants(&self) -> Vec<(&'static str, Option<f64>)> {
+                vec![$((stringify!($key), self.$key)),+]
+            }
+
+            /// This table with the constants of another one.
+            pub fn with_constants(mut self, constants: &[(&'static str, Option<f64>)]) -> Self {
+                for (key, value) in constants {
+                    $(if *key == stringify!($key) {
+                        self.$key = *value;
+                    })+
+                }
+                self
+            }
+        }
+    };
+}
+
+with_law_constants! {
 /// A tissue material: a preset, or the constants of a law with one volumetric key, or E and nu with a share of c10.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -109,20 +159,7 @@ pub struct MaterialTable {
     pub library: Option<String>,
     /// Elastic law; default "mooney_rivlin".
     pub law: Option<LawWord>,
-    /// First constant c10 of neo_hookean, mooney_rivlin and yeoh [kPa].
-    pub c10_kpa: Option<f64>,
-    /// Second constant c01 of mooney_rivlin [kPa].
-    pub c01_kpa: Option<f64>,
-    /// Second constant c20 of yeoh [kPa].
-    pub c20_kpa: Option<f64>,
-    /// Third constant c30 of yeoh [kPa].
-    pub c30_kpa: Option<f64>,
-    /// Shear modulus at rest mu of ogden and demiray [kPa].
-    pub mu_kpa: Option<f64>,
-    /// Exponent alpha of ogden.
-    pub alpha: Option<f64>,
-    /// Exponent b of demiray.
-    pub b: Option<f64>,
+    ..constants;
     /// Bulk modulus K = 2/D [kPa].
     pub bulk_modulus_kpa: Option<f64>,
     /// D = 2/K [1/MPa].
@@ -144,6 +181,7 @@ pub struct MaterialTable {
     pub cutting_force_n: Option<f64>,
     /// Cutting energy per area G_c instead of the cutting force, which is G_c times the needle diameter [J/m^2].
     pub cutting_energy_j_m2: Option<f64>,
+}
 }
 
 /// A part of the tissue with a material of its own: exactly one shape, in the coordinates of the scene.
@@ -229,6 +267,7 @@ pub struct LibraryFile {
     pub material: Vec<LibraryMaterial>,
 }
 
+with_law_constants! {
 /// One material of a library: constants as in [`MaterialTable`], and parameters of its own for effects.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -241,13 +280,7 @@ pub struct LibraryMaterial {
     /// Where they hold.
     pub range: Option<String>,
     pub law: Option<LawWord>,
-    pub c10_kpa: Option<f64>,
-    pub c01_kpa: Option<f64>,
-    pub c20_kpa: Option<f64>,
-    pub c30_kpa: Option<f64>,
-    pub mu_kpa: Option<f64>,
-    pub alpha: Option<f64>,
-    pub b: Option<f64>,
+    ..constants;
     pub bulk_modulus_kpa: Option<f64>,
     pub d_per_mpa: Option<f64>,
     pub poisson_ratio: Option<f64>,
@@ -259,6 +292,7 @@ pub struct LibraryMaterial {
     pub viscoelastic: Option<ViscoelasticTable>,
     pub damage: Option<DamageTable>,
     pub cutting: Option<CuttingTable>,
+}
 }
 
 /// Tip forces of a material; `cutting_force_n` or `cutting_energy_j_m2`. What is missing keeps the ratio of the two

@@ -7,7 +7,7 @@ mod laws;
 mod waves;
 
 use glam::{DMat3, DQuat, DVec3};
-use stylet::material::{Demiray, Isochoric, MooneyRivlin, NeoHookean, Ogden, Yeoh};
+use stylet::material::{Demiray, Isochoric, LAWS, MooneyRivlin, NeoHookean, Ogden, Yeoh};
 
 pub fn neo_hookean(c10: f64) -> Isochoric {
     Isochoric::NeoHookean(NeoHookean { c10 })
@@ -29,10 +29,9 @@ pub fn demiray(mu: f64, b: f64) -> Isochoric {
     Isochoric::Demiray(Demiray { mu, b })
 }
 
-/// Every law once or twice, of the size of soft tissue.
+/// Every law of the table with its own example, and more of the size of soft tissue.
 pub fn all_laws() -> Vec<Isochoric> {
-    vec![
-        neo_hookean(3300.0),
+    let more = [
         mooney_rivlin(2300.0, 1000.0),
         mooney_rivlin(-1000.0, 4000.0),
         yeoh(2000.0, 900.0, 300.0),
@@ -42,7 +41,8 @@ pub fn all_laws() -> Vec<Isochoric> {
         ogden(6000.0, 0.5),
         demiray(1170.0, 6.84),
         demiray(5000.0, 0.5),
-    ]
+    ];
+    LAWS.iter().map(|law| (law.build)(law.example)).chain(more).collect()
 }
 
 /// A small generator with a fixed sequence (xorshift64*).

@@ -1,8 +1,7 @@
 //! What a wave finds: bound of the tangent for the stable step, verdicts against the acoustic tensor.
 
 use glam::{DMat3, DVec3};
-use nalgebra::{Matrix3, SymmetricEigen};
-use stylet::material::kinematics::cofactor;
+use stylet::material::kinematics::{cofactor, symmetric_eigen};
 use stylet::material::{ElasticLaw, Isochoric, Verdict};
 
 use crate::*;
@@ -24,9 +23,8 @@ fn acoustic_tensor(tangent: &[DMat3; 9], n: DVec3) -> DMat3 {
 }
 
 fn eigenvalues(q: DMat3) -> (f64, f64) {
-    let symmetric = (q + q.transpose()) * 0.5;
-    let values = SymmetricEigen::new(Matrix3::from_column_slice(&symmetric.to_cols_array())).eigenvalues;
-    (values.min(), values.max())
+    let (values, _) = symmetric_eigen((q + q.transpose()) * 0.5);
+    (values.into_iter().fold(f64::INFINITY, f64::min), values.into_iter().fold(f64::NEG_INFINITY, f64::max))
 }
 
 /// Directions spread over a hemisphere, the coordinate axes among them.
@@ -90,11 +88,9 @@ fn the_stable_step_knows_the_stiffness_of_deformed_cells() {
 fn stiffest_wave(law: &ElasticLaw, h: DMat3, random: &mut Random) -> f64 {
     let a = tangent(&|h| law.isochoric_stress(h), h);
     let vector = |q: DMat3| {
-        let symmetric = (q + q.transpose()) * 0.5;
-        let eigen = SymmetricEigen::new(Matrix3::from_column_slice(&symmetric.to_cols_array()));
-        let (i, value) = eigen.eigenvalues.argmax();
-        let v = eigen.eigenvectors.column(i);
-        (DVec3::new(v[0], v[1], v[2]), value)
+        let (values, directions) = symmetric_eigen((q + q.transpose()) * 0.5);
+        let largest = if values[0] >= values[1].max(values[2]) { 0 } else { 1 + usize::from(values[2] > values[1]) };
+        (directions.col(largest), values[largest])
     };
     // R_ab = A_iajb a_i a_j.
     let turned = |d: DVec3| {

@@ -10,9 +10,10 @@ use rayon::prelude::*;
 use stylet::effects::{EFFECTS, EffectSet, mass_scaling};
 use stylet::engine::Stage;
 use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose, compose_without_effects};
-use stylet::gpu::engine::{Features, LAWS, defines, stages};
+use stylet::gpu::engine::{Features, defines, stages};
 use stylet::gpu::kernel::{BindingKind, Reflected, reflect};
 use stylet::gpu::structs::layouts;
+use stylet::material::LAWS;
 
 /// Features of a block of Mooney-Rivlin tissue.
 fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
@@ -49,7 +50,7 @@ fn scenes() -> Vec<Features> {
 
 /// Scenes of every elastic law alone, of pairs with Ogden's and with Mooney-Rivlin's, and of all together.
 fn scenes_of_laws() -> Vec<Features> {
-    let keys: Vec<&'static str> = LAWS.iter().map(|l| l.0).collect();
+    let keys: Vec<&'static str> = LAWS.iter().map(|law| law.key).collect();
     let mut sets: Vec<BTreeSet<&'static str>> = keys.iter().map(|k| BTreeSet::from([*k])).collect();
     sets.extend(keys.iter().flat_map(|k| [BTreeSet::from([*k, "ogden"]), BTreeSet::from([*k, "mooney_rivlin"])]));
     sets.push(keys.into_iter().collect());

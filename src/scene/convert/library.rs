@@ -38,20 +38,14 @@ impl Check<'_> {
     fn library_material(&mut self, at: &str, entry: &LibraryMaterial) -> Option<TissuePreset> {
         let table = MaterialTable {
             law: entry.law,
-            c10_kpa: entry.c10_kpa,
-            c01_kpa: entry.c01_kpa,
-            c20_kpa: entry.c20_kpa,
-            c30_kpa: entry.c30_kpa,
-            mu_kpa: entry.mu_kpa,
-            alpha: entry.alpha,
-            b: entry.b,
             bulk_modulus_kpa: entry.bulk_modulus_kpa,
             d_per_mpa: entry.d_per_mpa,
             poisson_ratio: entry.poisson_ratio,
             youngs_modulus_kpa: entry.youngs_modulus_kpa,
             c10_share: entry.c10_share,
             ..MaterialTable::default()
-        };
+        }
+        .with_constants(&entry.constants());
         let density = self.density(at, entry.density_kg_m3);
         self.material_ranges(at, &table);
         let law = self.law(at, &table);

@@ -1,12 +1,13 @@
 //! A tissue material of a scene or a library: its forms, its stability and what is stated twice.
 
-use super::super::file::{LawWord, MaterialTable};
+use super::super::file::MaterialTable;
 use super::super::presets;
 use super::super::tissue_preset::TissuePreset;
 use super::{Check, KPA, MM, Within, library};
 use crate::effects::TissueMaterial;
+use crate::material::law::{constants, owners};
 use crate::material::{
-    Demiray, ElasticLaw, Isochoric, NeoHookean, Ogden, Verdict, Yeoh, describe_verdict, four_digits, ripple_growth_time,
+    ElasticLaw, Isochoric, LawWord, NeoHookean, Verdict, describe_verdict, four_digits, ripple_growth_time,
 };
 use crate::reading;
 
@@ -16,69 +17,6 @@ const LARGEST_TISSUE_MODULUS: f64 = 10.0e6;
 const TISSUE_DENSITY: f64 = 1060.0;
 /// Share of the shear modulus that goes to c10 unless the scene says otherwise.
 const C10_SHARE: f64 = 0.7;
-
-impl LawWord {
-    /// Name in the scene file.
-    fn key(self) -> &'static str {
-        match self {
-            LawWord::NeoHookean => "neo_hookean",
-            LawWord::MooneyRivlin => "mooney_rivlin",
-            LawWord::Yeoh => "yeoh",
-            LawWord::Ogden => "ogden",
-            LawWord::Demiray => "demiray",
-        }
-    }
-
-    /// Keys of its constants; all are needed.
-    fn constants(self) -> &'static [&'static str] {
-        match self {
-            LawWord::NeoHookean => &["c10_kpa"],
-            LawWord::MooneyRivlin => &["c10_kpa", "c01_kpa"],
-            LawWord::Yeoh => &["c10_kpa", "c20_kpa", "c30_kpa"],
-            LawWord::Ogden => &["mu_kpa", "alpha"],
-            LawWord::Demiray => &["mu_kpa", "b"],
-        }
-    }
-
-    /// What makes it stable, for a way out.
-    fn stable_constants(self) -> &'static str {
-        match self {
-            LawWord::NeoHookean => "write c10_kpa > 0",
-            LawWord::MooneyRivlin => "write c10_kpa and c01_kpa that are >= 0 with a sum > 0",
-            LawWord::Yeoh => {
-                "write c10_kpa > 0; c20_kpa and c30_kpa >= 0 are stable everywhere, negative ones need allow_limited = true"
-            }
-            LawWord::Ogden => "write mu_kpa > 0 and an alpha other than 0; |alpha| >= 1 is stable everywhere",
-            LawWord::Demiray => "write mu_kpa > 0 and b > 0",
-        }
-    }
-
-    const ALL: [LawWord; 5] =
-        [LawWord::NeoHookean, LawWord::MooneyRivlin, LawWord::Yeoh, LawWord::Ogden, LawWord::Demiray];
-
-    fn of(law: &ElasticLaw) -> LawWord {
-        match law.isochoric {
-            Isochoric::NeoHookean(_) => LawWord::NeoHookean,
-            Isochoric::MooneyRivlin(_) => LawWord::MooneyRivlin,
-            Isochoric::Yeoh(_) => LawWord::Yeoh,
-            Isochoric::Ogden(_) => LawWord::Ogden,
-            Isochoric::Demiray(_) => LawWord::Demiray,
-        }
-    }
-}
-
-/// The constants of all laws with their keys, as written.
-fn written_constants(table: &MaterialTable) -> [(&'static str, Option<f64>); 7] {
-    [
-        ("c10_kpa", table.c10_kpa),
-        ("c01_kpa", table.c01_kpa),
-        ("c20_kpa", table.c20_kpa),
-        ("c30_kpa", table.c30_kpa),
-        ("mu_kpa", table.mu_kpa),
-        ("alpha", table.alpha),
-        ("b", table.b),
-    ]
-}
 
 /// Bulk modulus that is written directly [Pa].
 fn direct_bulk(table: &MaterialTable) -> Option<f64> {
@@ -110,16 +48,15 @@ impl Check<'_> {
                 self.notices.push(format!("`{at}.library` has no effect without a preset."));
             }
             let Some(law) = self.law(at, table) else { return (placeholder, None) };
-            let constants: Vec<&str> = written_constants(table).iter().filter_map(|(k, v)| v.map(|_| *k)).collect();
-            let origin =
-                if constants.is_empty() { "E and nu".into() } else { constants.join(", ").replace("_kpa", "") };
+            let written: Vec<&str> = table.constants().iter().filter_map(|(k, v)| v.map(|_| *k)).collect();
+            let origin = if written.is_empty() { "E and nu".into() } else { written.join(", ").replace("_kpa", "") };
             let material = TissueMaterial::new("constants", format!("{origin} of the scene file"), law, density);
             if in_range {
                 self.verdict(at, table, &material, cell_size);
             }
             return (material, None);
         };
-        let constant = written_constants(table).iter().find_map(|(key, value)| value.map(|_| *key));
+        let constant = table.constants().iter().find_map(|(key, value)| value.map(|_| *key));
         let other = [
             ("law", table.law.is_some()),
             ("youngs_modulus_kpa", table.youngs_modulus_kpa.is_some()),
@@ -205,14 +142,12 @@ impl Check<'_> {
     /// Ranges of all numbers of the law; the signs of its constants are the verdict's business.
     pub(super) fn material_ranges(&mut self, at: &str, table: &MaterialTable) {
         let path = |key: &str| format!("{at}.{key}");
-        for (key, value) in written_constants(table) {
-            let Some(value) = value else { continue };
-            let within = match key {
-                "alpha" => Within::Between(-50.0, 50.0),
-                "b" => Within::Between(-100.0, 100.0),
-                _ => Within::Between(-1e6, 1e6),
-            };
-            self.number(&path(key), value, within);
+        let known = constants();
+        for (key, value) in table.constants() {
+            let constant = known.iter().find(|constant| constant.key == key);
+            if let (Some(value), Some(constant)) = (value, constant) {
+                self.number(&path(key), value, Within::Between(-constant.largest, constant.largest));
+            }
         }
         let largest = LARGEST_TISSUE_MODULUS / KPA;
         if let Some(value) = table.youngs_modulus_kpa {
@@ -259,29 +194,23 @@ impl Check<'_> {
         if self.reports_foreign_constants(at, table, word) {
             return None;
         }
-        let written = written_constants(table);
+        let written = table.constants();
         let value = |key: &str| written.iter().find(|(k, _)| *k == key).and_then(|(_, value)| *value);
-        let missing: Vec<&str> = word.constants().iter().copied().filter(|key| value(key).is_none()).collect();
-        if missing.len() == word.constants().len() {
+        let keys = word.law().keys();
+        let missing: Vec<&str> = keys.iter().copied().filter(|key| value(key).is_none()).collect();
+        if missing.len() == keys.len() {
             return self.law_from_moduli(at, table, word);
         }
         if !missing.is_empty() {
             self.problems.report(
                 at,
-                format!("the law {} has no {}", word.key(), missing.join(" and no ")),
+                format!("the law {} has no {}", word.law().key, missing.join(" and no ")),
                 "incomplete",
                 format!("add {} (0 is a value), or write preset = \"across-fibre\"", missing.join(" and ")),
             );
             return None;
         }
-        let kpa = |key: &str| value(key).unwrap_or_default() * KPA;
-        let isochoric = match word {
-            LawWord::NeoHookean => Isochoric::NeoHookean(NeoHookean { c10: kpa("c10_kpa") }),
-            LawWord::MooneyRivlin => ElasticLaw::mooney_rivlin(kpa("c10_kpa"), kpa("c01_kpa"), 1.0).isochoric,
-            LawWord::Yeoh => Isochoric::Yeoh(Yeoh { c10: kpa("c10_kpa"), c20: kpa("c20_kpa"), c30: kpa("c30_kpa") }),
-            LawWord::Ogden => Isochoric::Ogden(Ogden { mu: kpa("mu_kpa"), alpha: value("alpha").unwrap_or_default() }),
-            LawWord::Demiray => Isochoric::Demiray(Demiray { mu: kpa("mu_kpa"), b: value("b").unwrap_or_default() }),
-        };
+        let isochoric = word.law().with(|key| value(key).unwrap_or_default());
         let Some(bulk_modulus) = bulk_modulus(table, isochoric.shear_modulus()) else {
             self.problems.report(
                 at,
@@ -299,29 +228,24 @@ impl Check<'_> {
 
     /// Reports constants of other laws; true where there is one.
     fn reports_foreign_constants(&mut self, at: &str, table: &MaterialTable, word: LawWord) -> bool {
+        let (name, keys) = (word.law().key, word.law().keys());
         let mut found = false;
-        for (key, value) in written_constants(table) {
-            if value.is_none() || word.constants().contains(&key) {
+        for (key, value) in table.constants() {
+            if value.is_none() || keys.contains(&key) {
                 continue;
             }
             found = true;
-            let owners: Vec<LawWord> = LawWord::ALL.into_iter().filter(|w| w.constants().contains(&key)).collect();
-            let names: Vec<&str> = owners.iter().map(|owner| owner.key()).collect();
+            let names: Vec<&str> = owners(key).map(|law| law.key).collect();
             let this = match table.law {
-                Some(word) => format!("this material is {}", word.key()),
-                None => "without the key `law` a material is mooney_rivlin".into(),
+                Some(_) => format!("this material is {name}"),
+                None => format!("without the key `law` a material is {name}"),
             };
             let laws: Vec<String> = names.iter().map(|name| format!("law = \"{name}\"")).collect();
             self.problems.report(
                 &format!("{at}.{key}"),
                 format!("`{key}` belongs to {}, and {this}", names.join(" and ")),
                 "constant of another law",
-                format!(
-                    "write {}, or remove {key}; {} has {}",
-                    laws.join(" or "),
-                    word.key(),
-                    word.constants().join(", ")
-                ),
+                format!("write {}, or remove {key}; {name} has {}", laws.join(" or "), keys.join(", ")),
             );
         }
         found
@@ -330,35 +254,29 @@ impl Check<'_> {
     /// Neo-Hookean or Mooney-Rivlin from E and nu.
     fn law_from_moduli(&mut self, at: &str, table: &MaterialTable, word: LawWord) -> Option<ElasticLaw> {
         let path = format!("{at}.youngs_modulus_kpa");
+        let (law, keys) = (word.law(), word.law().keys().join(", "));
         let Some(young) = table.youngs_modulus_kpa.map(|e| e * KPA) else {
             let way_out = match (table.law, word) {
                 (None, _) => "write preset = \"across-fibre\", or law with its constants and one volumetric key, or \
                      youngs_modulus_kpa and poisson_ratio"
                     .into(),
-                (_, LawWord::NeoHookean | LawWord::MooneyRivlin) => format!(
-                    "write {} and one volumetric key, or youngs_modulus_kpa and poisson_ratio",
-                    word.constants().join(", ")
-                ),
-                _ => format!("write {} and one volumetric key, e.g. poisson_ratio = 0.45", word.constants().join(", ")),
+                (_, LawWord::NeoHookean | LawWord::MooneyRivlin) => {
+                    format!("write {keys} and one volumetric key, or youngs_modulus_kpa and poisson_ratio")
+                }
+                _ => format!("write {keys} and one volumetric key, e.g. poisson_ratio = 0.45"),
             };
             self.problems.report(at, "the tissue has no complete law", "incomplete", way_out);
             return None;
         };
         if !matches!(word, LawWord::NeoHookean | LawWord::MooneyRivlin) {
             let shear = young / (2.0 * (1.0 + table.poisson_ratio.unwrap_or(0.45)));
-            let start = if word == LawWord::Yeoh {
-                format!("c10_kpa = {}", four_digits(0.5 * shear / KPA))
-            } else {
-                format!("mu_kpa = {}", four_digits(shear / KPA))
-            };
+            let first = law.constants[0];
+            let start = format!("{} = {}", first.key, four_digits(shear / law.shear_of_first() / first.si));
             self.problems.report(
                 &path,
-                format!("E and nu do not fix the law {}: they say nothing about its stiffening", word.key()),
+                format!("E and nu do not fix the law {}: they say nothing about its stiffening", law.key),
                 "for neo_hookean and mooney_rivlin only",
-                format!(
-                    "write its constants instead, {}; this E means {start} at rest; keep poisson_ratio",
-                    word.constants().join(", ")
-                ),
+                format!("write its constants instead, {keys}; this E means {start} at rest; keep poisson_ratio"),
             );
             return None;
         }
@@ -406,7 +324,7 @@ impl Check<'_> {
     /// Accepts, limits or refuses the law; compares values that are stated twice.
     fn verdict(&mut self, at: &str, table: &MaterialTable, material: &TissueMaterial, cell_size: f64) {
         let law = &material.law;
-        let key = written_constants(table).iter().filter(|(_, value)| value.is_some()).map(|(key, _)| *key).next();
+        let key = table.constants().iter().filter(|(_, value)| value.is_some()).map(|(key, _)| *key).next();
         let place = match key {
             Some(_) if table.c01_kpa.is_some() => format!("{at}.c01_kpa"),
             Some(key) => format!("{at}.{key}"),
@@ -427,7 +345,7 @@ impl Check<'_> {
                         "",
                         format!(
                             "write allow_limited = true to accept the limit; without it {}",
-                            LawWord::of(law).stable_constants()
+                            law.isochoric.law().way_out
                         ),
                     ),
                 };
@@ -486,7 +404,7 @@ impl Check<'_> {
                 place,
                 format!("REFUSED material: {} ({growth})", describe_verdict(law)),
                 "unstable at rest",
-                LawWord::of(law).stable_constants(),
+                law.isochoric.law().way_out,
             );
             return;
         };
@@ -508,5 +426,19 @@ impl Check<'_> {
             "write preset = \"lv2022-refit\" (c10 2.3 kPa, c01 1.0 kPa, D 4e-6 1/Pa) instead of the constants, \
              or constants with c10 + c01 > 0 (allow_limited = true if one of them is negative)",
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_has_the_constants_of_the_table_of_laws() {
+        let keys: Vec<&str> = constants().iter().map(|constant| constant.key).collect();
+        let written: Vec<&str> = MaterialTable::default().constants().iter().map(|(key, _)| *key).collect();
+        assert_eq!(written, keys, "src/scene/file.rs against the entries `LAW` in src/material");
+        let all: Vec<(&str, Option<f64>)> = keys.iter().zip(1..).map(|(key, i)| (*key, Some(f64::from(i)))).collect();
+        assert_eq!(MaterialTable::default().with_constants(&all).constants(), all);
     }
 }
