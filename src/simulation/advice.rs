@@ -175,7 +175,7 @@ mod tests {
     }
 
     const MAIN: &str = "effects = [\"puncture\"]\n[tissue]\nsize_mm = [12.0, 12.0, 8.0]\ncell_size_mm = 0.8\n[material]\n\
-        law = \"neo_hookean\"\nyoungs_modulus_kpa = 30.0\npoisson_ratio = 0.47\n[needle]\ngauge = \"16G\"\n\
+        law = \"neo_hookean\"\nyoungs_modulus_kpa = 30.0\npoisson_ratio = 0.47\n[needle]\ngauge = \"16G\"\ntip_half_angle_deg = 18\n\
         [[motion.phase]]\nkind = \"insert\"\nspeed_mm_s = 2.0\ndepth_mm = 4.0\n";
 
     #[test]
