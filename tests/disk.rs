@@ -204,7 +204,7 @@ fn a_checkpoint_that_cannot_be_written_leaves_the_one_before() {
     assert_whole_tables(&place.path("out"));
     assert!(place.leftovers("out").is_empty(), "{:?}", place.leftovers("out"));
     let output = place.call("run --resume out");
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", self::told(&output));
 }
 
 /// A run whose tables fit is not ended by a checkpoint that does not; and whoever could go on from nothing is told so.

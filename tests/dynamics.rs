@@ -15,6 +15,7 @@ use stylet::engine::{Engine, FrameSums, StepInput};
 use stylet::material::{Demiray, ElasticLaw, Isochoric, MooneyRivlin, NeoHookean};
 use stylet::model::Model;
 use stylet::scene::{FaceDrive, Scene};
+use stylet::simulation::Simulation;
 
 use common::*;
 
@@ -544,4 +545,28 @@ fn the_bound_knows_contact_springs_and_faces() {
         }
     }
     assert!(tightest > 0.5, "the bound is far from what it bounds: {tightest}");
+}
+
+/// Without mass scaling nothing raises the mass of a cell that stiffens: later frames take more steps, on both engines the same.
+#[test]
+fn both_engines_ask_for_the_same_steps_where_tissue_stiffens() {
+    let Some(gpu) = gpu() else { return };
+    let text = "effects = []\n[tissue]\nsize_mm = [4.0, 4.0, 4.0]\ncell_size_mm = 2.0\n[material]\nlaw = \"neo_hookean\"\n\
+        c10_kpa = 3.0\nbulk_modulus_kpa = 22.0\n[boundaries]\nx_min = \"roller\"\nx_max = \"free\"\ny_min = \"roller\"\ny_max = \"free\"\n\
+        z_min = \"roller\"\nz_max = { fixed = [\"z\"], displacement_mm = [0.0, 0.0, -2.0], duration_s = 0.2 }\n[solver]\nduration_s = 0.2\n\
+        mass_damping_per_s = 50.0\n";
+    let steps = |device| {
+        let scene = Scene::parse(std::path::Path::new("stiffening.toml"), text, &[]).unwrap();
+        let mut run = Simulation::on(scene, device).unwrap();
+        let mut steps = Vec::new();
+        while let Some(record) = run.next_frame().unwrap() {
+            steps.push(record.step);
+        }
+        steps
+    };
+    let (cpu, gpu) = (steps(None), steps(Some(gpu)));
+    let first = cpu[2] - cpu[1];
+    let last = cpu[cpu.len() - 2] - cpu[cpu.len() - 3];
+    assert!(last > first, "the tissue does not stiffen: {first} and {last} steps a frame");
+    assert_eq!(cpu, gpu);
 }

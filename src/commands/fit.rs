@@ -156,7 +156,10 @@ fn check_options(options: &FitOptions) -> Result<()> {
     if let Some(law) = &options.law
         && !LAWS.iter().any(|l| l.key == law)
     {
-        return Err(Error::input(format!("`{law}` is no law"), format!("use one of {}", LAWS.map(|l| l.key).join(", "))));
+        return Err(Error::input(
+            format!("`{law}` is no law"),
+            format!("use one of {}", LAWS.map(|l| l.key).join(", ")),
+        ));
     }
     if options.files.is_empty() {
         return Err(Error::input("no file was given", format!("give a CSV file with the header `{EXAMPLE}`")));
