@@ -116,7 +116,7 @@ mod tests {
         let folders = "a/".repeat(50_000);
         for text in [&long, &words, &folders] {
             let short = brief(&format!("`{text}` stands where a number is expected"));
-            assert!(short.starts_with("`a") && short.ends_with("a` stands where a number is expected"), "{short}");
+            assert!(short.starts_with("`a") && short.ends_with("` stands where a number is expected"), "{short}");
             assert!(short.len() < 2000, "{} bytes", short.len());
         }
         let path = format!("{}/scene.toml", "folder/".repeat(60));

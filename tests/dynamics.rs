@@ -551,10 +551,12 @@ fn the_bound_knows_contact_springs_and_faces() {
 #[test]
 fn both_engines_ask_for_the_same_steps_where_tissue_stiffens() {
     let Some(gpu) = gpu() else { return };
-    let text = "effects = []\n[tissue]\nsize_mm = [4.0, 4.0, 4.0]\ncell_size_mm = 2.0\n[material]\nlaw = \"neo_hookean\"\n\
-        c10_kpa = 3.0\nbulk_modulus_kpa = 22.0\n[boundaries]\nx_min = \"roller\"\nx_max = \"free\"\ny_min = \"roller\"\ny_max = \"free\"\n\
-        z_min = \"roller\"\nz_max = { fixed = [\"z\"], displacement_mm = [0.0, 0.0, -2.0], duration_s = 0.2 }\n[solver]\nduration_s = 0.2\n\
-        mass_damping_per_s = 50.0\n";
+    // Stretched by half along two axes.
+    let text = "effects = []\n[tissue]\nsize_mm = [4.0, 4.0, 4.0]\ncell_size_mm = 2.0\n[material]\nc10_kpa = 2.3\nc01_kpa = 1.0\n\
+        bulk_modulus_kpa = 22.0\n[boundaries]\nx_min = \"roller\"\ny_min = \"roller\"\ny_max = \"free\"\nz_min = \"roller\"\n\
+        x_max = { fixed = [\"x\"], displacement_mm = [2.0, 0.0, 0.0], duration_s = 0.5 }\n\
+        z_max = { fixed = [\"z\"], displacement_mm = [0.0, 0.0, 2.0], duration_s = 0.5 }\n[solver]\nduration_s = 0.5\n\
+        mass_damping_per_s = 150.0\n";
     let steps = |device| {
         let scene = Scene::parse(std::path::Path::new("stiffening.toml"), text, &[]).unwrap();
         let mut run = Simulation::on(scene, device).unwrap();

@@ -173,7 +173,11 @@ fn wrong_keys_kinds_and_text() {
     );
     assert_refused(&[("cell_size_mm = 0.6", "")], "[tissue]", &["no `cell_size_mm`", "mesh = \"part.msh\""]);
     assert_refused(&[("cell_size_mm = 0.6", "cell_size_mm = ")], "cell_size_mm", &["not TOML"]);
-    assert_refused(&[("[20.0, 20.0, 16.0]", "[20.0, 20.0]")], "size_mm", &["invalid length"]);
+    assert_refused(
+        &[("[20.0, 20.0, 16.0]", "[20.0, 20.0]")],
+        "size_mm",
+        &["`tissue.size_mm` has 2 entries, 3 are wanted"],
+    );
     assert_refused(
         &[("\"friction\"", "\"frictoin\"")],
         "effects",
@@ -732,7 +736,7 @@ fn keys_without_end_are_refused_at_once() {
         assert!(took < 4.0 && message.len() < 8_000, "{expected}: {took} s, {} bytes", message.len());
     }
     // The longest key that is read is refused for what it says.
-    let text = format!("{MATERIAL}[solver]\n{} = 1\n", "a".repeat(200));
+    let text = format!("{MATERIAL}[gravity]\n{} = 1\n", "a".repeat(200));
     assert!(load_block("", &text).unwrap_err().contains("unknown field"));
 }
 
@@ -742,7 +746,7 @@ fn nothing_in_a_scene_steers_the_terminal() {
     for text in [
         format!("{MATERIAL}\"\\u001b[31mred\" = 1\n"),
         "[material]\npreset = \"\\u001b[31mred\\u0007\"\n".to_string(),
-        format!("{MATERIAL}[solver]\nstep = \"\u{9b}31m \u{202e}red\"\n"),
+        format!("{MATERIAL}[gravity]\nstep = \"\u{9b}31m \u{202e}red\"\n"),
     ] {
         let message = load_block("", &text).unwrap_err();
         assert!(message.chars().all(|c| c == '\n' || !c.is_control()) && !message.contains('\u{202e}'), "{message:?}");

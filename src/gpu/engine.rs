@@ -1406,6 +1406,9 @@ impl Engine for GpuEngine {
             buffer.write(&self.gpu.queue, bytemuck::bytes_of(&centre_line(line)));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        if self.pace.must_learn() {
+            self.wait_for_oldest()?;
+        }
         let mut from = 0;
         match plan.steps.len().checked_sub(1) {
             Some(last) => {
@@ -1416,6 +1419,9 @@ impl Engine for GpuEngine {
                     self.encode_steps(&mut encoder, part.clone())?;
                     let next = self.gpu.device.create_command_encoder(&Default::default());
                     self.submit(std::mem::replace(&mut encoder, next), part.len())?;
+                    if self.pace.must_learn() {
+                        self.wait_for_oldest()?;
+                    }
                 }
                 self.encode_steps(&mut encoder, from..last)?;
                 self.encode_measured_step(&mut encoder, last);

@@ -130,7 +130,7 @@ fn missing_file() {
         ("scenes/muscle_biopsi.toml", "did you mean scenes/muscle_biopsy.toml (built in)?"),
         ("forearm.toml", "did you mean scenes/forearm.toml (built in)?"),
         ("scenes/training", "scenes/training/avoid_vessel.toml, scenes/training/core_biopsy.toml, "),
-        ("./scenes/training/", "scenes/training is a folder, not a scene file"),
+        ("./scenes/training/", "./scenes/training/ is a folder, not a scene file"),
     ] {
         place.call(&["check", wrong]).refused().says(meant);
     }
@@ -178,7 +178,6 @@ fn a_fit_is_refused_before_it_begins() {
         .refused()
         .says("`nonsense` is no law")
         .says("yeoh");
-    place.call(&["fit", "curve.csv", "--law", "nonsense"]).refused().says("`nonsense` is no law");
     place.call(&["fit", "curve.csv", "--out", "file"]).refused().says("file: cannot be used as a folder");
     place.call(&["fit", "curve.csv", "--out", "fitted", "--preset", "a"]).ended(0);
     place.call(&["fit", "curve.csv", "--out", "fitted", "--preset", "b"]).refused().says("fit.svg is already there");
@@ -261,7 +260,7 @@ fn endless_and_huge_sources_are_refused_at_once() {
         let took = begin.elapsed().as_secs_f64();
         assert!(took < 5.0, "{args:?} took {took} s\n{}", answer.all());
         assert_eq!(answer.stderr.matches("error: ").count(), 1, "{}", answer.all());
-        let hollow = args.iter().any(|arg| arg.contains("hole") || arg.contains("hollow"));
+        let hollow = args.iter().any(|arg| arg.contains("hole.") || *arg == "hollow");
         assert!(!hollow || !cfg!(target_os = "linux") || answer.stderr.contains("a hole"), "{}", answer.all());
     }
 }

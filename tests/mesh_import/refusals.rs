@@ -117,7 +117,7 @@ fn vtk() {
     refused("POINTS 5", "POINTS 4", &["a.vtk:10: `5` is not a section"]);
     refused("POINTS 5", "POINTS 6", &["a.vtk:11: a coordinate: `CELLS` is not a number"]);
     refused("POINTS 5", "POINTS 99999999999999999999", &["a.vtk:5: the number of points"]);
-    refused("POINTS 5", "POINTS 18446744073709551615", &["a.vtk:5: 18446744073709551615 times 3 values"]);
+    refused("POINTS 5", "POINTS 18446744073709551615", &["a.vtk:5: 18446744073709551615 points; at most"]);
     refused("4 1 2 3 4", "4 1 2 3 5", &["cell 1 names point 5, which is not in the file: points are 0 to 4"]);
     refused("4 1 2 3 4", "3 1 2 3 4", &["a.vtk:11: CELLS promises 10 values, but 2 cells take 9"]);
     refused("CELL_TYPES 2\n10\n10", "CELL_TYPES 1\n10", &["a.vtk:15: 2 cells, but 1 cell types"]);
@@ -200,17 +200,13 @@ fn abaqus() {
 #[test]
 fn zeros_in_a_text() {
     let zeros = "\0".repeat(1 << 20);
-    for (name, text, line) in [
-        ("a.inp", "*NODE\n".to_string(), 2),
-        ("a.inp", INP.to_string(), 11),
-        ("a.msh", two_tets().replace("$EndNodes\n", ""), 14),
-        ("a.vtk", VTK.to_string(), 19),
-    ] {
+    for (name, text) in
+        [("a.inp", "*NODE\n".to_string()), ("a.inp", INP.into()), ("a.msh", two_tets()), ("a.vtk", VTK.into())]
+    {
         let begin = std::time::Instant::now();
         let message = refusal(name, format!("{text}{zeros}").as_bytes());
-        assert_contains(&message, &["a byte of value 0 stands here", &format!("{name}:")]);
-        let told: u64 = message.split(':').nth(1).unwrap().parse().unwrap();
-        assert!(told.abs_diff(line) <= 2, "{message}");
+        let line = text.lines().count() + 1;
+        assert_contains(&message, &[&format!("{name}:{line}: a byte of value 0 stands here")]);
         assert!(begin.elapsed().as_secs() < 2 && message.len() < 500, "{message}");
     }
 }
