@@ -20,6 +20,7 @@ use winit::window::{Window, WindowId};
 use self::canvas::canvas;
 use self::opening::no_display;
 use self::reference::{read_curve, read_score};
+use super::PACES;
 use super::camera::Camera;
 use super::devices::Devices;
 use super::foresight::Foresight;
@@ -32,7 +33,8 @@ use super::scan::Scan;
 use super::scene_view::SceneView;
 use super::tuning::{Pace, Source};
 use super::watch::Watch;
-use super::{PACES, ViewOptions};
+use crate::commands::replay::session_file;
+use crate::commands::view::ViewArgs;
 use crate::ending;
 use crate::gpu::Gpu;
 use crate::gpu::compose::read_sources;
@@ -76,7 +78,7 @@ pub struct ViewOutcome {
 ///
 /// # Errors
 /// Those of the scene come first. `Error::Input` where there is no display, `Error::Adapter` where no adapter can draw on it.
-pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome> {
+pub fn view(options: &ViewArgs, program_start: Instant) -> Result<ViewOutcome> {
     if !PACES.contains(&options.pace) {
         let way_out = format!("write a number from {} to {}", PACES.start(), PACES.end());
         return Err(Error::input(
@@ -86,11 +88,11 @@ pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome
     }
     let (source, scene, recorded) = match &options.session {
         None => {
-            let (source, scene) = Source::read(options.scene.clone(), options.overrides.clone())?;
+            let (source, scene) = Source::read(options.scene.file.clone(), options.scene.overrides.clone())?;
             (source, scene, None)
         }
         Some(path) => {
-            let session = Session::read(path)?;
+            let session = Session::read(&session_file(path))?;
             session.scene()?;
             let (source, scene) = Source::read(session.scene.clone(), session.overrides.clone())?;
             (source, scene, Some(session))
@@ -130,7 +132,7 @@ pub fn view(options: &ViewOptions, program_start: Instant) -> Result<ViewOutcome
 }
 
 struct App {
-    options: ViewOptions,
+    options: ViewArgs,
     scene: Scene,
     source: Source,
     recorded: Option<Session>,

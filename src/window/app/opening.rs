@@ -32,7 +32,7 @@ const SIZE: [u32; 2] = [1280, 800];
 impl App {
     pub(super) fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<Open> {
         let refused = |reason: String| no_display(&reason);
-        let [width, height] = self.options.size.unwrap_or(SIZE);
+        let [width, height] = self.options.size().unwrap_or(SIZE);
         let attributes = Window::default_attributes()
             .with_title(format!("{} - {}", texts::TITLE, self.scene.title))
             .with_inner_size(winit::dpi::LogicalSize::new(width, height));
