@@ -1,5 +1,5 @@
 //! What a run tells about itself: one record per display frame, fields on request. [`quantity`] lists what stands in tables,
-//! [`energy`] where the work goes.
+//! [`energy`] where the work goes, [`field`] what is written and drawn of the tissue.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -220,6 +220,7 @@ pub struct FieldSnapshot {
 
 mod core_sample;
 pub mod energy;
+pub mod field;
 mod needle_volume;
 pub mod quantity;
 mod recorder;
