@@ -219,12 +219,15 @@ fn without_effect_blocks(text: &str) -> String {
     out
 }
 
+/// Lines of a text with their numbers.
+type NumberedLines<'a> = Vec<(usize, Cow<'a, str>)>;
+
 /// The lines of a text with their numbers (from 1), those between `#for` and `#end` once per law that is meant; or what is wrong in
 /// which line.
 fn repeated<'a>(
     text: &'a str,
     defines: &BTreeSet<&'static str>,
-) -> std::result::Result<Vec<(usize, Cow<'a, str>)>, (usize, String)> {
+) -> std::result::Result<NumberedLines<'a>, (usize, String)> {
     let mut out = Vec::new();
     let mut lines = text.lines().enumerate().map(|(n, line)| (n + 1, line));
     while let Some((number, line)) = lines.next() {
