@@ -79,7 +79,7 @@ impl InvariantLaw for Demiray {
         Slopes { w1: 0.5 * self.mu * first, w2: 0.0, w11: 0.5 * self.mu * self.b * second }
     }
 
-    fn is_capped(&self, e: f64) -> bool {
-        self.b * e > LARGEST_EXPONENT
+    fn is_capped(&self, e: impl FnOnce() -> f64) -> bool {
+        self.b * e() > LARGEST_EXPONENT
     }
 }

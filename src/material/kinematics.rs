@@ -67,6 +67,7 @@ pub fn is_measure_continued(s: f64, j: f64, m: f64) -> bool {
 /// The first line measures the shape at another size, which changes nothing where q >= 0.3: what is squeezed from all
 /// sides obeys the law itself far below J = 0.3, and only what is flat or inside out for its size leaves it. The third
 /// holds M >= 3, since a falls with q and `0.3 r >= q`.
+#[inline]
 pub fn isochoric_measure(s: f64, j: f64, m: f64) -> Measure {
     debug_assert!(m > 0.0, "degree {m}");
     if j >= J_CONTINUATION {
@@ -74,6 +75,11 @@ pub fn isochoric_measure(s: f64, j: f64, m: f64) -> Measure {
         let slope = -m * a / j;
         return Measure { value: a * s, by_s: a, by_j: slope * s, by_jj: (-m - 1.0) * slope / j * s };
     }
+    continued_measure(s, j, m)
+}
+
+/// The same below J = 0.3.
+fn continued_measure(s: f64, j: f64, m: f64) -> Measure {
     let (volume, u) = scale(s, m);
     let k3 = u.powf(0.375);
     let k3m = u.powf(0.375 * m);

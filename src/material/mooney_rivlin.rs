@@ -63,4 +63,8 @@ impl InvariantLaw for MooneyRivlin {
     fn slopes(&self, _i1: f64) -> Slopes {
         Slopes { w1: self.c10, w2: self.c01, ..Slopes::default() }
     }
+
+    fn measures(&self) -> [bool; 2] {
+        [self.c10 != 0.0, self.c01 != 0.0]
+    }
 }
