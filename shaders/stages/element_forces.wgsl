@@ -120,16 +120,10 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let cx = pull_xi(shape, point.cof[0], point.cof[1]);
         let cy = pull_eta(shape, point.cof[0], point.cof[1]);
         let cz = point.cof[2] * edge_z.quarter_inverse;
-#ifdef TIED
-        // Faces that part have edges of their own.
-        let on_edge = true;
-#else
-#ifdef MASS_SCALING
+#ifdef INNER_BOUND
         let on_edge = open_sides + open_side(k, CELLS_Z - 1u, 4u, FIXED_Z_MIN, FIXED_Z_MAX) > 1u;
 #else
-        // Nothing follows the stiffness of squeezed cells and of contact: the margin of the coarse bound is theirs.
         let on_edge = true;
-#endif
 #endif
         let cof_b = largest_square(
             vec3<f32>(dot(cx, cx), dot(cy, cy), dot(cz, cz)),

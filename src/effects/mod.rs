@@ -133,6 +133,12 @@ impl EffectSet {
         ]
     }
 
+    /// True where the finer step bound of cells within a block serves. Its lack of margin needs mass scaling, which follows the
+    /// stiffness of squeezed cells and of contact; and faces that may part (cohesive) have edges of their own in every cell.
+    pub fn bounds_inner_cells(&self) -> bool {
+        self.mass_scaling.is_some() && self.cohesive.is_none()
+    }
+
     /// The effects that are on, in the order of [`EFFECTS`].
     pub fn active(&self) -> impl Iterator<Item = &'static Effect> + '_ {
         EFFECTS.iter().zip(self.presence()).filter_map(|(effect, on)| on.then_some(effect))

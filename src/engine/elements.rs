@@ -364,10 +364,9 @@ impl Elements {
         self.stiffness_bound(model, cell, cofactor(DMat3::IDENTITY + h), tangent, q2)
     }
 
-    /// True where open faces of the block meet in a cell, or faces within it may part. Without mass scaling nothing follows the
-    /// stiffness of squeezed cells and of contact: the margin of the coarse bound is theirs, in all cells.
+    /// True where open faces of the block meet in a cell, and in all cells where the bound of inner ones does not serve.
     fn is_on_edge(&self, model: &Model, cell: usize) -> bool {
-        if model.effects.cohesive.is_some() || model.effects.mass_scaling.is_none() {
+        if !model.effects.bounds_inner_cells() {
             return true;
         }
         let block = model.mesh.block();

@@ -99,8 +99,9 @@ pub const SOURCES: &[(&str, &str)] = &[
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 14] = [
+pub const SCENE_DEFINES: [&str; 15] = [
     "TIED",
+    "INNER_BOUND",
     "SLIT",
     "BORE",
     "FREE_PATH",

@@ -112,6 +112,7 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     let separates = !features.tetrahedra && effects.cohesive.is_some() && effects.puncture.is_some();
     // Grid lines are doubled where faces may separate: copies that stay together move as one.
     define("TIED", !features.tetrahedra && effects.cohesive.is_some());
+    define("INNER_BOUND", !features.tetrahedra && effects.bounds_inner_cells());
     define("BORE", features.bore && separates);
     define("SLIT", features.slit && separates);
     define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
