@@ -13,7 +13,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::bench::{Subject, open, scene, uniform_mesh};
-use crate::effects::{EFFECTS, EffectSet, damage, fibres, gravity, plasticity, viscoelastic};
+use crate::effects::{self, EFFECTS, EffectSet, Kind, damage, fibres, gravity, plasticity, viscoelastic};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::compose::{compose, compose_without_effects};
@@ -192,7 +192,7 @@ pub fn off_is_absent() -> Result<bool> {
 pub fn bench_effects(engine: EngineChoice) -> Result<EffectReport> {
     let gpu = open(engine)?;
     let gpu = gpu.as_ref();
-    const CONSTITUTIVE: [&str; 4] = ["plasticity", "fibres", "viscoelastic", "damage"];
+    let constitutive: Vec<&str> = effects::keys_of(Kind::Constitutive).collect();
     let mut costs = Vec::new();
     let plan: [(&[&str], &[&str], bool); 14] = [
         (&["mass_scaling"], &[], false),
@@ -201,11 +201,11 @@ pub fn bench_effects(engine: EngineChoice) -> Result<EffectReport> {
         (&["fibres"], &[], false),
         (&["viscoelastic"], &[], false),
         (&["plasticity", "damage"], &["plasticity"], false),
-        (&CONSTITUTIVE, &[], false),
+        (&constitutive, &[], false),
         (&["plasticity"], &[], true),
         (&["fibres"], &[], true),
         (&["viscoelastic"], &[], true),
-        (&CONSTITUTIVE, &[], true),
+        (&constitutive, &[], true),
         (&["mass_scaling", "indentation"], &["mass_scaling"], false),
         (&["mass_scaling", "puncture"], &["mass_scaling"], false),
         (&["mass_scaling", "puncture", "friction"], &["mass_scaling", "puncture"], false),
@@ -214,7 +214,7 @@ pub fn bench_effects(engine: EngineChoice) -> Result<EffectReport> {
         eprintln!("  {} ({})", keys.join(" + "), if low { "work" } else { "rest" });
         costs.push(cost(keys, beside, low, gpu)?);
     }
-    let all = costs.iter().find(|c| c.load == "rest" && c.effects == CONSTITUTIVE.join(" + "));
+    let all = costs.iter().find(|c| c.load == "rest" && c.effects == constitutive.join(" + "));
     let info = Subject::of_model(Arc::new(Model::new(scene([2; 3], false), uniform_mesh([2; 3], 0.8e-3))), gpu, 1)?;
     Ok(EffectReport {
         engine: info.engine.info().engine.clone(),

@@ -10,7 +10,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::effects::viscoelastic::{LARGEST_TERM_COUNT, Term};
-use crate::effects::{damage, fibres, plasticity, viscoelastic};
+use crate::effects::{Effect, Kind, damage, fibres, keys_of, plasticity, viscoelastic};
 use crate::error::{Error, Result};
 use crate::material::law::{Constant, constants, owners};
 use crate::material::{Continuation, ElasticLaw, LAWS, LawWord, Mode, Verdict, describe_verdict, four_digits};
@@ -83,8 +83,9 @@ pub struct MaterialArgs {
     no_unload: bool,
 
     /// Effects beside the elastic law, with the program's default parameters (with --scene: those of the scene)
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", help_heading = "Effects")]
-    effects: Option<Vec<EffectName>>,
+    #[arg(long, value_parser = PossibleValuesParser::new(keys_of(Kind::Constitutive)), value_delimiter = ',', value_name = "LIST",
+        help_heading = "Effects")]
+    effects: Option<Vec<String>>,
     /// plasticity: yield stress
     #[arg(long, value_name = "KPA", help_heading = "Effects")]
     yield_kpa: Option<f64>,
@@ -208,14 +209,6 @@ enum ModeName {
     Planar,
     Shear,
     All,
-}
-
-#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
-enum EffectName {
-    Plasticity,
-    Fibres,
-    Viscoelastic,
-    Damage,
 }
 
 /// A material with its name, as the head of the table tells it.
@@ -500,15 +493,14 @@ fn bulk_modulus(args: &MaterialArgs, shear: f64) -> Result<Option<f64>> {
 fn effects(args: &MaterialArgs, material: &mut Material) -> Result<()> {
     if let Some(list) = &args.effects {
         if let Some((_, twice)) = list.iter().enumerate().find(|(index, name)| list[..*index].contains(name)) {
-            let key = twice.to_possible_value().map_or(String::new(), |value| value.get_name().to_string());
-            return Err(Error::input(format!("--effects: `{key}` is listed twice"), "name every effect once"));
+            return Err(Error::input(format!("--effects: `{twice}` is listed twice"), "name every effect once"));
         }
         // Parameters of a scene stay; what it does not have comes with its default.
-        let on = |name: EffectName| list.contains(&name);
-        material.plasticity = on(EffectName::Plasticity).then(|| material.plasticity.unwrap_or_default());
-        material.fibres = on(EffectName::Fibres).then(|| material.fibres.unwrap_or_default());
-        material.viscoelastic = on(EffectName::Viscoelastic).then(|| material.viscoelastic.clone().unwrap_or_default());
-        material.damage = on(EffectName::Damage).then(|| material.damage.unwrap_or_default());
+        let on = |effect: &Effect| list.iter().any(|key| key == effect.key);
+        material.plasticity = on(&plasticity::EFFECT).then(|| material.plasticity.unwrap_or_default());
+        material.fibres = on(&fibres::EFFECT).then(|| material.fibres.unwrap_or_default());
+        material.viscoelastic = on(&viscoelastic::EFFECT).then(|| material.viscoelastic.clone().unwrap_or_default());
+        material.damage = on(&damage::EFFECT).then(|| material.damage.unwrap_or_default());
     }
     let without = |option: &str, effect: &str| {
         Error::input(

@@ -19,11 +19,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "adhesion",
+    kind: Kind::Tool,
+    needs: &["puncture"],
     define: "ADHESION",
     summary: "tissue sticks to the tip and lets go: drops at a fixed spacing; a model of the built-up-edge hypothesis",
     source: "hypothesis of Lv2022; law: this project",

@@ -21,11 +21,13 @@
 //! the leapfrog work. Range of validity: the process zone `E G_c/strength^2` spans a few faces; penalty K = factor E/h, and
 //! `lambda_f >= 1.1 lambda_0`: a scene with less is refused.
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "cohesive",
+    kind: Kind::Faces,
+    needs: &[],
     define: "COHESIVE",
     summary: "faces that separate: bilinear cohesion on the slit or bore of a needle and on chosen planes",
     source: "Turon2006, Camanho2002, Benzeggagh1996",

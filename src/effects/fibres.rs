@@ -10,13 +10,15 @@
 
 use glam::{DMat3, DVec3};
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::{Parameter, Value};
 use crate::material::demiray::{LARGEST_EXPONENT, capped_exponential};
 use crate::material::kinematics::{cofactor, isochoric_factor, jacobian_minus_one};
 
 pub const EFFECT: Effect = Effect {
     key: "fibres",
+    kind: Kind::Constitutive,
+    needs: &[],
     define: "FIBRES",
     summary: "one family of fibres that stiffen exponentially in tension",
     source: "Holzapfel2000",

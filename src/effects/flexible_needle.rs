@@ -27,12 +27,14 @@
 
 use glam::DVec3;
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::{Parameter, Value};
 use crate::needle::beam::{BeamParams, Section};
 
 pub const EFFECT: Effect = Effect {
     key: "flexible_needle",
+    kind: Kind::Tool,
+    needs: &["puncture"],
     define: "FLEXIBLE_NEEDLE",
     summary: "the needle is a beam clamped in its hub: it bends, and buckles where it is too thin",
     source: "Crisfield1991; Berger1977; coupling: this project",

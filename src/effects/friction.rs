@@ -7,11 +7,13 @@
 //! force step for every layer of nodes that the base passes. A regularisation by `tanh` would creep and
 //! cannot stick. Source: Wriggers 2006, ch. 5 (return mapping); coefficient 0.3: Lv2022, section 3.2.
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "friction",
+    kind: Kind::Tool,
+    needs: &["puncture", "indentation"],
     define: "FRICTION",
     summary: "Coulomb friction with stick memory on the shaft, none on the cone",
     source: "Wriggers2006, Lv2022",

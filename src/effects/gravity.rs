@@ -5,11 +5,13 @@
 
 use glam::DVec3;
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::{Parameter, Value};
 
 pub const EFFECT: Effect = Effect {
     key: "gravity",
+    kind: Kind::Nodes,
+    needs: &[],
     define: "GRAVITY",
     summary: "weight of the tissue",
     source: "Newton",

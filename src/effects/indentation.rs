@@ -12,12 +12,14 @@
 
 use glam::DVec3;
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::Parameter;
 use crate::needle::Tool;
 
 pub const EFFECT: Effect = Effect {
     key: "indentation",
+    kind: Kind::Contact,
+    needs: &[],
     define: "INDENTATION",
     summary: "contact of the top face with a rigid sphere or flat punch",
     source: "Wriggers2006",

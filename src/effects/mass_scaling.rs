@@ -8,11 +8,13 @@
 //! wave speed; kinetic over internal energy is reported and should stay below 5 %.
 //! Source: Olovsson, Simonsson & Unosson 2005 (selective mass scaling); Joldes et al. 2008 (tissue).
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::Parameter;
 
 pub const EFFECT: Effect = Effect {
     key: "mass_scaling",
+    kind: Kind::Nodes,
+    needs: &[],
     define: "MASS_SCALING",
     summary: "inertia of the tissue times S, so that the stable step grows with sqrt(S)",
     source: "Olovsson2005, Joldes2008",

@@ -16,22 +16,41 @@ pub mod viscoelastic;
 
 use crate::material::ElasticLaw;
 
-/// The effects of one scene, one field per effect, in the order of [`EFFECTS`].
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct EffectSet {
-    pub mass_scaling: Option<mass_scaling::Params>,
-    pub gravity: Option<gravity::Params>,
-    /// Parameters of materials that state none of their own; the same for the next three.
-    pub plasticity: Option<plasticity::Params>,
-    pub fibres: Option<fibres::Params>,
-    pub viscoelastic: Option<viscoelastic::Params>,
-    pub damage: Option<damage::Params>,
-    pub cohesive: Option<cohesive::Params>,
-    pub puncture: Option<puncture::Params>,
-    pub adhesion: Option<adhesion::Params>,
-    pub indentation: Option<indentation::Params>,
-    pub friction: Option<friction::Params>,
-    pub flexible_needle: Option<flexible_needle::Params>,
+/// One line per effect: its field in [`EffectSet`] and its entry in [`EFFECTS`].
+macro_rules! effects {
+    ($($(#[$text:meta])* $name:ident,)+) => {
+        /// The effects of one scene, one field per effect, in the order of [`EFFECTS`]. Parameters of a constitutive effect are those of
+        /// materials that state none of their own.
+        #[derive(Debug, Clone, PartialEq, Default)]
+        pub struct EffectSet {
+            $($(#[$text])* pub $name: Option<$name::Params>,)+
+        }
+
+        /// All effects. The order is the order of their blocks in the stages.
+        pub const EFFECTS: [Effect; [$(stringify!($name)),+].len()] = [$($name::EFFECT),+];
+
+        impl EffectSet {
+            /// Which effects are on, in the order of [`EFFECTS`].
+            fn presence(&self) -> [bool; EFFECTS.len()] {
+                [$(self.$name.is_some()),+]
+            }
+        }
+    };
+}
+
+effects! {
+    mass_scaling,
+    gravity,
+    plasticity,
+    fibres,
+    viscoelastic,
+    damage,
+    cohesive,
+    puncture,
+    adhesion,
+    indentation,
+    friction,
+    flexible_needle,
 }
 
 /// Material of the tissue with its origin.
@@ -81,11 +100,36 @@ pub struct Numbers<'a> {
     pub material: &'a TissueMaterial,
 }
 
+/// What an effect acts on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Nodes: inertia and loads.
+    Nodes,
+    /// The stress in a cell; a material may state parameters of its own.
+    Constitutive,
+    /// Faces between cells, which separate.
+    Faces,
+    /// Touch: lets a tool touch the tissue.
+    Contact,
+    /// What a tool does beyond touching.
+    Tool,
+}
+
+impl Kind {
+    /// True for effects that work on the block only.
+    pub const fn needs_block(self) -> bool {
+        matches!(self, Kind::Faces | Kind::Contact | Kind::Tool)
+    }
+}
+
 /// What the program knows about an effect without running it.
 #[derive(Debug, Clone, Copy)]
 pub struct Effect {
     /// Key in the scene's `effects` list and stem of its files.
     pub key: &'static str,
+    pub kind: Kind,
+    /// Keys of effects of which one must be on beside it; none: it works alone.
+    pub needs: &'static [&'static str],
     /// Name tested by `#ifdef` in the shaders.
     pub define: &'static str,
     /// One line for `check`, the window and `docs/effects`.
@@ -98,41 +142,7 @@ pub struct Effect {
     pub parameters: &'static [parameter::Parameter],
 }
 
-/// All effects. The order is the order of their blocks in the stages.
-pub const EFFECTS: [Effect; 12] = [
-    mass_scaling::EFFECT,
-    gravity::EFFECT,
-    plasticity::EFFECT,
-    fibres::EFFECT,
-    viscoelastic::EFFECT,
-    damage::EFFECT,
-    cohesive::EFFECT,
-    puncture::EFFECT,
-    adhesion::EFFECT,
-    indentation::EFFECT,
-    friction::EFFECT,
-    flexible_needle::EFFECT,
-];
-
 impl EffectSet {
-    /// Which effects are on, in the order of [`EFFECTS`].
-    fn presence(&self) -> [bool; EFFECTS.len()] {
-        [
-            self.mass_scaling.is_some(),
-            self.gravity.is_some(),
-            self.plasticity.is_some(),
-            self.fibres.is_some(),
-            self.viscoelastic.is_some(),
-            self.damage.is_some(),
-            self.cohesive.is_some(),
-            self.puncture.is_some(),
-            self.adhesion.is_some(),
-            self.indentation.is_some(),
-            self.friction.is_some(),
-            self.flexible_needle.is_some(),
-        ]
-    }
-
     /// True where the finer step bound of cells within a block serves. Its lack of margin needs mass scaling, which follows the
     /// stiffness of squeezed cells and of contact; and faces that may part (cohesive) have edges of their own in every cell.
     pub fn bounds_inner_cells(&self) -> bool {
@@ -150,27 +160,24 @@ impl EffectSet {
     }
 }
 
+/// Keys of the effects of one kind.
+pub fn keys_of(kind: Kind) -> impl Iterator<Item = &'static str> {
+    EFFECTS.iter().filter(move |e| e.kind == kind).map(|e| e.key)
+}
+
 /// The override that switches exactly these effects on, in the order of [`EFFECTS`].
 pub fn exactly(on: &[&str]) -> String {
     let keys: Vec<&str> = EFFECTS.iter().map(|e| e.key).filter(|k| on.contains(k)).collect();
     format!("effects={keys:?}")
 }
 
-/// Effects that do nothing without one of the others beside them; a scene with such an effect alone is refused.
-const NEEDS: [(&str, &[&str]); 4] = [
-    ("damage", &["plasticity"]),
-    ("adhesion", &["puncture"]),
-    ("flexible_needle", &["puncture"]),
-    ("friction", &["puncture", "indentation"]),
-];
-
 /// The override that switches the effect `key` where those of `on` run. Switched off, it takes along what does nothing without it.
 pub fn switched(on: &[&str], key: &str, is: bool) -> String {
     let mut left: Vec<&str> = on.iter().copied().filter(|k| *k != key).chain(is.then_some(key)).collect();
     if !is {
-        for (dependent, needs) in NEEDS.iter().filter(|(_, needs)| needs.contains(&key)) {
-            if !needs.iter().any(|need| left.contains(need)) {
-                left.retain(|k| k != dependent);
+        for dependent in EFFECTS.iter().filter(|e| e.needs.contains(&key)) {
+            if !dependent.needs.iter().any(|need| left.contains(need)) {
+                left.retain(|k| *k != dependent.key);
             }
         }
     }

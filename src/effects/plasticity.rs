@@ -16,13 +16,15 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::Parameter;
 use crate::material::kinematics::{double_dot, symmetric_eigen};
 use crate::material::{ElasticLaw, deviator, equivalent};
 
 pub const EFFECT: Effect = Effect {
     key: "plasticity",
+    kind: Kind::Constitutive,
+    needs: &[],
     define: "PLASTICITY",
     summary: "permanent flow above a yield stress, linear hardening (F = Fe Fp)",
     source: "Lee 1969, Simo & Ortiz 1985; Lv2022 Eq. 8",

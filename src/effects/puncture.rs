@@ -34,7 +34,7 @@
 //! (src/needle/free_path.rs). Source: this project; F_cut = G_c w with the toughness of liver under needles, 76 to 185 J/m^2 [Azar2008],
 //! 164 J/m^2 [Gokgol2012].
 
-use super::Effect;
+use super::{Effect, Kind};
 use super::parameter::Parameter;
 
 /// Advance of the tip in its first step, and the largest one of a step beside what the needle travels [m]. The second is
@@ -67,6 +67,8 @@ pub fn share_beyond(force: f64, threshold: f64) -> f64 {
 
 pub const EFFECT: Effect = Effect {
     key: "puncture",
+    kind: Kind::Contact,
+    needs: &[],
     define: "PUNCTURE",
     summary: "tip law (puncture, cutting) and contact with the opened path of the needle",
     source: "this project (docs/effects/puncture.md); toughness: Gokgol2012, Azar2008",

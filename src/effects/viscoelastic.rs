@@ -15,10 +15,12 @@
 //! `Xi = sum q_i:q_i/(4 mu0 g_i)` is stored and the rest, `sum E:dq - Xi`, dissipated.
 
 use super::parameter::{Parameter, Value};
-use super::{Effect, Numbers};
+use super::{Effect, Kind, Numbers};
 
 pub const EFFECT: Effect = Effect {
     key: "viscoelastic",
+    kind: Kind::Constitutive,
+    needs: &[],
     define: "VISCOELASTIC",
     summary: "stress that relaxes with time: Prony series on the isochoric stress",
     source: "Simo1987, Taylor1970",

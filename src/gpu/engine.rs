@@ -15,7 +15,7 @@ use super::memory::Memory;
 use super::pace::Pace;
 use super::structs::*;
 use super::texels::{Texels, texel_numbers};
-use crate::effects::EffectSet;
+use crate::effects::{Effect, EffectSet};
 use crate::effects::adhesion::Bond;
 use crate::effects::cohesive::TORN_REACH;
 use crate::engine::elements::{HOURGLASS_MODULUS, PrismBase};
@@ -87,16 +87,13 @@ impl Features {
     }
 }
 
-/// Effects of tools, which work on the block only.
-const BLOCK_EFFECTS: [&str; 6] = ["cohesive", "puncture", "adhesion", "indentation", "friction", "flexible_needle"];
-
 /// Names that are defined for the shaders.
 pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
     // A flexible needle acts by the contact of `puncture`, on a planned path.
     let bends = effects.puncture.is_some() && !features.free_path;
     let works =
-        |key: &str| (!features.tetrahedra || !BLOCK_EFFECTS.contains(&key)) && (key != "flexible_needle" || bends);
-    let mut defines: BTreeSet<&'static str> = effects.active().filter(|e| works(e.key)).map(|e| e.define).collect();
+        |e: &&Effect| !(features.tetrahedra && e.kind.needs_block()) && (e.key != "flexible_needle" || bends);
+    let mut defines: BTreeSet<&'static str> = effects.active().filter(works).map(|e| e.define).collect();
     let mut define = |name: &'static str, wanted: bool| {
         if wanted {
             defines.insert(name);

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::Simulation;
 use super::checkpoint::Checkpoint;
 use super::fields::snapshot;
+use crate::effects::Kind;
 use crate::engine::{FramePlan, State};
 use crate::error::Result;
 use crate::model::Model;
@@ -166,7 +167,8 @@ fn locate(
         n => model.scene.regions.get(n - 1).map_or(format!("region {n}"), |r| format!("region \"{}\"", r.name)),
     };
     let law = model.material(cell).law.isochoric.key();
-    let within: Vec<&str> = model.effects.keys().into_iter().filter(|key| MATERIAL_EFFECTS.contains(key)).collect();
+    let within: Vec<&str> =
+        model.effects.active().filter(|e| e.kind == Kind::Constitutive).map(|effect| effect.key).collect();
     acting.push(match within.is_empty() {
         true => format!("element forces of {name} ({law})"),
         false => format!("element forces of {name} ({law} with {})", within.join(", ")),
@@ -192,6 +194,3 @@ fn locate(
         frame,
     }
 }
-
-/// Effects that act inside a cell.
-const MATERIAL_EFFECTS: [&str; 4] = ["plasticity", "fibres", "viscoelastic", "damage"];

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::{Engine, MeshSize, Settings, trimmed};
-use crate::effects::EFFECTS;
+use crate::effects::{EFFECTS, Kind};
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -24,9 +24,6 @@ const SPAN: f64 = 0.8;
 /// Distance of the sample points from the path in radii of the tool, and at most in lateral edges of the block.
 const CLEARANCE_RADII: f64 = 3.0;
 const CLEARANCE_EDGES: f64 = 0.2;
-
-/// Effects by which a tool touches the tissue: without them nothing is left to study.
-const CONTACTS: [&str; 2] = ["puncture", "indentation"];
 
 /// One effect more or less than the base has.
 #[derive(Debug, Clone, PartialEq)]
@@ -200,8 +197,10 @@ impl Subject {
                     self.base.mass_scaling.sqrt()
                 )),
                 "mass_scaling" => Some("the axis of mass scaling shows what it changes".into()),
-                _ if CONTACTS.contains(&key) && on => Some("without it the tool does not touch the tissue".into()),
-                _ if CONTACTS.contains(&key) => Some("it belongs to another tool".into()),
+                _ if effect.kind == Kind::Contact && on => {
+                    Some("without it the tool does not touch the tissue".into())
+                }
+                _ if effect.kind == Kind::Contact => Some("it belongs to another tool".into()),
                 "cohesive" if !on => Some("it is another model of the path, not an addition to this one".into()),
                 _ => None,
             };
@@ -209,11 +208,17 @@ impl Subject {
                 self.skipped.push((key.into(), reason));
                 continue;
             }
-            let keys: Vec<&str> = match key {
-                // Damage is driven by plastic flow.
-                "plasticity" if on && base.iter().any(|k| k == "damage") => vec!["plasticity", "damage"],
-                "damage" if !on && !base.iter().any(|k| k == "plasticity") => vec!["plasticity", "damage"],
-                _ => vec![key],
+            // What does nothing without another effect comes and goes with it.
+            let keys: Vec<&str> = match on {
+                true => EFFECTS
+                    .iter()
+                    .filter(|e| e.key == key || (base.iter().any(|k| k == e.key) && e.needs == [key]))
+                    .map(|e| e.key)
+                    .collect(),
+                false => match effect.needs {
+                    [need] if effect.kind == Kind::Constitutive && !base.iter().any(|k| k == need) => vec![need, key],
+                    _ => vec![key],
+                },
             };
             let kept = |k: &&crate::effects::Effect| {
                 let here = base.iter().any(|b| b == k.key);

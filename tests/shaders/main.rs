@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use stylet::effects::{EFFECTS, EffectSet, mass_scaling};
+use stylet::effects::{EFFECTS, EffectSet, Kind, mass_scaling};
 use stylet::engine::Stage;
 use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose, compose_without_effects};
 use stylet::gpu::engine::{Features, defines, stages};
@@ -63,30 +63,32 @@ fn scenes_of_laws() -> Vec<Features> {
     sets.iter().flat_map(|laws| [of(laws, false), of(laws, true)]).collect()
 }
 
-/// The set with the effects of which `wanted` is true, in the order of [`EFFECTS`].
-fn effect_set(wanted: impl Fn(usize) -> bool) -> EffectSet {
+/// The set with the effects whose keys `wanted` takes.
+fn effect_set(wanted: impl Fn(&str) -> bool) -> EffectSet {
+    let gravity = stylet::effects::gravity::Params { acceleration: DVec3::NEG_Z };
     let set = EffectSet {
-        mass_scaling: wanted(0).then_some(mass_scaling::Params { factor: 100.0 }),
-        gravity: wanted(1).then_some(stylet::effects::gravity::Params { acceleration: DVec3::NEG_Z }),
-        plasticity: wanted(2).then(Default::default),
-        fibres: wanted(3).then(Default::default),
-        viscoelastic: wanted(4).then(Default::default),
-        damage: wanted(5).then(Default::default),
-        cohesive: wanted(6).then(Default::default),
-        puncture: wanted(7).then(Default::default),
-        adhesion: wanted(8).then(Default::default),
-        indentation: wanted(9).then(Default::default),
-        friction: wanted(10).then(Default::default),
-        flexible_needle: wanted(11).then(Default::default),
+        mass_scaling: wanted("mass_scaling").then_some(mass_scaling::Params { factor: 100.0 }),
+        gravity: wanted("gravity").then_some(gravity),
+        plasticity: wanted("plasticity").then(Default::default),
+        fibres: wanted("fibres").then(Default::default),
+        viscoelastic: wanted("viscoelastic").then(Default::default),
+        damage: wanted("damage").then(Default::default),
+        cohesive: wanted("cohesive").then(Default::default),
+        puncture: wanted("puncture").then(Default::default),
+        adhesion: wanted("adhesion").then(Default::default),
+        indentation: wanted("indentation").then(Default::default),
+        friction: wanted("friction").then(Default::default),
+        flexible_needle: wanted("flexible_needle").then(Default::default),
     };
-    let expected: Vec<&str> = EFFECTS.iter().enumerate().filter(|e| wanted(e.0)).map(|e| e.1.key).collect();
+    let expected: Vec<&str> = EFFECTS.iter().map(|e| e.key).filter(|key| wanted(key)).collect();
     assert_eq!(set.keys(), expected, "order of the effect table");
     set
 }
 
 /// All 4096 subsets: none, every single one, all pairs, all together and what lies between.
 fn all_sets() -> Vec<EffectSet> {
-    (0..1usize << EFFECTS.len()).map(|bits| effect_set(|i| bits >> i & 1 == 1)).collect()
+    let place = |key: &str| EFFECTS.iter().position(|e| e.key == key).unwrap();
+    (0..1usize << EFFECTS.len()).map(|bits| effect_set(|key| bits >> place(key) & 1 == 1)).collect()
 }
 
 /// All stages of a set of effects.
@@ -394,7 +396,7 @@ fn step_input_lines() -> BTreeSet<String> {
 fn the_bare_stages_are_those_of_shaders_that_never_had_an_effect() {
     assert!(stylet::commands::bench_effects::off_is_absent().unwrap());
     // Not a comparison of a text with itself: with an effect on the texts differ.
-    let set = effect_set(|i| EFFECTS[i].key == "fibres");
+    let set = effect_set(|key| key == "fibres");
     let defines = defines(&set, &scene(false, false));
     let path = "stages/element_forces";
     let without = compose_without_effects(path, &defines).unwrap();
@@ -404,10 +406,10 @@ fn the_bare_stages_are_those_of_shaders_that_never_had_an_effect() {
 
 #[test]
 fn an_absent_effect_leaves_no_trace() {
-    for (absent, (key, traces)) in TRACES.iter().enumerate() {
-        assert_eq!(EFFECTS[absent].key, *key);
+    assert_eq!(TRACES.map(|t| t.0), EFFECTS.map(|e| e.key));
+    for (effect, (key, traces)) in EFFECTS.iter().zip(&TRACES) {
         // The stages of the effect are gone, and so are its blocks in the others.
-        let others = effect_set(|i| i != absent);
+        let others = effect_set(|other| other != *key);
         for (stage, text) in [scene(true, true), tetrahedra(true, true)].iter().flat_map(|f| text_of(&others, f)) {
             for word in *traces {
                 let shared = ["shared/step_input", "shared/contact_node"];
@@ -422,8 +424,8 @@ fn an_absent_effect_leaves_no_trace() {
             }
         }
         // Not a vacuous search: with the effect alone (or with a tool, for those that need one) the words are there.
-        let needs_tool = ["friction", "adhesion", "flexible_needle"].contains(key);
-        let present = effect_set(|i| i == absent || (needs_tool && EFFECTS[i].key == "puncture"));
+        let needs_tool = effect.kind == Kind::Tool;
+        let present = effect_set(|other| other == *key || (needs_tool && other == "puncture"));
         let all: String = text_of(&present, &scene(false, false)).into_iter().map(|t| t.1).collect();
         assert!(traces.iter().any(|word| all.contains(word)), "{key}: none of {traces:?} with it");
     }
@@ -473,8 +475,8 @@ fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
 
 #[test]
 fn tools_leave_no_trace_in_tetrahedra() {
-    let tools: Vec<usize> = (6..12).collect();
-    let (with, without) = (effect_set(|_| true), effect_set(|i| !tools.contains(&i)));
+    let needs_block = |key: &str| EFFECTS.iter().any(|e| e.key == key && e.kind.needs_block());
+    let (with, without) = (effect_set(|_| true), effect_set(|key| !needs_block(key)));
     let features = tetrahedra(true, true);
     assert_eq!(stages(&with, &features), stages(&without, &features));
     assert_eq!(text_of(&with, &features), text_of(&without, &features));
@@ -494,7 +496,7 @@ fn every_stage_has_a_file_and_every_file_a_stage() {
 fn a_broken_stage_names_file_and_line() {
     // The needle's stage without its effect lacks nothing that the composer sees, but the tip stage of a scene
     // without a define still imports what it needs; a line of a shared file must map back to that file.
-    let set = effect_set(|i| EFFECTS[i].key == "puncture");
+    let set = effect_set(|key| key == "puncture");
     let composed = compose("stages/needle_contact", &defines(&set, &scene(false, false))).unwrap();
     for (index, line) in composed.source.lines().enumerate() {
         let place = composed.place(index + 1);
