@@ -1,23 +1,44 @@
-//! Lists the scenes, meshes and curves of the repository, which are built into the program (`src/reading.rs`).
+//! Lists the files that are built into the program: scenes, meshes and curves (`src/reading.rs`), and shaders (`src/gpu/compose.rs`).
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
-    let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
+    let built_in = files(&["scenes", "assets/curves", "assets/meshes"])?;
+    list("built_in.rs", "/// Relative path and bytes of every built-in file, sorted.\npub const BUILT_IN: &[(&str, &[u8])]", built_in, |path, name| {
+        format!("({name:?}, include_bytes!({path:?}))")
+    })?;
+    // Those that draw are not composed.
+    let shaders = files(&["shaders/effects", "shaders/materials", "shaders/shared", "shaders/stages"])?;
+    list("shader_sources.rs", "pub const SOURCES: &[(&str, &str)]", shaders, |path, name| {
+        let name = name.trim_start_matches("shaders/").trim_end_matches(".wgsl");
+        format!("({name:?}, include_str!({path:?}))")
+    })
+}
+
+/// Relative paths of all files below these folders, sorted.
+fn files(folders: &[&str]) -> io::Result<Vec<String>> {
     let mut names = Vec::new();
-    for folder in ["scenes", "assets/curves", "assets/meshes"] {
+    for folder in folders {
         println!("cargo::rerun-if-changed={folder}");
-        collect(&root.join(folder), folder, &mut names)?;
+        collect(&root().join(folder), folder, &mut names)?;
     }
     names.sort();
-    let mut text = String::from("/// Relative path and bytes of every built-in file, sorted.\n");
-    text += "pub const BUILT_IN: &[(&str, &[u8])] = &[\n";
+    Ok(names)
+}
+
+/// Writes the constant `head` with an entry for every file.
+fn list(file: &str, head: &str, names: Vec<String>, entry: impl Fn(&Path, &str) -> String) -> io::Result<()> {
+    let mut text = format!("{head} = &[\n");
     for name in names {
-        writeln!(text, "    ({name:?}, include_bytes!({:?})),", root.join(&name)).map_err(io::Error::other)?;
+        writeln!(text, "    {},", entry(&root().join(&name), &name)).map_err(io::Error::other)?;
     }
-    fs::write(PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default()).join("built_in.rs"), text + "];\n")
+    fs::write(PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default()).join(file), text + "];\n")
+}
+
+fn root() -> PathBuf {
+    PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default())
 }
 
 fn collect(folder: &Path, name: &str, names: &mut Vec<String>) -> io::Result<()> {

@@ -7,12 +7,13 @@
 //! viscoelastic  - F sum q_i, driven by F^-1 (P_iso + P_f)           relaxes what matrix and fibres hold together
 //! damage        (1 - d) times the sum                               last: what has failed carries nothing of it
 //! ```
+//! Effects that a program brings along add their stress to the sum; their memory is brought forward after all others.
 //! The path of the effect `puncture` multiplies the result once more, in the element stage.
 
 use glam::DMat3;
 use serde::{Deserialize, Serialize};
 
-use crate::effects::{damage, fibres, plasticity, viscoelastic};
+use crate::effects::{EffectSet, TissueMaterial, damage, fibres, own, plasticity, viscoelastic};
 use crate::material::kinematics::{cofactor, double_dot, jacobian_minus_one, norm_squared};
 use crate::material::{Continuation, ElasticLaw, TangentBound};
 
@@ -26,6 +27,8 @@ pub struct Material {
     pub fibres: Option<fibres::Params>,
     pub viscoelastic: Option<viscoelastic::Params>,
     pub damage: Option<damage::Params>,
+    /// Effects that the program brings along.
+    pub own: Vec<own::Chosen>,
 }
 
 /// History of one material point. Energies are per rest volume and since t = 0 [J/m^3].
@@ -39,6 +42,8 @@ pub struct PointState {
     pub damage_dissipation: f64,
     /// sum E:dq, weighted with the stiffness that was left.
     pub viscous_work: f64,
+    /// One entry per own effect; empty: all at rest.
+    pub own: Vec<own::State>,
 }
 
 /// Volumetric answer. A hexahedron has its own J; tetrahedra share averaged nodal values.
@@ -74,6 +79,24 @@ pub struct PointEnergy {
 }
 
 impl Material {
+    /// A material without effects. `density` [kg/m^3].
+    pub fn elastic(law: ElasticLaw, density: f64) -> Self {
+        Material { law, density, plasticity: None, fibres: None, viscoelastic: None, damage: None, own: Vec::new() }
+    }
+
+    /// A material of a scene with the effects that are on; what it does not state itself comes from the scene's tables.
+    pub fn of(tissue: &TissueMaterial, effects: &EffectSet) -> Self {
+        let (own, common) = (tissue, effects);
+        Material {
+            plasticity: common.plasticity.map(|p| own.plasticity.unwrap_or(p)),
+            fibres: common.fibres.map(|p| own.fibres.unwrap_or(p)),
+            viscoelastic: common.viscoelastic.clone().map(|p| own.viscoelastic.clone().unwrap_or(p)),
+            damage: common.damage.map(|p| own.damage.unwrap_or(p)),
+            own: common.own.clone(),
+            ..Self::elastic(tissue.law, tissue.density)
+        }
+    }
+
     /// K/2 (J - 1)^2 of a point that keeps the part `intact` of its stiffness, and its derivative.
     pub fn volumetric(&self, h: DMat3, intact: f64) -> Volumetric {
         let dj = jacobian_minus_one(h);
@@ -83,6 +106,30 @@ impl Material {
     /// Degradation d of the point.
     pub fn degradation(&self, state: &PointState, length: f64) -> f64 {
         self.damage.map_or(0.0, |damage| damage.degradation(state.plastic.alpha, length))
+    }
+
+    /// What own effects are told, each with what it remembers.
+    fn own_points<'a>(
+        &'a self,
+        h: DMat3,
+        dt: f64,
+        state: &'a PointState,
+    ) -> impl Iterator<Item = (&'static own::OwnEffect, own::Point<'a>, own::Memory)> {
+        let memory = |place: usize| state.own.get(place).map_or([0.0; 4], |s| s.memory);
+        self.own.iter().enumerate().map(move |(place, chosen)| {
+            let (bulk_modulus, shear_modulus) = (self.law.bulk_modulus, self.law.shear_modulus());
+            (chosen.effect, own::Point { h, numbers: &chosen.numbers, bulk_modulus, shear_modulus, dt }, memory(place))
+        })
+    }
+
+    /// Brings what own effects remember to this step, of a point that keeps the part `intact` of its stiffness.
+    fn advance_own(&self, h: DMat3, dt: f64, intact: f64, state: &mut PointState) {
+        state.own.resize(self.own.len(), own::State::default());
+        let (bulk_modulus, shear_modulus) = (self.law.bulk_modulus, self.law.shear_modulus());
+        for (chosen, own) in self.own.iter().zip(&mut state.own) {
+            let point = own::Point { h, numbers: &chosen.numbers, bulk_modulus, shear_modulus, dt };
+            own.supplied += intact * (chosen.effect.law.advance)(&point, &mut own.memory);
+        }
     }
 
     /// Isochoric stress of matrix and fibres [Pa].
@@ -165,6 +212,9 @@ impl Material {
             let energy = self.free_energy(h, volumetric_energy, state) + around.other_energy;
             state.damage_dissipation += around.remaining * grown * energy;
         }
+        if !self.own.is_empty() {
+            self.advance_own(h, around.dt, intact, state);
+        }
         met
     }
 
@@ -174,6 +224,9 @@ impl Material {
         let mut p = self.isochoric_stress(h, state);
         if self.viscoelastic.is_some() {
             p -= f * Self::viscous_sum(state);
+        }
+        for (effect, point, memory) in self.own_points(h, 0.0, state) {
+            p += (effect.law.stress)(&point, &memory);
         }
         p * intact + cofactor(f) * volumetric.stress
     }
@@ -191,6 +244,9 @@ impl Material {
         if self.viscoelastic.is_some() {
             let strain = (h + h.transpose() + h.transpose() * h) * 0.5;
             energy -= double_dot(Self::viscous_sum(state), strain);
+        }
+        for (effect, point, memory) in self.own_points(h, 0.0, state) {
+            energy += (effect.law.energy)(&point, &memory);
         }
         energy
     }
@@ -219,6 +275,9 @@ impl Material {
             Some(_) => self.law.tangent_bound(plasticity::elastic_gradient(h, &state.plastic)),
         };
         bound.straight += self.fibres.map_or(0.0, |fibres| fibres.tangent_bound(h));
+        for (effect, point, memory) in self.own_points(h, 0.0, state) {
+            bound.straight += (effect.law.tangent)(&point, &memory);
+        }
         bound
     }
 
@@ -234,6 +293,6 @@ impl Material {
 
     /// True where a point of this material remembers something.
     pub fn has_history(&self) -> bool {
-        self.plasticity.is_some() || self.viscoelastic.is_some()
+        self.plasticity.is_some() || self.viscoelastic.is_some() || !self.own.is_empty()
     }
 }

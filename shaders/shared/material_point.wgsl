@@ -16,6 +16,9 @@
 #ifdef DAMAGE
 #import effects/damage
 #endif
+#ifdef OWN
+#import shared/own_effects
+#endif
 
 struct PointPlace {
     cell: u32,
@@ -106,6 +109,13 @@ fn material_point(place: PointPlace, H: mat3x3<f32>) -> PointAnswer {
         let energy = free_energy(place, elastic_strain, H, out.dj) + place.other_energy;
         history.degradation = (d - before) * energy;
     }
+#endif
+#ifdef OWN
+    // After all others, which know nothing of them: on the whole F, weakened like the rest.
+    advance_own(material, place.cell, H, out.cof, out.dj, out.intact);
+    let own = own_stress(material, place.cell, H, out.cof, out.dj);
+    out.P += own.P;
+    out.tangent += own.tangent;
 #endif
 #ifdef HISTORY
     let happened = history.flow != 0.0 || history.relaxation_work != 0.0 || history.failures != 0.0;

@@ -12,6 +12,11 @@
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
+#ifdef OWN
+// What own effects supplied in this frame [J], one sum per thread.
+@group(2) @binding(12) var<storage, read_write> own_sums: array<vec4<f32>>;
+#endif
+
 #ifdef HISTORY
 // Adds what the cell reported in this frame and clears it. The work of relaxation is kept: it belongs to the state.
 fn book_history(sums: ptr<function, CellSums>, cell: u32, volume: f32, held: f32) {
@@ -34,6 +39,9 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     sums.min_jacobian = 1e30;
     sums.min_corner_jacobian = 1e30;
     sums.least_intact = 1.0;
+#ifdef OWN
+    var own_sum = vec4<f32>(0.0);
+#endif
     for (var index = thread; index < CELL_COUNT; index += MEASURE_THREADS) {
         let cell = measured_cell(index);
         let energy = cell.energy;
@@ -41,6 +49,9 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         sums.hourglass += energy.hourglass;
 #ifdef HISTORY
         book_history(&sums, index, cell.volume, energy.held);
+#endif
+#ifdef OWN
+        own_sum += cell.volume * take_own_supply(index);
 #endif
         sums.least_intact = min(sums.least_intact, select(1.0, energy.intact / cell.kept, cell.kept > 0.0));
         // What has been deleted may be turned inside out; a gap between two copies of a line is no tissue.
@@ -58,4 +69,7 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         }
     }
     cell_sums[thread] = sums;
+#ifdef OWN
+    own_sums[thread] = own_sum;
+#endif
 }

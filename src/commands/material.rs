@@ -389,7 +389,7 @@ fn subject(args: &MaterialArgs) -> Result<Subject> {
 }
 
 fn elastic(law: ElasticLaw) -> Material {
-    Material { law, density: DENSITY, plasticity: None, fibres: None, viscoelastic: None, damage: None }
+    Material::elastic(law, DENSITY)
 }
 
 fn from_preset(name: &str) -> Result<Subject> {
@@ -421,15 +421,7 @@ fn from_scene(args: &MaterialArgs, path: &std::path::Path) -> Result<Subject> {
             }
         },
     };
-    let on = &scene.effects;
-    let material = Material {
-        law: tissue.law,
-        density: tissue.density,
-        plasticity: on.plasticity.map(|p| tissue.plasticity.unwrap_or(p)),
-        fibres: on.fibres.map(|p| tissue.fibres.unwrap_or(p)),
-        viscoelastic: on.viscoelastic.clone().map(|p| tissue.viscoelastic.clone().unwrap_or(p)),
-        damage: on.damage.map(|p| tissue.damage.unwrap_or(p)),
-    };
+    let material = Material::of(tissue, &scene.effects);
     Ok(Subject { name, material })
 }
 

@@ -9,6 +9,7 @@ pub mod friction;
 pub mod gravity;
 pub mod indentation;
 pub mod mass_scaling;
+pub mod own;
 pub mod parameter;
 pub mod plasticity;
 pub mod puncture;
@@ -24,6 +25,8 @@ macro_rules! effects {
         #[derive(Debug, Clone, PartialEq, Default)]
         pub struct EffectSet {
             $($(#[$text])* pub $name: Option<$name::Params>,)+
+            /// Effects that the program brings along, in the order of the scene's list.
+            pub own: Vec<own::Chosen>,
         }
 
         /// All effects. The order is the order of their blocks in the stages.
@@ -149,9 +152,10 @@ impl EffectSet {
         self.mass_scaling.is_some() && self.cohesive.is_none()
     }
 
-    /// The effects that are on, in the order of [`EFFECTS`].
+    /// The effects that are on, in the order of [`EFFECTS`]; behind them those of the program.
     pub fn active(&self) -> impl Iterator<Item = &'static Effect> + '_ {
-        EFFECTS.iter().zip(self.presence()).filter_map(|(effect, on)| on.then_some(effect))
+        let built_in = EFFECTS.iter().zip(self.presence()).filter_map(|(effect, on)| on.then_some(effect));
+        built_in.chain(self.own.iter().map(|chosen| &chosen.effect.effect))
     }
 
     /// Keys of the effects that are on.

@@ -2,7 +2,9 @@
 //!
 //! A file is included once, where it is first imported. `#for law ... #end` repeats its lines for every elastic law whose key is
 //! among the defines, in the order of [`LAWS`]: `$law` is its key, `$number` its place; `#for invariant law` and `#for stretch law`
-//! are those of one [`Form`]. So the dispatch stands in WGSL, once for all laws. Unknown files, names and stray directives are
+//! are those of one [`Form`]. So the dispatch stands in WGSL, once for all laws. `#for own ... #end` does the same for the effects that
+//! a program brings along ([`OwnEffect`]): `$own` is the key, `$count` how many there are, and `own/<key>` the file that the effect
+//! holds. Unknown files, names and stray directives are
 //! errors. Compiler messages are mapped back to file and line.
 
 use std::borrow::Cow;
@@ -10,96 +12,17 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
+use crate::effects::own::OwnEffect;
 use crate::error::{Error, Result};
 use crate::material::law::Form;
 use crate::material::{LAWS, Law};
 use crate::reading;
 
-/// Every shader file by its path under `shaders/`, without extension.
-pub const SOURCES: &[(&str, &str)] = &[
-    ("effects/adhesion", include_str!("../../shaders/effects/adhesion.wgsl")),
-    ("effects/cohesive", include_str!("../../shaders/effects/cohesive.wgsl")),
-    ("effects/damage", include_str!("../../shaders/effects/damage.wgsl")),
-    ("effects/fibres", include_str!("../../shaders/effects/fibres.wgsl")),
-    ("effects/flexible_needle", include_str!("../../shaders/effects/flexible_needle.wgsl")),
-    ("effects/free_path", include_str!("../../shaders/effects/free_path.wgsl")),
-    ("effects/friction", include_str!("../../shaders/effects/friction.wgsl")),
-    ("effects/gravity", include_str!("../../shaders/effects/gravity.wgsl")),
-    ("effects/indentation", include_str!("../../shaders/effects/indentation.wgsl")),
-    ("effects/mass_scaling", include_str!("../../shaders/effects/mass_scaling.wgsl")),
-    ("effects/plasticity", include_str!("../../shaders/effects/plasticity.wgsl")),
-    ("effects/puncture", include_str!("../../shaders/effects/puncture.wgsl")),
-    ("effects/viscoelastic", include_str!("../../shaders/effects/viscoelastic.wgsl")),
-    ("materials/demiray", include_str!("../../shaders/materials/demiray.wgsl")),
-    ("materials/mooney_rivlin", include_str!("../../shaders/materials/mooney_rivlin.wgsl")),
-    ("materials/neo_hookean", include_str!("../../shaders/materials/neo_hookean.wgsl")),
-    ("materials/ogden", include_str!("../../shaders/materials/ogden.wgsl")),
-    ("materials/yeoh", include_str!("../../shaders/materials/yeoh.wgsl")),
-    ("shared/averaged_dilatation", include_str!("../../shaders/shared/averaged_dilatation.wgsl")),
-    ("shared/bent_column", include_str!("../../shaders/shared/bent_column.wgsl")),
-    ("shared/capped_exponential", include_str!("../../shaders/shared/capped_exponential.wgsl")),
-    ("shared/cell_edge", include_str!("../../shaders/shared/cell_edge.wgsl")),
-    ("shared/cell_energy", include_str!("../../shaders/shared/cell_energy.wgsl")),
-    ("shared/cell_sums", include_str!("../../shaders/shared/cell_sums.wgsl")),
-    ("shared/contact_node", include_str!("../../shaders/shared/contact_node.wgsl")),
-    ("shared/corner_force", include_str!("../../shaders/shared/corner_force.wgsl")),
-    ("shared/displacement", include_str!("../../shaders/shared/displacement.wgsl")),
-    ("shared/drawn_cell", include_str!("../../shaders/shared/drawn_cell.wgsl")),
-    ("shared/drawn_hexahedron", include_str!("../../shaders/shared/drawn_hexahedron.wgsl")),
-    ("shared/drawn_tetrahedron", include_str!("../../shaders/shared/drawn_tetrahedron.wgsl")),
-    ("shared/driven_faces", include_str!("../../shaders/shared/driven_faces.wgsl")),
-    ("shared/elastic", include_str!("../../shaders/shared/elastic.wgsl")),
-    ("shared/gathered_force", include_str!("../../shaders/shared/gathered_force.wgsl")),
-    ("shared/grid_lines", include_str!("../../shaders/shared/grid_lines.wgsl")),
-    ("shared/hexahedron_energy", include_str!("../../shaders/shared/hexahedron_energy.wgsl")),
-    ("shared/kinematics", include_str!("../../shaders/shared/kinematics.wgsl")),
-    ("shared/material_point", include_str!("../../shaders/shared/material_point.wgsl")),
-    ("shared/measured_hexahedron", include_str!("../../shaders/shared/measured_hexahedron.wgsl")),
-    ("shared/measured_tetrahedron", include_str!("../../shaders/shared/measured_tetrahedron.wgsl")),
-    ("shared/mesh_numbers", include_str!("../../shaders/shared/mesh_numbers.wgsl")),
-    ("shared/mesh_node", include_str!("../../shaders/shared/mesh_node.wgsl")),
-    ("shared/node_load", include_str!("../../shaders/shared/node_load.wgsl")),
-    ("shared/node_place", include_str!("../../shaders/shared/node_place.wgsl")),
-    ("shared/node_sums", include_str!("../../shaders/shared/node_sums.wgsl")),
-    ("shared/face_points", include_str!("../../shaders/shared/face_points.wgsl")),
-    ("shared/node_cures", include_str!("../../shaders/shared/node_cures.wgsl")),
-    ("shared/node_work", include_str!("../../shaders/shared/node_work.wgsl")),
-    ("shared/params", include_str!("../../shaders/shared/params.wgsl")),
-    ("shared/point_energy", include_str!("../../shaders/shared/point_energy.wgsl")),
-    ("shared/point_history", include_str!("../../shaders/shared/point_history.wgsl")),
-    ("shared/point_stress", include_str!("../../shaders/shared/point_stress.wgsl")),
-    ("shared/step_input", include_str!("../../shaders/shared/step_input.wgsl")),
-    ("shared/straight_column", include_str!("../../shaders/shared/straight_column.wgsl")),
-    ("shared/symmetric_eigen", include_str!("../../shaders/shared/symmetric_eigen.wgsl")),
-    ("shared/tetrahedron", include_str!("../../shaders/shared/tetrahedron.wgsl")),
-    ("shared/slit_contact", include_str!("../../shaders/shared/slit_contact.wgsl")),
-    ("shared/tied_nodes", include_str!("../../shaders/shared/tied_nodes.wgsl")),
-    ("shared/thread_index", include_str!("../../shaders/shared/thread_index.wgsl")),
-    ("shared/tip_read", include_str!("../../shaders/shared/tip_read.wgsl")),
-    ("shared/tip_written", include_str!("../../shaders/shared/tip_written.wgsl")),
-    ("stages/advance_free_tip", include_str!("../../shaders/stages/advance_free_tip.wgsl")),
-    ("stages/advance_tip", include_str!("../../shaders/stages/advance_tip.wgsl")),
-    ("stages/average_pressure", include_str!("../../shaders/stages/average_pressure.wgsl")),
-    ("stages/cell_fields", include_str!("../../shaders/stages/cell_fields.wgsl")),
-    ("stages/cohesive_forces", include_str!("../../shaders/stages/cohesive_forces.wgsl")),
-    ("stages/element_forces", include_str!("../../shaders/stages/element_forces.wgsl")),
-    ("stages/indenter_contact", include_str!("../../shaders/stages/indenter_contact.wgsl")),
-    ("stages/integrate_nodes", include_str!("../../shaders/stages/integrate_nodes.wgsl")),
-    ("stages/measure_cells", include_str!("../../shaders/stages/measure_cells.wgsl")),
-    ("stages/measure_contact", include_str!("../../shaders/stages/measure_contact.wgsl")),
-    ("stages/measure_dilatation", include_str!("../../shaders/stages/measure_dilatation.wgsl")),
-    ("stages/measure_faces", include_str!("../../shaders/stages/measure_faces.wgsl")),
-    ("stages/measure_nodes", include_str!("../../shaders/stages/measure_nodes.wgsl")),
-    ("stages/measure_separation", include_str!("../../shaders/stages/measure_separation.wgsl")),
-    ("stages/needle_contact", include_str!("../../shaders/stages/needle_contact.wgsl")),
-    ("stages/node_fields", include_str!("../../shaders/stages/node_fields.wgsl")),
-    ("stages/soften_free_path", include_str!("../../shaders/stages/soften_free_path.wgsl")),
-    ("stages/soften_path", include_str!("../../shaders/stages/soften_path.wgsl")),
-    ("stages/tetrahedron_forces", include_str!("../../shaders/stages/tetrahedron_forces.wgsl")),
-];
+// Every shader file by its path under `shaders/`, without extension: `SOURCES: &[(&str, &str)]`, written by build.rs.
+include!(concat!(env!("OUT_DIR"), "/shader_sources.rs"));
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 15] = [
+pub const SCENE_DEFINES: [&str; 16] = [
     "TIED",
     "INNER_BOUND",
     "SLIT",
@@ -115,7 +38,37 @@ pub const SCENE_DEFINES: [&str; 15] = [
     "VARYING_STIFFNESS",
     "INVARIANT_LAWS",
     "SEVERAL_LAWS",
+    "OWN",
 ];
+
+/// What decides which lines a composed shader has.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Defines {
+    /// Names that `#ifdef` finds, and keys of laws.
+    pub names: BTreeSet<&'static str>,
+    /// Effects that the program brings along.
+    pub own: Vec<&'static OwnEffect>,
+}
+
+impl<const N: usize> From<[&'static str; N]> for Defines {
+    fn from(names: [&'static str; N]) -> Self {
+        Defines { names: BTreeSet::from(names), own: Vec::new() }
+    }
+}
+
+impl Defines {
+    pub fn contains(&self, name: &str) -> bool {
+        self.names.contains(name)
+    }
+
+    /// The file `name`: its name in messages, and its text.
+    fn file<'a>(&self, files: &[(&'static str, &'a str)], name: &str) -> Option<(&'static str, &'a str)> {
+        match name.strip_prefix("own/") {
+            None => files.iter().find(|(other, _)| *other == name).copied(),
+            Some(key) => self.own.iter().find(|own| own.effect.key == key).map(|own| (own.effect.key, own.shader)),
+        }
+    }
+}
 
 /// A composed shader.
 #[derive(Debug, Clone)]
@@ -129,7 +82,8 @@ impl Composed {
     /// `shaders/<file>.wgsl:<line>` of a line (from 1) of the composed source.
     pub fn place(&self, line: usize) -> String {
         match self.origin.get(line.wrapping_sub(1)) {
-            Some((file, line)) => format!("shaders/{file}.wgsl:{line}"),
+            Some((file, line)) if file.contains('/') => format!("shaders/{file}.wgsl:{line}"),
+            Some((key, line)) => format!("WGSL of the effect {key}:{line}"),
             None => "end of the composed shader".into(),
         }
     }
@@ -158,7 +112,7 @@ pub fn read_sources(folder: &Path) -> Result<()> {
 }
 
 /// Composes the file `root` (path under `shaders/`, no extension) with the given defines.
-pub fn compose(root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed> {
+pub fn compose(root: &str, defines: &Defines) -> Result<Composed> {
     let edited = EDITED.read().unwrap_or_else(PoisonError::into_inner);
     if edited.is_empty() {
         return compose_from(SOURCES, root, defines);
@@ -174,7 +128,7 @@ pub fn compose(root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed>
 
 /// The same from sources in which no effect was ever written: their files and their `#ifdef` blocks are taken out
 /// first. What a run without effects must be equal to.
-pub fn compose_without_effects(root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed> {
+pub fn compose_without_effects(root: &str, defines: &Defines) -> Result<Composed> {
     let stripped: Vec<(&'static str, String)> = SOURCES
         .iter()
         .filter(|(name, _)| !name.starts_with("effects/"))
@@ -227,7 +181,7 @@ type NumberedLines<'a> = Vec<(usize, Cow<'a, str>)>;
 /// which line.
 fn repeated<'a>(
     text: &'a str,
-    defines: &BTreeSet<&'static str>,
+    defines: &Defines,
 ) -> std::result::Result<NumberedLines<'a>, (usize, String)> {
     let mut out = Vec::new();
     let mut lines = text.lines().enumerate().map(|(n, line)| (n + 1, line));
@@ -240,8 +194,10 @@ fn repeated<'a>(
             "law" => None,
             "invariant law" => Some(Form::Invariants),
             "stretch law" => Some(Form::Stretches),
+            "own" => None,
             other => return Err((number, format!("unknown list `{other}` in #for"))),
         };
+        let of_effects = meant.trim() == "own";
         let mut ended = false;
         let mut body = Vec::new();
         for (number, line) in lines.by_ref() {
@@ -255,15 +211,21 @@ fn repeated<'a>(
             return Err((number, "#for without #end".into()));
         }
         let wanted = |law: &Law| defines.contains(law.key) && form.is_none_or(|form| form == law.form);
-        for (place, law) in LAWS.iter().enumerate().filter(|(_, law)| wanted(law)) {
-            let filled = |line: &str| line.replace("$law", law.key).replace("$number", &format!("{place}u"));
+        let laws = LAWS.iter().enumerate().filter(|(_, law)| !of_effects && wanted(law)).map(|(n, law)| (n, law.key));
+        let own = defines.own.iter().enumerate().filter(|_| of_effects).map(|(n, own)| (n, own.effect.key));
+        for (place, key) in laws.chain(own) {
+            let count = defines.own.len();
+            let filled = |line: &str| {
+                let line = line.replace("$law", key).replace("$own", key).replace("_$number", &format!("_{place}"));
+                line.replace("$number", &format!("{place}u")).replace("$count", &format!("{count}u"))
+            };
             out.extend(body.iter().map(|(number, line)| (*number, filled(line).into())));
         }
     }
     Ok(out)
 }
 
-fn compose_from(files: &[(&'static str, &str)], root: &str, defines: &BTreeSet<&'static str>) -> Result<Composed> {
+fn compose_from(files: &[(&'static str, &str)], root: &str, defines: &Defines) -> Result<Composed> {
     let mut out = Composed { source: String::new(), origin: Vec::new() };
     let mut included = BTreeSet::new();
     include(files, root, root, 0, defines, &mut included, &mut out)?;
@@ -275,14 +237,14 @@ fn include(
     name: &str,
     from: &str,
     from_line: usize,
-    defines: &BTreeSet<&'static str>,
+    defines: &Defines,
     included: &mut BTreeSet<&'static str>,
     out: &mut Composed,
 ) -> Result<()> {
     let fail = |file: &str, line: usize, message: String| {
         Err(Error::Shader { stage: format!("shaders/{file}.wgsl:{line}"), message })
     };
-    let Some(&(file, text)) = files.iter().find(|(n, _)| *n == name) else {
+    let Some((file, text)) = defines.file(files, name) else {
         let known: Vec<&str> = files.iter().map(|(n, _)| *n).collect();
         return fail(from, from_line, format!("unknown import `{name}`; there are {}", known.join(", ")));
     };
@@ -357,20 +319,20 @@ mod tests {
 
     #[test]
     fn imports_once_and_maps_lines() {
-        let composed = compose_from(FILES, "a", &BTreeSet::new()).unwrap();
+        let composed = compose_from(FILES, "a", &Defines::default()).unwrap();
         assert_eq!(composed.source, "let b = 1;\nlet a = 1;\nlet q = 1;\n");
         assert_eq!(composed.place(1), "shaders/b.wgsl:1");
         assert_eq!(composed.place(3), "shaders/a.wgsl:7");
-        let composed = compose_from(FILES, "a", &BTreeSet::from(["PUNCTURE"])).unwrap();
+        let composed = compose_from(FILES, "a", &Defines::from(["PUNCTURE"])).unwrap();
         assert!(composed.source.contains("let p") && !composed.source.contains("let q"));
     }
 
     #[test]
     fn lines_are_repeated_for_the_laws_of_the_scene() {
-        let composed = compose_from(FILES, "laws", &BTreeSet::from(["yeoh", "mooney_rivlin"])).unwrap();
+        let composed = compose_from(FILES, "laws", &Defines::from(["yeoh", "mooney_rivlin"])).unwrap();
         assert_eq!(composed.source, "let mooney_rivlin = 1u;\nlet yeoh = 2u;\n");
         assert_eq!([composed.place(1), composed.place(2)], ["shaders/laws.wgsl:2", "shaders/laws.wgsl:2"]);
-        let composed = compose_from(FILES, "laws", &BTreeSet::from(["ogden"])).unwrap();
+        let composed = compose_from(FILES, "laws", &Defines::from(["ogden"])).unwrap();
         assert_eq!(composed.source, "let ogden = 3u;\nlet b = 1;\n");
     }
 
@@ -386,7 +348,7 @@ mod tests {
             ("endless", "endless.wgsl:2: #for without #end"),
             ("end", "unknown directive #end"),
         ] {
-            let error = compose_from(FILES, root, &BTreeSet::new()).unwrap_err().to_string();
+            let error = compose_from(FILES, root, &Defines::default()).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
     }

@@ -8,6 +8,7 @@ use bytemuck::Zeroable;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::compose::Defines;
 use super::device::Gpu;
 use super::kernel::{BindingKind, Compiled, Kernel, MeshNumbers, STEP_INPUT};
 use super::layout::Layout;
@@ -15,6 +16,7 @@ use super::memory::Memory;
 use super::pace::Pace;
 use super::structs::*;
 use super::texels::{Texels, texel_numbers};
+use crate::effects::own::OwnEffect;
 use crate::effects::{Effect, EffectSet};
 use crate::effects::adhesion::Bond;
 use crate::effects::cohesive::TORN_REACH;
@@ -88,12 +90,13 @@ impl Features {
 }
 
 /// Names that are defined for the shaders.
-pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static str> {
+pub fn defines(effects: &EffectSet, features: &Features) -> Defines {
     // A flexible needle acts by the contact of `puncture`, on a planned path.
     let bends = effects.puncture.is_some() && !features.free_path;
     let works =
         |e: &&Effect| !(features.tetrahedra && e.kind.needs_block()) && (e.key != "flexible_needle" || bends);
     let mut defines: BTreeSet<&'static str> = effects.active().filter(works).map(|e| e.define).collect();
+    let own: Vec<&'static OwnEffect> = effects.own.iter().map(|chosen| chosen.effect).collect();
     let mut define = |name: &'static str, wanted: bool| {
         if wanted {
             defines.insert(name);
@@ -123,7 +126,8 @@ pub fn defines(effects: &EffectSet, features: &Features) -> BTreeSet<&'static st
     let of_invariants = |law: &Law| law.form == Form::Invariants && features.laws.contains(law.key);
     define("INVARIANT_LAWS", LAWS.iter().any(of_invariants));
     define("SEVERAL_LAWS", features.laws.len() > 1);
-    defines
+    define("OWN", !own.is_empty());
+    Defines { names: defines, own }
 }
 
 /// The stages that a set of effects needs, in the order of the step.

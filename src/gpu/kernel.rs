@@ -1,11 +1,11 @@
 //! From a stage's name to a pipeline: compose, validate, find bindings by name.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use super::compose::{Composed, compose};
+use super::compose::{Composed, Defines, compose};
 use super::memory::Memory;
 use super::texels::{Access, format_of, rewritten};
 use crate::engine::Stage;
@@ -68,11 +68,11 @@ pub struct Reflected {
 }
 
 /// Composes and validates a stage and lists the resources that its entry point uses; `texels`: with arrays in textures.
-pub fn reflect(stage: Stage, defines: &BTreeSet<&'static str>, texels: bool) -> Result<Reflected> {
+pub fn reflect(stage: Stage, defines: &Defines, texels: bool) -> Result<Reflected> {
     validated(stage, composed(stage, defines, texels)?)
 }
 
-fn composed(stage: Stage, defines: &BTreeSet<&'static str>, texels: bool) -> Result<Composed> {
+fn composed(stage: Stage, defines: &Defines, texels: bool) -> Result<Composed> {
     let mut composed = compose(&format!("stages/{}", stage.name()), defines)?;
     if texels {
         composed.source = rewritten(&composed.source, Access::Storage);
@@ -205,7 +205,7 @@ impl KernelCache {
         &self,
         device: &wgpu::Device,
         stage: Stage,
-        defines: &BTreeSet<&'static str>,
+        defines: &Defines,
         numbers: &MeshNumbers,
         texels: bool,
     ) -> Result<Arc<Compiled>> {

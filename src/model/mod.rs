@@ -14,7 +14,7 @@ pub use puncture::{
     ANCHOR_COUNT, LARGEST_ANCHOR_COUNT, LARGEST_SEGMENT_COUNT, PathCell, PathSegment, PuncturePlan, TipAnchor,
 };
 
-use crate::effects::{EffectSet, TissueMaterial, cohesive};
+use crate::effects::{EffectSet, cohesive};
 use crate::material_point::Material;
 use crate::mesh::{Mesh, TissuePoint};
 use crate::needle::{Kinematics, PlannedPath};
@@ -67,7 +67,7 @@ impl Model {
         let scaling = scene.effects.mass_scaling.map_or(1.0, |m| m.factor);
         let materials: Vec<Material> = std::iter::once(&scene.material)
             .chain(scene.regions.iter().map(|r| &r.material))
-            .map(|m| constants(m, &scene.effects))
+            .map(|m| Material::of(m, &scene.effects))
             .collect();
         let cell_material = if scene.regions.is_empty() { Vec::new() } else { assign_materials(&scene, &mesh) };
         let node_mass = nodal_masses(&mesh, &materials, &cell_material, scaling);
@@ -127,7 +127,7 @@ impl Model {
 
     /// True where cells remember something.
     pub fn has_history(&self) -> bool {
-        self.effects.plasticity.is_some() || self.effects.viscoelastic.is_some()
+        self.effects.plasticity.is_some() || self.effects.viscoelastic.is_some() || !self.effects.own.is_empty()
     }
 
     /// Largest number of Prony terms of a material.
@@ -196,18 +196,6 @@ impl Model {
         let mut centre = 0.5 * (low + high);
         centre[face.axis()] = if face.is_max() { high } else { low }[face.axis()];
         centre
-    }
-}
-
-/// A material with the effects that are on; what it does not state itself comes from the scene's tables.
-fn constants(material: &TissueMaterial, effects: &EffectSet) -> Material {
-    Material {
-        law: material.law,
-        density: material.density,
-        plasticity: effects.plasticity.map(|p| material.plasticity.unwrap_or(p)),
-        fibres: effects.fibres.map(|p| material.fibres.unwrap_or(p)),
-        viscoelastic: effects.viscoelastic.clone().map(|p| material.viscoelastic.clone().unwrap_or(p)),
-        damage: effects.damage.map(|p| material.damage.unwrap_or(p)),
     }
 }
 

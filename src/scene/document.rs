@@ -120,6 +120,12 @@ impl<'s> Document<'s> {
         })
     }
 
+    /// Takes the value of a top-level key out of what [`Document::deserialize`] reads; messages still find its place.
+    pub fn take(&mut self, key: &str) -> Option<DeValue<'s>> {
+        let DeValue::Table(table) = self.root.get_mut() else { return None };
+        table.remove(key).map(Spanned::into_inner)
+    }
+
     /// Paths of all numbers that are NaN, infinite or too large for a double.
     pub fn non_finite_numbers(&self) -> Vec<String> {
         let mut found = Vec::new();

@@ -24,6 +24,7 @@ pub use document::closest;
 pub use file::OnTrouble;
 pub use task::{Goal, Obstacle, Task};
 
+use crate::effects::own::OwnEffect;
 use crate::effects::{EffectSet, Numbers, TissueMaterial};
 use crate::mesh::{TetMesh, Tissue};
 use crate::needle::{Motion, NeedleShape, Tool};
@@ -74,12 +75,33 @@ impl Scene {
     /// Reads, checks and converts a scene file. `overrides` are `key=value` texts (`motion.phase.0.speed_mm_s=5`) that
     /// replace values of the file. Every error is an [`Error::Scene`] with file, line, excerpt and way out.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
-        convert::load(path, overrides).map_err(Error::Scene)
+        Self::load_with(path, overrides, &[])
+    }
+
+    /// The same for a program that brings effects along: the list `effects` may name them, and each has a table of its numbers.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn load_with(path: &Path, overrides: &[String], own: &[&'static OwnEffect]) -> Result<Scene> {
+        convert::load(path, overrides, own).map_err(Error::Scene)
     }
 
     /// The same with the text of the file in memory; `path` stands for it in messages, and files that it names start from there.
     pub fn parse(path: &Path, source: &str, overrides: &[String]) -> Result<Scene> {
-        convert::parse(path, source, overrides).map_err(Error::Scene)
+        Self::parse_with(path, source, overrides, &[])
+    }
+
+    /// The same with effects that the program brings along.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn parse_with(
+        path: &Path,
+        source: &str,
+        overrides: &[String],
+        own: &[&'static OwnEffect],
+    ) -> Result<Scene> {
+        convert::parse(path, source, overrides, own).map_err(Error::Scene)
     }
 
     /// The needle, if the tool is one.

@@ -16,12 +16,11 @@ impl TissuePreset {
         let plasticity = self.plasticity.as_ref().map(|t| parameters::plasticity_over(t, Default::default()));
         let flow: effects::plasticity::Params = plasticity.unwrap_or_default();
         Material {
-            law: self.law,
-            density: self.density,
             plasticity,
             fibres: self.fibres.as_ref().map(|t| parameters::fibres_over(t, Default::default())),
             viscoelastic: self.viscoelastic.as_ref().map(|t| parameters::viscoelastic_over(t, Default::default())),
             damage: self.damage.as_ref().map(|t| parameters::damage_over(t, Default::default(), flow)),
+            ..Material::elastic(self.law, self.density)
         }
     }
 }

@@ -4,6 +4,7 @@ use super::super::FaceCondition;
 use super::super::file::*;
 use super::{Check, MM, Within, parameters};
 use crate::effects::mass_scaling::Loading;
+use crate::effects::own::OwnEffect;
 use crate::effects::{self, EFFECTS, EffectSet, TissueMaterial};
 use crate::material::four_digits;
 use crate::needle::beam::{BeamParams, Section};
@@ -13,12 +14,14 @@ impl Check<'_> {
     pub(super) fn effects(
         &mut self,
         file: &SceneFile,
+        own: &[&'static OwnEffect],
         tool: &Option<Tool>,
         motion: &Motion,
         (faces, size): (&[FaceCondition; 6], glam::DVec3),
         material: &TissueMaterial,
     ) -> EffectSet {
-        let keys: Vec<&str> = EFFECTS.iter().map(|effect| effect.key).collect();
+        let keys: Vec<&str> =
+            EFFECTS.iter().chain(own.iter().map(|own| &own.effect)).map(|effect| effect.key).collect();
         for (index, key) in file.effects.iter().enumerate() {
             if !keys.contains(&key.as_str()) {
                 self.unknown_name(&format!("effects.{index}"), "effect", key, &keys);
@@ -239,6 +242,7 @@ impl Check<'_> {
             indentation: listed("indentation").then_some(indentation),
             friction: listed("friction").then_some(friction),
             flexible_needle: flexible,
+            own: Vec::new(),
         }
     }
 

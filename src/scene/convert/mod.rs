@@ -9,6 +9,7 @@ pub(super) mod library;
 mod material;
 mod mesh;
 mod missing;
+mod own;
 pub(super) mod parameters;
 mod regions;
 mod targets;
@@ -19,6 +20,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use own::OwnNumbers;
 use parameters::OwnTables;
 
 use missing::{refusal, unreadable};
@@ -26,6 +28,7 @@ use missing::{refusal, unreadable};
 use super::document::{Document, Problems, closest};
 use super::file::*;
 use super::*;
+use crate::effects::own::OwnEffect;
 use crate::material::four_digits;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::needle::Phase;
@@ -48,14 +51,18 @@ const HIGHEST_FRAME_RATE: f64 = 1e5;
 
 /// Reads, checks and converts; the error is the rendered text of all problems of the first stage that finds any:
 /// document, keys, numbers, geometry, memory.
-pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, String> {
+pub fn load(
+    path: &Path,
+    overrides: &[String],
+    own: &[&'static OwnEffect],
+) -> std::result::Result<Scene, String> {
     let source = reading::text(path, reading::most::SCENE).map_err(|unread| match unread {
         Unread::System(error) => unreadable(path, &error),
         Unread::Refused { reason, way_out } => {
             refusal(&format!("cannot read the scene file {}: {reason}", path.display()), way_out)
         }
     })?;
-    let mut scene = parse(path, &source, overrides)?;
+    let mut scene = parse(path, &source, overrides, own)?;
     if reading::is_built_in(path) {
         let notice =
             format!("there is no file {} here: the scene that is built into the program is used", path.display());
@@ -65,12 +72,18 @@ pub fn load(path: &Path, overrides: &[String]) -> std::result::Result<Scene, Str
 }
 
 /// The same with the text in memory.
-pub fn parse(path: &Path, source: &str, overrides: &[String]) -> std::result::Result<Scene, String> {
-    let document = Document::parse(path, source, overrides)?;
-    let mut check = Check::new(&document, path);
-    check.finite_numbers(&document)?;
+pub fn parse(
+    path: &Path,
+    source: &str,
+    overrides: &[String],
+    own: &[&'static OwnEffect],
+) -> std::result::Result<Scene, String> {
+    let mut document = Document::parse(path, source, overrides)?;
+    Check::new(&document, path).finite_numbers(&document)?;
+    let own_numbers = own::take_tables(&mut document, own);
+    let mut check = Check { own_numbers, ..Check::new(&document, path) };
     let file: SceneFile = document.deserialize()?;
-    check.scene(path, &file)
+    check.scene(path, &file, own)
 }
 
 /// Range of a number, in the unit of its key.
@@ -90,6 +103,8 @@ struct Check<'a> {
     notices: Vec<String>,
     /// Folder that relative paths start from: that of the file.
     folder: &'a Path,
+    /// Tables of effects that the program brings along.
+    own_numbers: OwnNumbers,
 }
 
 type Checked<T> = std::result::Result<T, String>;
@@ -97,7 +112,12 @@ type Checked<T> = std::result::Result<T, String>;
 impl<'a> Check<'a> {
     /// The check of the document that was read from `path`.
     fn new(document: &'a Document<'a>, path: &'a Path) -> Self {
-        Check { problems: Problems::new(document), notices: Vec::new(), folder: path.parent().unwrap_or(Path::new("")) }
+        Check {
+            problems: Problems::new(document),
+            notices: Vec::new(),
+            folder: path.parent().unwrap_or(Path::new("")),
+            own_numbers: Vec::new(),
+        }
     }
 
     fn finite_numbers(&mut self, document: &Document) -> Checked<()> {
@@ -114,7 +134,7 @@ impl<'a> Check<'a> {
 }
 
 impl Check<'_> {
-    fn scene(&mut self, path: &Path, file: &SceneFile) -> Checked<Scene> {
+    fn scene(&mut self, path: &Path, file: &SceneFile, own: &[&'static OwnEffect]) -> Checked<Scene> {
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let (tissue, mesh) = self.tissue(&file.tissue);
         let (mut material, preset) = self.material("material", &file.material, tissue.cell_size);
@@ -123,7 +143,8 @@ impl Check<'_> {
         let faces = self.faces(&file.boundaries, file.tissue.mesh.is_some());
         let tool = self.tool(file);
         let motion = self.motion(file, tool.is_some());
-        let effects = self.effects(file, &tool, &motion, (&faces, tissue.size), &material);
+        let mut effects = self.effects(file, own, &tool, &motion, (&faces, tissue.size), &material);
+        effects.own = self.own_effects(file, own);
         parameters::settle(
             &mut material,
             &[parameters::of_preset(preset.as_ref()), file.own_tables()],
