@@ -1,5 +1,10 @@
 //! Stylet: a needle goes into soft tissue, and a person sees and feels what happens.
 //!
+//! A program that embeds it begins with [`Scene`] (from a file, or [`Scene::block`]), makes a [`Simulation`] of it and takes
+//! [`FrameRecord`]s from [`Simulation::next_frame`]; a hand leads the needle by [`Simulation::lead`] and a [`HandPose`]; an
+//! [`OwnEffect`] acts in the cells beside those built in; a [`Gpu`] may be the host's own. `examples/` has each of them. Without the
+//! feature `cli` only what a library needs is built.
+//!
 //! Reading order, which is also the straight line that data takes:
 //! [`scene`] -> [`mesh`], [`effects`], [`separation`] -> [`model`] -> [`engine`] (the contract) -> [`cpu`] and [`gpu`], which do not know
 //! each other -> [`observables`] -> [`simulation`] (a run) -> [`output`] and [`render`]. Below stand [`material`] and [`needle`], laws and the
@@ -46,4 +51,12 @@ pub mod whole_file;
 #[cfg(feature = "window")]
 pub mod window;
 
+// What a program that embeds the library needs first.
+pub use effects::TissueMaterial;
+pub use effects::own::OwnEffect;
 pub use error::{Error, Result};
+pub use gpu::Gpu;
+pub use needle::motion::HandPose;
+pub use observables::FrameRecord;
+pub use scene::Scene;
+pub use simulation::{EngineChoice, Simulation};

@@ -86,57 +86,22 @@ pub struct Report {
 pub(super) fn scene(cells: [usize; 3], needle: bool) -> Scene {
     let h = 0.8e-3;
     let shear = 60e3 / 2.9;
-    let fixed = FaceCondition { fixed: [true; 3], ..Default::default() };
-    Scene {
-        name: "bench".into(),
-        title: "bench".into(),
-        path: "bench".into(),
-        tissue: Tissue {
-            size: DVec3::new(cells[0] as f64, cells[1] as f64, cells[2] as f64) * h,
-            cell_size: h,
-            fine_radius: 0.0,
-            growth: 1.0,
-            axis_offset_cells: [0.0, 0.0],
-        },
-        material: TissueMaterial::new(
-            "bench",
-            "E 60 kPa, nu 0.45",
-            ElasticLaw::from_moduli(shear, 60e3 / 0.3, 0.7),
-            1060.0,
-        ),
-        regions: Vec::new(),
-        mesh: None,
-        supports: Vec::new(),
-        faces: [fixed.clone(), fixed.clone(), fixed.clone(), fixed.clone(), fixed, FaceCondition::default()],
-        tool: needle.then(|| Tool::Needle(NeedleShape::cone("16G", 0.8255e-3, 2.5e-3))),
-        motion: Motion {
-            // Off the grid lines, as scenes have it.
-            entry: DVec3::new(0.23 * h, 0.31 * h, 0.0),
-            direction: DVec3::NEG_Z,
-            phases: if needle { vec![Phase::Insert { speed: 2e-3, depth: 10e-3 }] } else { Vec::new() },
-            vibration: None,
-        },
-        effects: EffectSet {
-            mass_scaling: Some(mass_scaling::Params { factor: 1000.0 }),
-            puncture: needle.then(puncture::Params::default),
-            friction: needle.then(friction::Params::default),
-            ..Default::default()
-        },
-        solver: SolverSettings {
-            on_trouble: Default::default(),
-            safety: 0.8,
-            time_step: None,
-            mass_damping: 10.0,
-            hourglass_stiffness: 0.1,
-            hourglass_quartic: 15_000.0,
-            frame_rate: 60.0,
-            duration: Some(1.0),
-        },
-        outputs: Outputs::default(),
-        targets: Vec::new(),
-        task: None,
-        notices: Vec::new(),
+    let size = DVec3::new(cells[0] as f64, cells[1] as f64, cells[2] as f64) * h;
+    let law = ElasticLaw::from_moduli(shear, 60e3 / 0.3, 0.7);
+    let mut scene = Scene::block(size, h, TissueMaterial::new("bench", "E 60 kPa, nu 0.45", law, 1060.0)).lasting(1.0);
+    scene.tissue = Tissue { fine_radius: 0.0, growth: 1.0, axis_offset_cells: [0.0, 0.0], ..scene.tissue };
+    scene.effects.mass_scaling = Some(mass_scaling::Params { factor: 1000.0 });
+    if needle {
+        // Off the grid lines, as scenes have it.
+        let entry = DVec3::new(0.23 * h, 0.31 * h, 0.0);
+        let phases = vec![Phase::Insert { speed: 2e-3, depth: 10e-3 }];
+        let tool = Tool::Needle(NeedleShape::cone("16G", 0.8255e-3, 2.5e-3));
+        scene = scene.with_tool(tool, entry, DVec3::NEG_Z, phases);
+        scene.effects.friction = Some(friction::Params::default());
     }
+    scene.motion.direction = DVec3::NEG_Z;
+    scene.solver.hourglass_quartic = 15_000.0;
+    scene
 }
 
 pub(super) fn uniform_mesh(cells: [usize; 3], h: f64) -> BlockMesh {

@@ -148,6 +148,13 @@ impl Gpu {
         Ok(Gpu { device, queue, info, failure, kernels: KernelCache::default(), texels })
     }
 
+    /// A device that a host program has opened and goes on using: an engine on it submits to the same queue. It needs
+    /// `wgpu::Limits::default()`; errors outside the engine's calls stay with the host, whose callbacks are not replaced.
+    pub fn shared(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
+        let texels = info.name.contains("llvmpipe");
+        Gpu { device, queue, info, failure: Arc::new(Mutex::new(None)), kernels: KernelCache::default(), texels }
+    }
+
     /// Opens the first adapter of an instance that can draw on a surface; `WGPU_ADAPTER_NAME` names another.
     ///
     /// # Errors

@@ -4,6 +4,7 @@
 //! [`Scene::load`] reads, checks and converts. Nothing after this module knows about millimetres.
 
 mod block;
+pub mod builder;
 mod convert;
 pub(crate) mod document;
 pub mod edit;

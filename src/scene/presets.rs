@@ -7,6 +7,7 @@ use super::convert::{library, parameters};
 use super::tissue_preset::TissuePreset;
 use crate::effects;
 use crate::material::ElasticLaw;
+use crate::effects::TissueMaterial;
 use crate::material_point::Material;
 
 impl TissuePreset {
@@ -22,6 +23,21 @@ impl TissuePreset {
             damage: self.damage.as_ref().map(|t| parameters::damage_over(t, Default::default(), flow)),
             ..Material::elastic(self.law, self.density)
         }
+    }
+}
+
+impl TissueMaterial {
+    /// The tissue preset called `name`, with what it states for effects; `None`: there is none. [`tissues`] has all of them.
+    pub fn preset(name: &str) -> Option<Self> {
+        let preset = tissue(name)?;
+        let point = preset.material();
+        Some(TissueMaterial {
+            plasticity: point.plasticity,
+            fibres: point.fibres,
+            viscoelastic: point.viscoelastic,
+            damage: point.damage,
+            ..TissueMaterial::new(&preset.name, &preset.source, preset.law, preset.density)
+        })
     }
 }
 

@@ -61,40 +61,17 @@ pub fn gpu_engine(model: &Arc<Model>, dt: f64, max_steps: usize) -> Option<GpuEn
 
 /// A block of material A without effects, tool or support; edge lengths and cell edge in mm.
 pub fn block(size_mm: [f64; 3], cell_mm: f64) -> Scene {
-    Scene {
-        name: "test".into(),
-        title: "test".into(),
-        path: Default::default(),
-        tissue: Tissue {
-            size: DVec3::from(size_mm) * 1e-3,
-            cell_size: cell_mm * 1e-3,
-            fine_radius: 2.5e-3,
-            growth: 1.25,
-            axis_offset_cells: [0.23, 0.31],
-        },
-        material: TissueMaterial::new("A", "reference files", MATERIAL_A, DENSITY),
-        regions: Vec::new(),
-        mesh: None,
-        supports: Vec::new(),
-        faces: Default::default(),
-        tool: None,
-        motion: Motion::default(),
-        effects: EffectSet::default(),
-        solver: SolverSettings {
-            on_trouble: Default::default(),
-            safety: 0.8,
-            time_step: None,
-            mass_damping: 0.0,
-            hourglass_stiffness: HOURGLASS.0,
-            hourglass_quartic: HOURGLASS.1,
-            frame_rate: 30.0,
-            duration: Some(1.0),
-        },
-        outputs: Outputs::default(),
-        targets: Vec::new(),
-        task: None,
-        notices: Vec::new(),
-    }
+    let material = TissueMaterial::new("A", "reference files", MATERIAL_A, DENSITY);
+    let mut scene = Scene::block(DVec3::from(size_mm) * 1e-3, cell_mm * 1e-3, material).lasting(1.0);
+    scene.faces = Default::default();
+    scene.solver = SolverSettings {
+        mass_damping: 0.0,
+        hourglass_stiffness: HOURGLASS.0,
+        hourglass_quartic: HOURGLASS.1,
+        frame_rate: 30.0,
+        ..scene.solver
+    };
+    scene
 }
 
 /// Gives a scene a tool that enters at the middle of the top face.

@@ -25,6 +25,7 @@ use parameters::OwnTables;
 
 use missing::{refusal, unreadable};
 
+use super::builder::hourglass_quartic;
 use super::document::{Document, Problems, closest};
 use super::file::*;
 use super::*;
@@ -554,10 +555,7 @@ impl Check<'_> {
                 "solver.hourglass_quartic",
                 table.hourglass_quartic,
                 1.0,
-                // Under a needle tip cells fold with less; elsewhere it would stiffen the block (30 % compression of
-                // a cube: 5.16 N with 15000, 4.75 N with 1000, 4.65 N converged). The smallest factor without folding grows
-                // like h^-4: 2000, 5000, 15000 at 0.6, 0.5, 0.4 mm; at 0.3 mm 15000 fold, 50000 do not.
-                if punctures { 15_000.0 * (0.4e-3 / cell_size).powi(4).max(1.0) } else { 1000.0 },
+                hourglass_quartic(punctures, cell_size),
                 Within::NotNegative(1e6),
             ),
             frame_rate: self.optional(
