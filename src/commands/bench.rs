@@ -11,7 +11,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::cpu::CpuEngine;
-use crate::effects::{EffectSet, TissueMaterial, friction, mass_scaling, puncture};
+use crate::effects::{TissueMaterial, friction, mass_scaling};
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::engine::{Engine, FramePlan, StepInput};
 use crate::error::Result;
@@ -21,9 +21,9 @@ use crate::material::ElasticLaw;
 use crate::mesh::tets::TetMesh;
 use crate::mesh::{BlockMesh, Tissue};
 use crate::model::Model;
-use crate::needle::{Motion, NeedleShape, Phase, Tool};
+use crate::needle::{NeedleShape, Phase, Tool};
 use crate::process;
-use crate::scene::{FaceCondition, Outputs, Scene, SolverSettings};
+use crate::scene::Scene;
 use crate::simulation::{EngineChoice, Simulation};
 
 /// What the command line chooses.
