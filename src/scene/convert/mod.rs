@@ -30,13 +30,14 @@ use super::document::{Document, Problems, closest};
 use super::file::*;
 use super::*;
 use crate::effects::own::OwnEffect;
-use crate::material::four_digits;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::needle::Phase;
 use crate::reading::{self, Unread};
+use crate::units;
+use crate::units::four_digits;
 
-const MM: f64 = 1e-3;
-const KPA: f64 = 1e3;
+const MM: f64 = units::MILLIMETRE.si;
+const KPA: f64 = units::KILOPASCAL.si;
 
 /// Distance that the path keeps from the sides and the bottom of the block [m].
 const PATH_MARGIN: f64 = 1.0e-3;
