@@ -6,9 +6,12 @@ use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
     let built_in = files(&["scenes", "assets/curves", "assets/meshes"])?;
-    list("built_in.rs", "/// Relative path and bytes of every built-in file, sorted.\npub const BUILT_IN: &[(&str, &[u8])]", built_in, |path, name| {
-        format!("({name:?}, include_bytes!({path:?}))")
-    })?;
+    list(
+        "built_in.rs",
+        "/// Relative path and bytes of every built-in file, sorted.\npub const BUILT_IN: &[(&str, &[u8])]",
+        built_in,
+        |path, name| format!("({name:?}, include_bytes!({path:?}))"),
+    )?;
     // Those that draw are not composed.
     let shaders = files(&["shaders/effects", "shaders/materials", "shaders/shared", "shaders/stages"])?;
     list("shader_sources.rs", "pub const SOURCES: &[(&str, &str)]", shaders, |path, name| {

@@ -76,9 +76,8 @@ fn energy(point: &Point, memory: &Memory) -> f64 {
 
 fn main() -> stylet::Result<()> {
     let material = TissueMaterial::preset("across-fibre").expect("a preset of the library");
-    let mut scene = Scene::block([20e-3, 8e-3, 8e-3], 2e-3, material)
-        .lasting(1.0)
-        .with_own(&CONTRACTION, &[("tension_kpa", 3e3)]);
+    let mut scene =
+        Scene::block([20e-3, 8e-3, 8e-3], 2e-3, material).lasting(1.0).with_own(&CONTRACTION, &[("tension_kpa", 3e3)]);
     scene.faces = Default::default();
     scene.faces[0] = FaceCondition { fixed: [true; 3], ..Default::default() };
     scene.effects.mass_scaling = Some(stylet::effects::mass_scaling::Params { factor: 1000.0 });

@@ -311,7 +311,7 @@ fn pictures_are_named_by_their_moment() {
 fn tables_grow_row_by_row_and_survive_without_being_closed() {
     let base = tempfile::tempdir().unwrap();
     let folder = OutputFolder::create(Some(base.path()), "scene", false).unwrap();
-    let mut tables = Tables::create(&folder, &[], false, &[]).unwrap();
+    let mut tables = Tables::create(&folder, &[], false, &block([2.0; 3], 1.0)).unwrap();
     assert!(!folder.file(SAMPLE_TABLE).exists());
     let records = records();
     for (rows, record) in records.iter().take(5).enumerate() {
@@ -654,7 +654,7 @@ fn a_sample_is_written_per_driven_face() {
     // 16 mm between the faces, 20 x 20 mm: pulled to a stretch of 1.5, 40 N are 100 kPa.
     let faces = DrivenFace::of_scene(&driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &mesh);
     let records = pulled(Face::ZMax, DVec3::Z, 40.0);
-    let mut tables = Tables::create(&folder, &faces, false, &[]).unwrap();
+    let mut tables = Tables::create(&folder, &faces, false, &block([2.0; 3], 1.0)).unwrap();
     for (rows, record) in records.iter().enumerate() {
         tables.append(record).unwrap();
         let text = fs::read_to_string(folder.file(SAMPLE_TABLE)).unwrap();

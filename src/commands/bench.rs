@@ -15,7 +15,7 @@ use crate::effects::{TissueMaterial, friction, mass_scaling};
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::engine::{Engine, FramePlan, StepInput};
 use crate::error::Result;
-use crate::gpu::engine::{Features, stages};
+use crate::gpu::plan::{Features, stages};
 use crate::gpu::{Gpu, GpuEngine};
 use crate::material::ElasticLaw;
 use crate::mesh::tets::TetMesh;

@@ -17,7 +17,7 @@ use crate::effects::{self, EFFECTS, EffectSet, Kind, damage, fibres, gravity, pl
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::compose::{compose, compose_without_effects};
-use crate::gpu::engine::{Features, defines, stages};
+use crate::gpu::plan::{Features, defines, stages};
 use crate::material::LAWS;
 use crate::model::Model;
 use crate::needle::{Motion, Phase, Tool};

@@ -57,7 +57,7 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
     let mut simulation = Simulation::for_purpose(scene.clone(), device, Purpose { led: true, drawn: false })?;
     let info = simulation.engine().info().clone();
     let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
-    let mut tables = Tables::create(&folder, &driven, simulation.model.has_bore(), &scene.targets)?;
+    let mut tables = Tables::create(&folder, &driven, simulation.model.has_bore(), &scene)?;
     let (begin, mut records) = (Instant::now(), Vec::new());
     let mut outcome = ReplayOutcome {
         folder: folder.path().to_path_buf(),

@@ -326,6 +326,16 @@ impl CpuEngine {
         total
     }
 
+    /// Takes what effects of the program's own supplied in this frame out of the points.
+    fn take_own_supply(&mut self) {
+        for (cell, point) in self.state.points.iter_mut().enumerate() {
+            let volume = self.model.mesh.cell_volume(cell);
+            for (sum, own) in self.sums.energy.own.iter_mut().zip(&mut point.own) {
+                *sum += volume * std::mem::take(&mut own.supplied);
+            }
+        }
+    }
+
     /// Stages `measure_cells`, `measure_contact`, `measure_faces`, `measure_separation`: stored energies and health, between the forces of
     /// the last step and its motion.
     fn measure_stored(&mut self) {
@@ -358,6 +368,8 @@ impl CpuEngine {
         sums.health.inverted_cells = u32::from(sums.health.inverted_cell.is_some()) + broken.count() as u32;
         sums.energy += dissipated - self.booked;
         self.booked = dissipated;
+        self.take_own_supply();
+        let (model, elements, state, sums) = (&self.model, &self.elements, &self.state, &mut self.sums);
         if model.has_driven_faces() {
             let forces = elements.nodal_forces(&model.mesh, &self.cells);
             sums.reactions = face_reactions(model, &forces);

@@ -19,8 +19,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Effect, Kind};
 use super::parameter::Parameter;
+use super::{Effect, Kind};
 
 pub const EFFECT: Effect = Effect {
     key: "adhesion",

@@ -21,8 +21,8 @@
 //! the leapfrog work. Range of validity: the process zone `E G_c/strength^2` spans a few faces; penalty K = factor E/h, and
 //! `lambda_f >= 1.1 lambda_0`: a scene with less is refused.
 
-use super::{Effect, Kind};
 use super::parameter::Parameter;
+use super::{Effect, Kind};
 
 pub const EFFECT: Effect = Effect {
     key: "cohesive",

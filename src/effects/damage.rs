@@ -12,8 +12,8 @@
 //! the failing one softens more steeply than the others unload, without hardening for `(n - 1) L_e > E u_f/sigma`.
 //! Source: Hillerborg 1976, Lubliner et al. 1989; [Lv2022] Eq. 12-14 with the kinematics of Eq. 8.
 
-use super::{Effect, Kind};
 use super::parameter::Parameter;
+use super::{Effect, Kind};
 
 pub const EFFECT: Effect = Effect {
     key: "damage",

@@ -10,8 +10,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Effect, Kind};
 use super::parameter::{Parameter, Value};
+use super::{Effect, Kind};
 use crate::material::demiray::{LARGEST_EXPONENT, capped_exponential};
 use crate::material::kinematics::{cofactor, isochoric_factor, jacobian_minus_one};
 

@@ -27,8 +27,8 @@
 
 use glam::DVec3;
 
-use super::{Effect, Kind};
 use super::parameter::{Parameter, Value};
+use super::{Effect, Kind};
 use crate::needle::beam::{BeamParams, Section};
 
 pub const EFFECT: Effect = Effect {

@@ -7,8 +7,8 @@
 //! force step for every layer of nodes that the base passes. A regularisation by `tanh` would creep and
 //! cannot stick. Source: Wriggers 2006, ch. 5 (return mapping); coefficient 0.3: Lv2022, section 3.2.
 
-use super::{Effect, Kind};
 use super::parameter::Parameter;
+use super::{Effect, Kind};
 
 pub const EFFECT: Effect = Effect {
     key: "friction",

@@ -5,8 +5,8 @@
 
 use glam::DVec3;
 
-use super::{Effect, Kind};
 use super::parameter::{Parameter, Value};
+use super::{Effect, Kind};
 
 pub const EFFECT: Effect = Effect {
     key: "gravity",

@@ -12,8 +12,8 @@
 
 use glam::DVec3;
 
-use super::{Effect, Kind};
 use super::parameter::Parameter;
+use super::{Effect, Kind};
 use crate::needle::Tool;
 
 pub const EFFECT: Effect = Effect {

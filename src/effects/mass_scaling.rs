@@ -8,8 +8,8 @@
 //! wave speed; kinetic over internal energy is reported and should stay below 5 %.
 //! Source: Olovsson, Simonsson & Unosson 2005 (selective mass scaling); Joldes et al. 2008 (tissue).
 
-use super::{Effect, Kind};
 use super::parameter::Parameter;
+use super::{Effect, Kind};
 
 pub const EFFECT: Effect = Effect {
     key: "mass_scaling",

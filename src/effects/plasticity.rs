@@ -16,8 +16,8 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Effect, Kind};
 use super::parameter::Parameter;
+use super::{Effect, Kind};
 use crate::material::kinematics::{double_dot, symmetric_eigen};
 use crate::material::{ElasticLaw, deviator, equivalent};
 

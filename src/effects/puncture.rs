@@ -34,8 +34,8 @@
 //! (src/needle/free_path.rs). Source: this project; F_cut = G_c w with the toughness of liver under needles, 76 to 185 J/m^2 [Azar2008],
 //! 164 J/m^2 [Gokgol2012].
 
-use super::{Effect, Kind};
 use super::parameter::Parameter;
+use super::{Effect, Kind};
 
 /// Advance of the tip in its first step, and the largest one of a step beside what the needle travels [m]. The second is
 /// as fast as the needle's speed times four with steps of 2.7 ms at 2 mm/s: with 13 um steps beyond 1.6 ms held the

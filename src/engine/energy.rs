@@ -5,6 +5,8 @@ use std::ops::{AddAssign, Sub};
 
 use serde::{Deserialize, Serialize};
 
+use crate::effects::own::LARGEST_COUNT;
+
 /// One addend of the energy account.
 #[derive(Debug, Clone, Copy)]
 pub struct EnergyPart {
@@ -32,18 +34,22 @@ macro_rules! energies {
                 #[doc = concat!("Sum over its steps: ", $meaning, ".")]
                 pub $sum: f64,
             )+)?)+
+            /// Sum over its steps: supplied by effects of the program's own, in the order of the scene.
+            pub own: [f64; LARGEST_COUNT],
         }
 
         impl AddAssign for FrameEnergies {
             fn add_assign(&mut self, other: Self) {
                 $($(self.$end += other.$end;)? $($(self.$sum += other.$sum;)+)?)+
+                self.own.iter_mut().zip(other.own).for_each(|(sum, part)| *sum += part);
             }
         }
 
         impl Sub for FrameEnergies {
             type Output = Self;
             fn sub(self, other: Self) -> Self {
-                Self { $($($end: self.$end - other.$end,)? $($($sum: self.$sum - other.$sum,)+)?)+ }
+                let own = std::array::from_fn(|place| self.own[place] - other.own[place]);
+                Self { $($($end: self.$end - other.$end,)? $($($sum: self.$sum - other.$sum,)+)?)+ own }
             }
         }
 
@@ -56,7 +62,9 @@ macro_rules! energies {
                 #[doc = concat!("It is ", $meaning, ".")]
                 pub $name: f64,
             )+
-            /// Largest |external| so far, the scale of the imbalance.
+            /// Supplied by effects of the program's own, in the order of the scene: they put it in.
+            pub own: [f64; LARGEST_COUNT],
+            /// Largest magnitude of [`EnergyAccount::put_in`] so far, the scale of the imbalance.
             pub external_max: f64,
         }
 
@@ -74,6 +82,7 @@ macro_rules! energies {
             /// Books the energies of a frame; `taken` keeps the sums of parts that hold something, too.
             pub(crate) fn book(&mut self, taken: &mut FrameEnergies, frame: &FrameEnergies) {
                 $(energies!(@book self, taken, frame, $name $(, end $end)? $(, sum $($sum)+)?);)+
+                self.own.iter_mut().zip(frame.own).for_each(|(sum, part)| *sum += part);
             }
         }
     };
@@ -119,9 +128,14 @@ fn ratio(part: f64, whole: f64) -> f64 {
 }
 
 impl EnergyAccount {
+    /// External work and what effects of the program's own supplied [J].
+    pub fn put_in(&self) -> f64 {
+        self.external + self.own.iter().sum::<f64>()
+    }
+
     /// Sum of everything that external work turned into [J].
     pub fn accounted(&self) -> f64 {
-        Self::PARTS.iter().map(|part| part.sign * (part.of)(self)).sum()
+        Self::PARTS.iter().map(|part| part.sign * (part.of)(self)).sum::<f64>() - self.own.iter().sum::<f64>()
     }
 
     /// What nobody can explain, over the largest external work so far: (external - accounted) / largest |external|, positive

@@ -179,10 +179,7 @@ type NumberedLines<'a> = Vec<(usize, Cow<'a, str>)>;
 
 /// The lines of a text with their numbers (from 1), those between `#for` and `#end` once per law that is meant; or what is wrong in
 /// which line.
-fn repeated<'a>(
-    text: &'a str,
-    defines: &Defines,
-) -> std::result::Result<NumberedLines<'a>, (usize, String)> {
+fn repeated<'a>(text: &'a str, defines: &Defines) -> std::result::Result<NumberedLines<'a>, (usize, String)> {
     let mut out = Vec::new();
     let mut lines = text.lines().enumerate().map(|(n, line)| (n + 1, line));
     while let Some((number, line)) = lines.next() {

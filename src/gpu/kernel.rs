@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
+use super::arrays::STEP_INPUT;
 use super::compose::{Composed, Defines, compose};
 use super::memory::Memory;
 use super::texels::{Access, format_of, rewritten};
@@ -122,9 +123,6 @@ fn validated(stage: Stage, composed: Composed) -> Result<Reflected> {
 
 /// Values of the constants that a shader leaves open (`override`), by name: shaders/shared/mesh_numbers.wgsl.
 pub type MeshNumbers = BTreeMap<&'static str, u32>;
-
-/// Name of the uniform that changes from step to step and is bound with a dynamic offset.
-pub const STEP_INPUT: &str = "step_input";
 
 /// A pipeline and what it binds; buffers and threads are those of an engine.
 pub struct Compiled {

@@ -1,5 +1,6 @@
 //! The GPU engine: shaders composed from the chosen effects, one submission per display frame.
 
+pub mod arrays;
 pub mod compose;
 pub mod device;
 pub mod engine;
@@ -7,6 +8,7 @@ pub mod kernel;
 mod layout;
 mod memory;
 mod pace;
+pub mod plan;
 pub mod structs;
 pub mod texels;
 mod workers;

@@ -90,6 +90,14 @@ shared_structs! {
         normal: [u32; 4],
         shear: [u32; 4],
     }
+    /// shaders/shared/own_effects.wgsl
+    struct OwnState {
+        memory: [f32; 4],
+        supplied: f32,
+        _pad0: f32,
+        _pad1: f32,
+        _pad2: f32,
+    }
     /// shaders/effects/damage.wgsl
     struct DamageParams {
         onset: f32,

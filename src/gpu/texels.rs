@@ -6,31 +6,15 @@
 //! reads lie in textures of one number per texel there, and shaders are rewritten to match; on other adapters nothing changes.
 //! The texels of a texture, row by row, are the numbers of the array: copies and checkpoints do not know the difference.
 
+use super::arrays::{self, Place};
+
 /// Bytes in a row of such a texture.
 const ROW: u64 = 32768;
 
-/// Arrays that steps change: one number per texel, so that a shader may read and write them. At most four occur in one stage, as many
-/// storage textures as a portable device binds.
-pub const STATE: [&str; 5] =
-    ["node_displacement", "node_velocity", "corner_force", "cell_stiffness", "contact_records"];
-
-/// Arrays that no shader writes, in textures that are sampled: one vector per texel, or one number where the array has numbers.
-pub const CONSTANT: [&str; 10] = [
-    "cell_edges",
-    "node_mass",
-    "contact_nodes",
-    "grid_lines",
-    "tip_anchors",
-    "cell_material",
-    "tied_nodes",
-    "tetrahedra",
-    "mesh_nodes",
-    "node_cells",
-];
-
-/// Small ones that all threads read in the same places: uniforms for the stages that do not write them. With the number of their
-/// entries; none for what is no array.
-const UNIFORM: [(&str, Option<&str>); 2] = [("tip_state", None), ("tip_anchor_loads", Some("ANCHOR_COUNT"))];
+/// Where the array of this name lies; in a buffer what no entry knows.
+fn place(name: &str) -> Place {
+    arrays::find(name).map_or(Place::Buffer, |array| array.place)
+}
 
 /// How a rewritten shader reads what steps change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,17 +83,18 @@ fn declaration(source: &str, line: &str, access: Access) -> Option<String> {
     let (place, rest) = line.split_once("var<storage, ")?;
     let (mode, rest) = rest.split_once("> ")?;
     let (name, kind) = rest.strip_suffix(';')?.split_once(": ")?;
-    if let Some((_, count)) = UNIFORM.iter().find(|(other, _)| *other == name && mode == "read") {
+    if let (Place::Uniform(count), "read") = (self::place(name), mode) {
         let kind = match (count, kind.strip_suffix('>')) {
             (Some(count), Some(kind)) => format!("{kind}, {count}>"),
             _ => kind.into(),
         };
         return Some(format!("{place}var<uniform> {name}: {kind};"));
     }
-    let constant = CONSTANT.contains(&name);
-    if !constant && !STATE.contains(&name) {
-        return None;
-    }
+    let constant = match self::place(name) {
+        Place::Texels => false,
+        Place::Sampled(_) => true,
+        Place::Buffer | Place::Uniform(_) => return None,
+    };
     let kind = kind.strip_prefix("array<")?.strip_suffix('>')?;
     let members = members(source, kind)?;
     let count: u64 = members.iter().map(|m| m.count).sum();
@@ -164,14 +149,16 @@ fn declaration(source: &str, line: &str, access: Access) -> Option<String> {
 
 /// Numbers in a texel of the array of this name.
 pub fn texel_numbers(name: &str) -> u64 {
-    let numbers = ["node_mass", "grid_lines", "cell_material"];
-    if CONSTANT.contains(&name) && !numbers.contains(&name) { 4 } else { 1 }
+    match place(name) {
+        Place::Sampled(numbers) => numbers,
+        _ => 1,
+    }
 }
 
 /// Uses of the arrays as calls of the functions that stand for them.
 fn with_calls(text: &str) -> String {
-    let names = STATE.iter().chain(&CONSTANT);
-    let Some((start, name)) = names.filter_map(|name| Some((find_use(text, name)?, *name))).min() else {
+    let names = arrays::all().filter(|array| matches!(array.place, Place::Texels | Place::Sampled(_)));
+    let Some((start, name)) = names.filter_map(|array| Some((find_use(text, array.name)?, array.name))).min() else {
         return text.into();
     };
     let open = start + name.len();

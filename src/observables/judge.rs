@@ -34,7 +34,7 @@ pub struct Judge {
     sizes: Sizes,
     /// What was stored before the first frame [J].
     stored: Option<f64>,
-    /// External work at the end of the last frame [J].
+    /// What had been put in at the end of the last frame [J].
     last: f64,
     /// Sums over the frames so far: internal, hourglass and added kinetic energy [J].
     internal: f64,
@@ -90,8 +90,8 @@ impl Judge {
         let given = -missing > 2.0 * energy.external_max && -missing > self.sizes.floor;
         let stored = *self.stored.get_or_insert(if given { -missing } else { 0.0 });
         let missing = missing + stored;
-        let per_step = (energy.external - self.last).abs() / f64::from(steps.max(1));
-        self.last = energy.external;
+        let per_step = (energy.put_in() - self.last).abs() / f64::from(steps.max(1));
+        self.last = energy.put_in();
         // What was put in bounds what can move: energy that a step creates is no reason to look away.
         let put_in = energy.external_max.max(stored).max(self.sizes.floor).max(f64::MIN_POSITIVE);
         let scale = put_in.max(FLOOR_STEPS * per_step);

@@ -4,6 +4,7 @@
 use std::sync::LazyLock;
 
 use super::{EnergyAccount, ForceParts, FrameRecord};
+use crate::effects::own::Chosen;
 use crate::units::{
     self, JOULE, KILOGRAM, METRE, METRE_PER_SECOND, NEWTON, NEWTON_METRE, ONE, SECOND, SQUARE_METRE, Unit,
 };
@@ -17,6 +18,12 @@ pub struct Quantity<T: 'static> {
     pub fold: Fold,
     pub meaning: &'static str,
     pub of: Of<T>,
+}
+
+impl<T> std::fmt::Debug for Quantity<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.column)
+    }
 }
 
 /// How the values of the frames become one of the run.
@@ -194,6 +201,14 @@ pub static FORCE: LazyLock<Vec<Quantity<FrameRecord>>> = LazyLock::new(|| {
     table.push(TIP_COORDINATE);
     table
 });
+
+/// Columns of `energy.csv` for effects of the program's own: what each has supplied since t = 0.
+pub fn own_columns(own: &[Chosen]) -> Vec<Quantity<FrameRecord>> {
+    let of: fn(&FrameRecord, usize) -> f64 = |r, n| r.energy.own[n];
+    let column =
+        |(n, chosen): (usize, &Chosen)| at(chosen.effect.column, JOULE, Last, "supplied by this effect", of, n);
+    own.iter().enumerate().map(column).collect()
+}
 
 /// `energy.csv`, a row per frame. Where the work goes is [`EnergyAccount::PARTS`].
 pub static ENERGY: LazyLock<Vec<Quantity<FrameRecord>>> = LazyLock::new(|| {

@@ -39,8 +39,8 @@ impl Recorder {
         let end = clock.time_of(step);
         let e = &mut self.totals;
         e.external += sums.tool_work + sums.load_work;
-        e.external_max = e.external_max.max(e.external.abs());
         e.book(&mut self.taken, &sums.energy);
+        e.external_max = e.external_max.max(e.put_in().abs());
         let mean_pose = kinematics.map(|k| k.pose(0.5 * (begin + end)));
         let direction = mean_pose.map_or(DVec3::ZERO, |p| p.direction);
         let force = sums.impulse / duration;

@@ -13,8 +13,8 @@ use super::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_
 use super::sample::{DrivenFace, SAMPLE, SampleRow};
 use super::target::{TARGETS, TargetRow};
 use crate::observables::FrameRecord;
-use crate::observables::quantity::{CORE, ENERGY, FORCE, columns, row};
-use crate::scene::Target;
+use crate::observables::quantity::{CORE, ENERGY, FORCE, Quantity, columns, own_columns, row};
+use crate::scene::Scene;
 use crate::whole_file;
 use crate::{Error, Result};
 
@@ -23,6 +23,8 @@ use crate::{Error, Result};
 pub struct Tables {
     force: Table,
     energy: Table,
+    /// Further columns of it.
+    own: Vec<Quantity<FrameRecord>>,
     /// With a hollow needle.
     core: Option<Table>,
     /// Where faces are driven.
@@ -89,8 +91,8 @@ impl Table {
 impl Tables {
     /// Creates the files with their header rows; that of the sample only where faces are driven, that of the core only with a
     /// hollow needle, that of the targets only where there are any.
-    pub fn create(folder: &OutputFolder, driven: &[DrivenFace], hollow: bool, targets: &[Target]) -> Result<Self> {
-        Self::with_records(folder, driven, hollow, targets, &[])
+    pub fn create(folder: &OutputFolder, driven: &[DrivenFace], hollow: bool, scene: &Scene) -> Result<Self> {
+        Self::with_records(folder, driven, hollow, scene, &[])
     }
 
     /// The same with the rows of these records. A file of an earlier run is replaced in one step.
@@ -98,7 +100,7 @@ impl Tables {
         folder: &OutputFolder,
         driven: &[DrivenFace],
         hollow: bool,
-        targets: &[Target],
+        scene: &Scene,
         records: &[FrameRecord],
     ) -> Result<Self> {
         let sample = match driven {
@@ -106,7 +108,8 @@ impl Tables {
             driven => Some((driven.to_vec(), Table::new(folder.file(SAMPLE_TABLE), &columns(&SAMPLE))?)),
         };
         let core = hollow.then(|| Table::new(folder.file(CORE_TABLE), &columns(&CORE))).transpose()?;
-        let targets = match targets {
+        let own = own_columns(&scene.effects.own);
+        let targets = match &scene.targets[..] {
             [] => None,
             targets => {
                 let names = targets.iter().map(|target| target.name.clone()).collect();
@@ -118,7 +121,8 @@ impl Tables {
             sample,
             targets,
             force: Table::new(folder.file(FORCE_TABLE), &columns(&FORCE))?,
-            energy: Table::new(folder.file(ENERGY_TABLE), &columns(&ENERGY))?,
+            energy: Table::new(folder.file(ENERGY_TABLE), &[columns(&ENERGY), columns(&own)].concat())?,
+            own,
         };
         records.iter().try_for_each(|record| tables.rows(record))?;
         tables.all().try_for_each(Table::make)?;
@@ -143,7 +147,7 @@ impl Tables {
 
     fn rows(&mut self, record: &FrameRecord) -> Result<()> {
         self.force.row(&row(&FORCE, record))?;
-        self.energy.row(&row(&ENERGY, record))?;
+        self.energy.row(&[row(&ENERGY, record), row(&self.own, record)].concat())?;
         if let Some(table) = self.core.as_mut().filter(|_| record.core.is_some()) {
             table.row(&row(&CORE, record))?;
         }

@@ -96,12 +96,7 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Scene::load`].
-    pub fn parse_with(
-        path: &Path,
-        source: &str,
-        overrides: &[String],
-        own: &[&'static OwnEffect],
-    ) -> Result<Scene> {
+    pub fn parse_with(path: &Path, source: &str, overrides: &[String], own: &[&'static OwnEffect]) -> Result<Scene> {
         convert::parse(path, source, overrides, own).map_err(Error::Scene)
     }
 

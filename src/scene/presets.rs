@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 use super::convert::{library, parameters};
 use super::tissue_preset::TissuePreset;
 use crate::effects;
-use crate::material::ElasticLaw;
 use crate::effects::TissueMaterial;
+use crate::material::ElasticLaw;
 use crate::material_point::Material;
 
 impl TissuePreset {

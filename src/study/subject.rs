@@ -201,9 +201,7 @@ impl Subject {
                     self.base.mass_scaling.sqrt()
                 )),
                 "mass_scaling" => Some("the axis of mass scaling shows what it changes".into()),
-                _ if effect.kind == Kind::Contact && on => {
-                    Some("without it the tool does not touch the tissue".into())
-                }
+                _ if effect.kind == Kind::Contact && on => Some("without it the tool does not touch the tissue".into()),
                 _ if effect.kind == Kind::Contact => Some("it belongs to another tool".into()),
                 "cohesive" if !on => Some("it is another model of the path, not an addition to this one".into()),
                 _ => None,

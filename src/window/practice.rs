@@ -217,7 +217,7 @@ impl Practice {
             Some(out) => {
                 let folder = OutputFolder::create(Some(out), &scene.name, force)?;
                 let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
-                let tables = Tables::create(&folder, &driven, simulation.model.has_bore(), &scene.targets)?;
+                let tables = Tables::create(&folder, &driven, simulation.model.has_bore(), &scene)?;
                 let file = session_file(&folder, leader, &session)?;
                 Some(Written { folder, tables, session: file })
             }
@@ -446,8 +446,8 @@ impl Practice {
         let Some(written) = &self.written else { return Ok(()) };
         let model = &self.simulation.model;
         let driven = DrivenFace::of_scene(&self.scene.faces, &model.mesh);
-        let (folder, targets) = (&written.folder, &self.scene.targets);
-        let tables = Tables::with_records(folder, &driven, model.has_bore(), targets, &self.records);
+        let folder = &written.folder;
+        let tables = Tables::with_records(folder, &driven, model.has_bore(), &self.scene, &self.records);
         let session = || session_file(folder, self.leader, &self.session);
         let done = tables.and_then(|tables| Ok((tables, session()?))).map(|(tables, session)| {
             if let Some(written) = &mut self.written {

@@ -61,11 +61,15 @@ fn a_free_block_takes_the_volume_that_it_is_given() {
 
 #[test]
 fn a_block_that_cannot_grow_presses_and_holds_the_energy() {
-    let held: Vec<String> =
-        ["x_min", "x_max", "y_min", "y_max", "z_min"].iter().map(|face| format!("boundaries.{face}=\"roller\"")).collect();
+    let held: Vec<String> = ["x_min", "x_max", "y_min", "y_max", "z_min"]
+        .iter()
+        .map(|face| format!("boundaries.{face}=\"roller\""))
+        .collect();
     let mut overrides: Vec<&str> = held.iter().map(String::as_str).collect();
     // A face that is driven nowhere tells its reaction.
-    overrides.push("boundaries.z_max={ fixed = [\"x\", \"y\", \"z\"], displacement_mm = [0.0, 0.0, 0.0], duration_s = 1.0 }");
+    overrides.push(
+        "boundaries.z_max={ fixed = [\"x\", \"y\", \"z\"], displacement_mm = [0.0, 0.0, 0.0], duration_s = 1.0 }",
+    );
     for engine in engines() {
         let (record, _) = run(scene(&overrides), engine);
         let theta = 0.2 * record.time;

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use stylet::effects::{EFFECTS, EffectSet, Kind, mass_scaling};
 use stylet::engine::Stage;
 use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose, compose_without_effects};
-use stylet::gpu::engine::{Features, defines, stages};
 use stylet::gpu::kernel::{BindingKind, Reflected, reflect};
+use stylet::gpu::plan::{Features, defines, stages};
 use stylet::gpu::structs::layouts;
 use stylet::material::LAWS;
 

@@ -53,11 +53,7 @@ const HIGHEST_FRAME_RATE: f64 = 1e5;
 
 /// Reads, checks and converts; the error is the rendered text of all problems of the first stage that finds any:
 /// document, keys, numbers, geometry, memory.
-pub fn load(
-    path: &Path,
-    overrides: &[String],
-    own: &[&'static OwnEffect],
-) -> std::result::Result<Scene, String> {
+pub fn load(path: &Path, overrides: &[String], own: &[&'static OwnEffect]) -> std::result::Result<Scene, String> {
     let source = reading::text(path, reading::most::SCENE).map_err(|unread| match unread {
         Unread::System(error) => unreadable(path, &error),
         Unread::Refused { reason, way_out } => {
