@@ -128,7 +128,11 @@ impl Material {
         let (bulk_modulus, shear_modulus) = (self.law.bulk_modulus, self.law.shear_modulus());
         for (chosen, own) in self.own.iter().zip(&mut state.own) {
             let point = own::Point { h, numbers: &chosen.numbers, bulk_modulus, shear_modulus, dt };
-            own.supplied += intact * (chosen.effect.law.advance)(&point, &mut own.memory);
+            let advance = chosen.effect.law.advance;
+            let behind = advance(&point, &mut own.memory);
+            // Mean over the strains at both ends of a step: half of the way here, half of the way ahead.
+            let ahead = advance(&point, &mut own.memory.clone());
+            own.supplied += intact * 0.5 * (behind + ahead);
         }
     }
 

@@ -62,9 +62,12 @@ fn own_stress(material: Material, cell: u32, H: mat3x3<f32>, cof: mat3x3<f32>, d
 fn advance_own(material: Material, cell: u32, H: mat3x3<f32>, cof: mat3x3<f32>, dj: f32, intact: f32) {
 #for own
     var memory_$number = own_states[cell * $count + $number].memory;
-    let work_$number = $own_advance(own_point(material, $number, H, cof, dj), &memory_$number);
+    let point_$number = own_point(material, $number, H, cof, dj);
+    let behind_$number = $own_advance(point_$number, &memory_$number);
     own_states[cell * $count + $number].memory = memory_$number;
-    own_states[cell * $count + $number].supplied += intact * work_$number;
+    // Mean over the strains at both ends of a step: half of the way here, half of the way ahead.
+    let ahead_$number = $own_advance(point_$number, &memory_$number);
+    own_states[cell * $count + $number].supplied += intact * 0.5 * (behind_$number + ahead_$number);
 #end
 }
 

@@ -64,8 +64,9 @@ pub struct Point<'a> {
 /// The law in f64: the reference that the WGSL is compared with.
 #[derive(Debug, Clone, Copy)]
 pub struct Law {
-    /// Brings the memory to this step; returns the work that this supplies to the tissue per rest volume [J/m^3], negative where it
-    /// takes some.
+    /// Brings the memory from one step to the next; returns the work that this supplies to the tissue at this strain, per rest volume
+    /// [J/m^3], negative where it takes some: `W(F, s') - W(F, s)`. It is asked twice in a step, for the way that ends there and for
+    /// the one that begins, so that the account is of second order in the step.
     pub advance: fn(&Point, &mut Memory) -> f64,
     /// First Piola-Kirchhoff stress beside that of the material [Pa].
     pub stress: fn(&Point, &Memory) -> DMat3,
