@@ -220,6 +220,11 @@ fn snapshot(scene: &Scene, mesh: &Mesh, depth: f64) -> FieldSnapshot {
 
 // Folders
 
+/// A scene without targets and effects.
+fn bare() -> Scene {
+    Scene::block(DVec3::splat(2e-3), 1e-3, TissueMaterial::preset("across-fibre").unwrap())
+}
+
 #[test]
 fn a_named_folder_is_made_and_not_reused() {
     let base = tempfile::tempdir().unwrap();
@@ -311,7 +316,7 @@ fn pictures_are_named_by_their_moment() {
 fn tables_grow_row_by_row_and_survive_without_being_closed() {
     let base = tempfile::tempdir().unwrap();
     let folder = OutputFolder::create(Some(base.path()), "scene", false).unwrap();
-    let mut tables = Tables::create(&folder, &[], false, &block([2.0; 3], 1.0)).unwrap();
+    let mut tables = Tables::create(&folder, &[], false, &bare()).unwrap();
     assert!(!folder.file(SAMPLE_TABLE).exists());
     let records = records();
     for (rows, record) in records.iter().take(5).enumerate() {
@@ -654,7 +659,7 @@ fn a_sample_is_written_per_driven_face() {
     // 16 mm between the faces, 20 x 20 mm: pulled to a stretch of 1.5, 40 N are 100 kPa.
     let faces = DrivenFace::of_scene(&driven(Face::ZMax, [0.0, 0.0, 8.0], 2.0), &mesh);
     let records = pulled(Face::ZMax, DVec3::Z, 40.0);
-    let mut tables = Tables::create(&folder, &faces, false, &block([2.0; 3], 1.0)).unwrap();
+    let mut tables = Tables::create(&folder, &faces, false, &bare()).unwrap();
     for (rows, record) in records.iter().enumerate() {
         tables.append(record).unwrap();
         let text = fs::read_to_string(folder.file(SAMPLE_TABLE)).unwrap();

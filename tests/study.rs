@@ -6,8 +6,9 @@ use std::process::{Command, Output, Stdio};
 
 use assert_cmd::cargo::CommandCargoExt;
 use serde_json::Value;
+use stylet::output::curve::interpolated;
 use stylet::study::advice::{Candidate, sentences};
-use stylet::study::metrics::{curve_error, field_error, interpolated};
+use stylet::study::metrics::{curve_error, field_error};
 use stylet::study::order::{fit, richardson};
 use stylet::study::pareto::front;
 use stylet::study::plan::{Basis, Choice, Costs, Role, UnitCost, choose, shard};

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use common::*;
 use glam::{DMat3, DVec3};
-use stylet::commands::run::{RunOptions, RunOutcome, describe, run};
+use stylet::commands::run::{RunArgs, RunOutcome, describe, run};
 use stylet::mesh::{BlockMesh, Mesh, TissuePoint};
 use stylet::model::Model;
 use stylet::observables::quantity::columns;
@@ -269,8 +269,8 @@ fn figures_count_the_way_in() {
 
 /// A run of the command into a folder.
 fn run_into(scene: Scene, choice: EngineChoice, out: &Path) -> RunOutcome {
-    let options = RunOptions { engine: choice, out: Some(out.to_path_buf()), force: false, ..RunOptions::default() };
-    run(scene, &options, Instant::now(), &AtomicBool::new(false)).unwrap()
+    let args = RunArgs { engine: choice, out: Some(out.to_path_buf()), ..RunArgs::default() };
+    run(scene, &args, None, Instant::now(), &AtomicBool::new(false)).unwrap()
 }
 
 #[test]

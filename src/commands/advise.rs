@@ -3,6 +3,9 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use clap::Args;
+
+use super::SceneArgs;
 use super::report::moment;
 use crate::effects::mass_scaling::{AUTO_MACH, Loading};
 use crate::error::{Error, Result};
@@ -24,15 +27,21 @@ const SHARE: f64 = 0.8;
 /// Edges that are tried without a study, over that of the scene.
 const EDGES: [f64; 9] = [0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0];
 
-/// What the command line says.
-#[derive(Debug, Clone, Default)]
-pub struct AdviseOptions {
-    pub scene: PathBuf,
-    pub overrides: Vec<String>,
+#[derive(Debug, Clone, Default, Args)]
+pub struct AdviseArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
-    /// Frames per second.
+    /// Ask for settings that keep real time
+    #[arg(long)]
+    pub real_time: bool,
+    /// Frames per second
+    #[arg(long, default_value_t = 60.0)]
     pub rate: f64,
-    /// Folder of a study of the scene; `None`: `out/study_<scene>`, if it is there.
+    /// Folder of a study of the scene [default: out/study_<scene>, if it is there]
+    #[arg(long)]
     pub study: Option<PathBuf>,
 }
 
@@ -47,27 +56,39 @@ struct Proposal {
     same_mesh: bool,
 }
 
+/// The command: prints the proposal.
+///
+/// # Errors
+/// As [`advise`]; without what the settings are for.
+pub fn execute(args: &AdviseArgs) -> Result<u8> {
+    if !args.real_time {
+        return Err(Error::input("advise needs to know what for", "ask for real time with --real-time"));
+    }
+    println!("{}", advise(args)?);
+    Ok(0)
+}
+
 /// Measures this machine for about a second and proposes settings.
 ///
 /// # Errors
 /// Wrong options and scenes; a folder given by the user that holds no study.
-pub fn advise(options: &AdviseOptions) -> Result<String> {
-    if !(1.0..=1000.0).contains(&options.rate) {
+pub fn advise(args: &AdviseArgs) -> Result<String> {
+    if !(1.0..=1000.0).contains(&args.rate) {
         return Err(Error::input(
-            format!("a rate of {} frames per second is none", options.rate),
+            format!("a rate of {} frames per second is none", args.rate),
             "give a number from 1 to 1000, e.g. --rate 60",
         ));
     }
-    let subject = Subject::load(&options.scene, &options.overrides, options.engine)?;
+    let subject = Subject::load(&args.scene.file, &args.scene.overrides, args.engine)?;
     let folder = PathBuf::from(format!("out/study_{}", safe_name(&subject.scene.name)));
-    let study = match &options.study {
+    let study = match &args.study {
         Some(folder) => Some(Store::existing(folder)?),
         None => Store::existing(&folder).ok(),
     };
     // What a frame costs beside its steps counts at the wanted rate.
     let at_rate: Vec<String> =
-        options.overrides.iter().cloned().chain([format!("solver.frame_rate_hz={:?}", options.rate)]).collect();
-    let measured = Subject::load(&options.scene, &at_rate, options.engine)?;
+        args.scene.overrides.iter().cloned().chain([format!("solver.frame_rate_hz={:?}", args.rate)]).collect();
+    let measured = Subject::load(&args.scene.file, &at_rate, args.engine)?;
     let cost = measure_engine(&measured, measured.base.engine, MEASURED_S)?;
 
     let mut out = String::new();
@@ -76,7 +97,7 @@ pub fn advise(options: &AdviseOptions) -> Result<String> {
         let _ = writeln!(out, "{head:<11} {text}");
     };
     let adapter = subject.adapter.as_deref().unwrap_or("the processor");
-    line("scene", format!("{} ({})", subject.scene.name, options.scene.display()));
+    line("scene", format!("{} ({})", subject.scene.name, args.scene.file.display()));
     line(
         "measured",
         format!(
@@ -104,7 +125,7 @@ pub fn advise(options: &AdviseOptions) -> Result<String> {
         }
         Analysis::read(store, plan).map_err(|error| error.to_string().lines().next().unwrap_or_default().to_string())
     });
-    let command = study_command(options);
+    let command = study_command(args);
     let proposal = match usable {
         Some(Ok(analysis)) => {
             let last = analysis.rows.iter().map(|row| row.run.finished).max().unwrap_or(0);
@@ -113,7 +134,7 @@ pub fn advise(options: &AdviseOptions) -> Result<String> {
             line("study", format!("{folder}, {}; errors are against {reference}", moment(last)));
             assumptions
                 .push("only settings that the study ran are proposed; their errors are those measured there".into());
-            of_study(&subject, &analysis, &cost, options.rate)
+            of_study(&subject, &analysis, &cost, args.rate)
         }
         other => {
             match other {
@@ -125,48 +146,14 @@ pub fn advise(options: &AdviseOptions) -> Result<String> {
                 "without a study: mass scaling so that the needle moves at {AUTO_MACH} of the shear wave speed or as the scene \
                  has it, whichever is more, and the finest mesh that keeps the rate"
             ));
-            by_rule(&subject, &cost, options.rate)
+            by_rule(&subject, &cost, args.rate)
         }
     };
     match proposal {
         Ok(p) => {
-            line("proposal", p.settings.describe());
-            line(
-                "",
-                format!(
-                    "{} cells, frames of {:.1} ms: {:.1} ms of steps, {}",
-                    p.size.cells,
-                    1e3 / options.rate,
-                    1e3 / options.rate / p.factor,
-                    speed(p.factor)
-                ),
-            );
-            line(
-                "error",
-                match p.error {
-                    None => "not known without a study".into(),
-                    Some(e) if p.same_mesh => format!(
-                        "{} % of the force over depth by mass scaling and step; that of the mesh is not known, it is the \
-                         reference's own",
-                        three_decimals(100.0 * e)
-                    ),
-                    Some(e) => format!("{} % of the force over depth", three_decimals(100.0 * e)),
-                },
-            );
-            line(
-                "run it",
-                format!(
-                    "stylet run {}{} --engine {} --set tissue.cell_size_mm={} --set solver.mass_scaling={} --set \
-                     solver.safety={} --set solver.frame_rate_hz={}",
-                    options.scene.display(),
-                    sets(&options.overrides),
-                    p.settings.engine.key(),
-                    trimmed(p.settings.cell_size_mm),
-                    trimmed(p.settings.mass_scaling),
-                    trimmed(p.settings.safety),
-                    trimmed(options.rate)
-                ),
-            );
+            for (head, text) in in_words(&p, args) {
+                line(head, text);
+            }
         }
         Err(reason) => line("proposal", reason),
     }
@@ -174,6 +161,49 @@ pub fn advise(options: &AdviseOptions) -> Result<String> {
         line(if number == 0 { "assumes" } else { "" }, text);
     }
     Ok(out.trim_end().to_string())
+}
+
+/// What is proposed, how fast and how good it is, and the command that runs it.
+fn in_words(p: &Proposal, args: &AdviseArgs) -> [(&'static str, String); 4] {
+    [
+        ("proposal", p.settings.describe()),
+        (
+            "",
+            format!(
+                "{} cells, frames of {:.1} ms: {:.1} ms of steps, {}",
+                p.size.cells,
+                1e3 / args.rate,
+                1e3 / args.rate / p.factor,
+                speed(p.factor)
+            ),
+        ),
+        (
+            "error",
+            match p.error {
+                None => "not known without a study".into(),
+                Some(e) if p.same_mesh => format!(
+                    "{} % of the force over depth by mass scaling and step; that of the mesh is not known, it is the \
+                     reference's own",
+                    three_decimals(100.0 * e)
+                ),
+                Some(e) => format!("{} % of the force over depth", three_decimals(100.0 * e)),
+            },
+        ),
+        (
+            "run it",
+            format!(
+                "stylet run {}{} --engine {} --set tissue.cell_size_mm={} --set solver.mass_scaling={} --set \
+                 solver.safety={} --set solver.frame_rate_hz={}",
+                args.scene.file.display(),
+                sets(&args.scene.overrides),
+                p.settings.engine.key(),
+                trimmed(p.settings.cell_size_mm),
+                trimmed(p.settings.mass_scaling),
+                trimmed(p.settings.safety),
+                trimmed(args.rate)
+            ),
+        ),
+    ]
 }
 
 /// The most accurate settings of the study that are predicted to keep the rate; else why there are none.
@@ -253,10 +283,10 @@ fn sets(overrides: &[String]) -> String {
 }
 
 /// The study that would tell the errors.
-fn study_command(options: &AdviseOptions) -> String {
-    let engine = match options.engine {
+fn study_command(args: &AdviseArgs) -> String {
+    let engine = match args.engine {
         EngineChoice::Auto => String::new(),
         engine => format!(" --engine {}", engine.key()),
     };
-    format!("stylet study {}{}{engine}", options.scene.display(), sets(&options.overrides))
+    format!("stylet study {}{}{engine}", args.scene.file.display(), sets(&args.scene.overrides))
 }

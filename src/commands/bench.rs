@@ -7,11 +7,13 @@ use std::fmt::Write;
 use std::sync::Arc;
 use std::time::Instant;
 
+use clap::Args;
 use glam::DVec3;
 use serde::Serialize;
 
 use crate::cpu::CpuEngine;
 use crate::effects::{TissueMaterial, friction, mass_scaling};
+use crate::ending;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::engine::{Engine, FramePlan, StepInput};
 use crate::error::Result;
@@ -26,10 +28,19 @@ use crate::process;
 use crate::scene::Scene;
 use crate::simulation::{EngineChoice, Simulation};
 
-/// What the command line chooses.
-#[derive(Debug, Clone)]
-pub struct BenchOptions {
+#[derive(Debug, Clone, Args)]
+pub struct BenchArgs {
+    /// auto, gpu or cpu
+    #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+    /// Measure what every effect costs instead
+    #[arg(long)]
+    pub effects: bool,
+    /// Largest number of cells
+    #[arg(long, default_value_t = 500_000)]
     pub max_cells: usize,
 }
 
@@ -358,13 +369,24 @@ fn tell(row: &Row) {
     );
 }
 
+/// The command: prints the report.
+///
+/// # Errors
+/// As [`bench`].
+pub fn execute(args: &BenchArgs) -> Result<u8> {
+    ending::watch();
+    let report = bench(args)?;
+    println!("{}", if args.json { report.json() } else { report.table() });
+    Ok(0)
+}
+
 /// Measures everything that fits under `max_cells`. What is under way goes to standard error.
-pub fn bench(options: &BenchOptions) -> Result<Report> {
-    let gpu = open(options.engine)?;
+pub fn bench(args: &BenchArgs) -> Result<Report> {
+    let gpu = open(args.engine)?;
     let software = gpu.as_ref().is_none_or(Gpu::is_software);
     let mut rows = Vec::new();
     let sizes = SIZES.iter().take(if software { 4 } else { 5 });
-    for cells in sizes.filter(|c| c.iter().product::<usize>() <= options.max_cells) {
+    for cells in sizes.filter(|c| c.iter().product::<usize>() <= args.max_cells) {
         eprintln!("measuring {} cells", cells.iter().product::<usize>());
         rows.push(measure(*cells, false, gpu.as_ref())?);
         tell(&rows[rows.len() - 1]);
@@ -416,7 +438,7 @@ pub fn bench(options: &BenchOptions) -> Result<Report> {
     }
     for (cold, bound) in [(true, 150.0), (false, 70.0)] {
         eprintln!("measuring the start with a {} cache", if cold { "cold" } else { "warm" });
-        let tries: Vec<(f64, f64)> = (0..ROUNDS).filter_map(|_| start(cold, options.engine)).collect();
+        let tries: Vec<(f64, f64)> = (0..ROUNDS).filter_map(|_| start(cold, args.engine)).collect();
         let best = tries.iter().map(|t| t.0).fold(f64::INFINITY, f64::min);
         if !tries.is_empty() {
             let what = if cold { "start to first step, cold shader cache" } else { "start to first step, warm cache" };
@@ -428,7 +450,7 @@ pub fn bench(options: &BenchOptions) -> Result<Report> {
         }
     }
     goal("real-time factor, 20 k cells, S 1000, needle on", needle.real_time_factor, "x", ">=", 1.5);
-    let factor = main_job(options.engine)?;
+    let factor = main_job(args.engine)?;
     goal("real-time factor, scenes/muscle_biopsy.toml, whole run", factor, "x", ">=", 1.0);
     let costs: Vec<f64> = rows.iter().filter(|r| !r.needle).map(cost).collect();
     let (low, high) = (costs.iter().copied().fold(f64::INFINITY, f64::min), costs.iter().copied().fold(0.0, f64::max));

@@ -12,8 +12,9 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::bench::{Subject, open, scene, uniform_mesh};
+use super::bench::{BenchArgs, Subject, open, scene, uniform_mesh};
 use crate::effects::{self, EFFECTS, EffectSet, Kind, damage, fibres, gravity, plasticity, viscoelastic};
+use crate::ending;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::compose::{compose, compose_without_effects};
@@ -183,6 +184,17 @@ pub fn off_is_absent() -> Result<bool> {
         }
     }
     Ok(true)
+}
+
+/// The command with `--effects`: prints the report.
+///
+/// # Errors
+/// As [`bench_effects`].
+pub fn execute(args: &BenchArgs) -> Result<u8> {
+    ending::watch();
+    let report = bench_effects(args.engine)?;
+    println!("{}", if args.json { report.json() } else { report.table() });
+    Ok(0)
 }
 
 /// Measures every effect.

@@ -3,7 +3,11 @@
 use std::fmt::Write;
 use std::time::Instant;
 
+use clap::Args;
+
+use super::SceneArgs;
 use crate::effects::{EffectSet, TissueMaterial, damage, fibres, plasticity, viscoelastic};
+use crate::ending;
 use crate::engine::stable_dt::power_iteration;
 use crate::error::{Result, brief};
 use crate::material::{describe_constants, describe_verdict};
@@ -19,6 +23,25 @@ const TRIAL: f64 = 0.5;
 
 /// Most cells of a mesh whose stable step is also found by power iteration: more would take seconds.
 const MOST_ITERATED: usize = 30_000;
+
+#[derive(Debug, Clone, Default, Args)]
+pub struct CheckArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    #[arg(long, default_value = "auto")]
+    pub engine: EngineChoice,
+}
+
+/// The command: prints what the scene means.
+///
+/// # Errors
+/// Those of the scene, and as [`check`].
+pub fn execute(args: &CheckArgs) -> Result<u8> {
+    ending::watch();
+    println!("{}", check(args.scene.load()?, args.engine)?);
+    Ok(0)
+}
 
 /// Validates a scene (loading it did) and tells moduli, waves, stability, steps, effects and the predicted time.
 pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {

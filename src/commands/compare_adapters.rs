@@ -8,28 +8,31 @@
 //! ```
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 use std::time::Instant;
 
+use clap::Args;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::SceneArgs;
+use crate::ending;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::device;
 use crate::observables::{EnergyAccount, FrameRecord};
-use crate::scene::Scene;
 use crate::simulation::Simulation;
 
 /// Most that a run on an adapter may differ from the CPU engine, in percent: what f32 costs in the main job (0.02 % of the force)
 /// five times over. A wrong kernel is beyond it by orders of magnitude.
 pub const BOUNDS: Differences = Differences { force: Some(0.1), displacement: Some(0.1), energy: Some(0.1) };
 
-/// What the user asked for.
-#[derive(Debug, Clone)]
-pub struct CompareOptions {
-    pub scene: PathBuf,
-    pub overrides: Vec<String>,
+#[derive(Debug, Clone, Default, Args)]
+pub struct CompareArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Differences from the CPU engine, in percent of the largest value; `None` where the scene has no such quantity.
@@ -88,12 +91,23 @@ struct Trace {
     wall: f64,
 }
 
+/// The command: prints the table. The exit code is 1 where a bound is broken.
+///
+/// # Errors
+/// As [`compare_adapters`].
+pub fn execute(args: &CompareArgs) -> Result<u8> {
+    ending::watch();
+    let table = compare_adapters(args)?;
+    println!("{}", if args.json { table.json() } else { table.table() }.trim_end());
+    Ok(u8::from(table.is_broken()))
+}
+
 /// Runs the scene on the CPU engine and on every adapter of every backend.
 ///
 /// # Errors
 /// Those of the scene, and whatever stops the CPU engine: without it there is nothing to compare with.
-pub fn compare_adapters(options: &CompareOptions) -> Result<AdapterTable> {
-    let scene = Scene::load(&options.scene, &options.overrides)?;
+pub fn compare_adapters(args: &CompareArgs) -> Result<AdapterTable> {
+    let scene = args.scene.load()?;
     let mut simulation = Simulation::on(scene.clone(), None)?;
     let (cells, info) = (simulation.model.mesh.cell_count(), simulation.engine().info().clone());
     let reference = trace(&mut simulation)?;

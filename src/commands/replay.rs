@@ -3,6 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use clap::Args;
+
+use super::{ended, until_ended};
 use crate::ending;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -13,12 +16,18 @@ use crate::simulation::{EngineChoice, Purpose, Simulation};
 use crate::training::kinematic::Sample;
 use crate::training::score::Score;
 
-/// What the user asked for.
-#[derive(Debug, Clone)]
-pub struct ReplayOptions {
+#[derive(Debug, Clone, Default, Args)]
+pub struct ReplayArgs {
+    /// A session.json that `stylet view` has written
     pub session: PathBuf,
+    /// gpu or cpu; auto: the kind of engine that recorded it
+    #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
+    /// Folder of the results [default: the next out/<scene>/001, 002, ...]
+    #[arg(long)]
     pub out: Option<PathBuf>,
+    /// Replace the results that the folder holds
+    #[arg(long)]
     pub force: bool,
 }
 
@@ -41,19 +50,29 @@ pub struct ReplayOutcome {
     pub adapter: String,
 }
 
+/// The command: prints what came out.
+///
+/// # Errors
+/// As [`replay`].
+pub fn execute(args: &ReplayArgs) -> Result<u8> {
+    until_ended();
+    println!("{}", replay(args)?.text());
+    Ok(ended("the tables go on to the last frame that was computed"))
+}
+
 /// Computes a session again and writes its tables.
 ///
 /// # Errors
 /// `Error::Input` for a session that is none or whose scene has changed; `Error::Diverged` where the guard stops the run, as it
 /// did when it was recorded; what the folder cannot take.
-pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
-    let session = Session::read(&options.session)?;
+pub fn replay(args: &ReplayArgs) -> Result<ReplayOutcome> {
+    let session = Session::read(&session_file(&args.session))?;
     let scene = session.scene()?;
-    let device = match (options.engine, session.engine.as_str()) {
+    let device = match (args.engine, session.engine.as_str()) {
         (EngineChoice::Cpu, _) | (EngineChoice::Auto, "cpu") => None,
         _ => Some(Gpu::open()?),
     };
-    let folder = OutputFolder::create(options.out.as_deref(), &scene.name, options.force)?;
+    let folder = OutputFolder::create(args.out.as_deref(), &scene.name, args.force)?;
     let mut simulation = Simulation::for_purpose(scene.clone(), device, Purpose { led: true, drawn: false })?;
     let info = simulation.engine().info().clone();
     let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
@@ -107,6 +126,26 @@ pub fn replay(options: &ReplayOptions) -> Result<ReplayOutcome> {
         Score::of(&scene, &samples, &records, None)?.write(&folder)?;
     }
     Ok(outcome)
+}
+
+impl ReplayOutcome {
+    fn text(&self) -> String {
+        let same = match self.same_place {
+            true => "the same bit for bit as recorded".to_string(),
+            false => format!("recorded by {}, so within what adapters differ by", self.recorded_by),
+        };
+        let doubt = self.doubt.as_ref().map_or(String::new(), |why| format!("DOUBTFUL: {why}\n"));
+        format!(
+            "{doubt}{} frames, {:.2} s simulated in {:.2} s by {}: {same}\nlargest force {:.3} N; energy imbalance {:.2} %\n{}",
+            self.frames,
+            self.simulated,
+            self.wall,
+            self.adapter,
+            self.largest_force,
+            100.0 * self.imbalance,
+            self.folder.display()
+        )
+    }
 }
 
 fn place(version: &str, adapter: &str) -> String {

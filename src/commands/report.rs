@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
+use clap::Args;
 use serde::{Deserialize, Serialize};
 
-use super::run::{self, RunOptions};
+use super::run::{self, RunArgs};
+use super::{ended_between_runs, until_ended};
 use crate::error::{Error, Result};
 use crate::output::Status;
 use crate::output::report::CaseResults;
@@ -23,21 +25,27 @@ pub const NAMES: [&str; 1] = ["lv2022"];
 /// Written beside the folders of the runs: what has been computed from which scene.
 const LEDGER: &str = "report.json";
 
-/// What the command line says.
-#[derive(Debug, Clone, Default)]
-pub struct ReportOptions {
-    /// One of [`NAMES`].
+#[derive(Debug, Clone, Default, Args)]
+pub struct ReportArgs {
+    /// Which report: lv2022
     pub name: String,
-    pub engine: EngineChoice,
-    /// Folder of runs and page; `None`: `out/report_<name>`.
+    /// Folder of the runs and of the page [default: out/report_<NAME>, with --quick out/report_<NAME>_quick]
+    #[arg(long)]
     pub out: Option<PathBuf>,
-    /// Folder of the scenes; `None`: that of the repository.
-    pub scenes: Option<PathBuf>,
-    /// Coarse cells: a look at the page, no result.
+    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    #[arg(long, default_value = "auto")]
+    pub engine: EngineChoice,
+    /// Coarse cells: a look at the page within seconds, no result
+    #[arg(long)]
     pub quick: bool,
-    /// `key=value` texts for all scenes.
+    /// Override a key of all scenes; the page says so
+    #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
-    /// Compute everything again.
+    /// Folder of the scenes [default: scenes/<NAME>]
+    #[arg(long)]
+    pub scenes: Option<PathBuf>,
+    /// Compute everything again, and replace what the folder holds
+    #[arg(long)]
     pub force: bool,
 }
 
@@ -81,21 +89,38 @@ struct Planned {
     made_from: Finished,
 }
 
+/// The command: prints the path of the page; the exit code of a page that shows failed runs is that of a stopped one.
+///
+/// # Errors
+/// As [`report`].
+pub fn execute(args: &ReportArgs) -> Result<u8> {
+    match report(args, until_ended())? {
+        ReportOutcome::Page { path, failed } => {
+            println!("{}", path.display());
+            if failed > 0 {
+                eprintln!("error: {failed} of the runs failed; the page says why");
+            }
+            Ok(if failed > 0 { run::EXIT_DIVERGED } else { 0 })
+        }
+        ReportOutcome::Interrupted { done, of } => Ok(ended_between_runs(done, of)),
+    }
+}
+
 /// Runs what is missing and writes the page `<name>.html` into the folder.
 ///
 /// # Errors
 /// Wrong names, folders and scenes come before anything is run. A run that diverges does not stop the others: the page
 /// says so, and the outcome counts it.
-pub fn report(options: &ReportOptions, interrupted: &AtomicBool) -> Result<ReportOutcome> {
-    if !NAMES.contains(&options.name.as_str()) {
+pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<ReportOutcome> {
+    if !NAMES.contains(&args.name.as_str()) {
         return Err(Error::input(
-            format!("there is no report `{}`", options.name),
+            format!("there is no report `{}`", args.name),
             format!("write one of: {}", NAMES.join(", ")),
         ));
     }
-    let planned = plan(options)?;
-    let out = options.out.clone().unwrap_or_else(|| default_out(options));
-    let mut ledger = open_ledger(&out, options, &planned)?;
+    let planned = plan(args)?;
+    let out = args.out.clone().unwrap_or_else(|| default_out(args));
+    let mut ledger = open_ledger(&out, args, &planned)?;
     let mut cases = Vec::new();
     for (number, plan) in planned.iter().enumerate() {
         let place = format!("case {} of {}, {}", number + 1, planned.len(), plan.case.name);
@@ -105,7 +130,7 @@ pub fn report(options: &ReportOptions, interrupted: &AtomicBool) -> Result<Repor
                 eprintln!("{place}: {}", plan.scene.title);
                 ledger.cases.remove(plan.case.name);
                 ledger.write(&out)?;
-                match compute(plan, options.engine, &out, interrupted)? {
+                match compute(plan, args.engine, &out, interrupted)? {
                     Some((results, made_from)) => {
                         if results.summary.status == Status::Ok {
                             ledger.cases.insert(plan.case.name.into(), made_from);
@@ -126,23 +151,23 @@ pub fn report(options: &ReportOptions, interrupted: &AtomicBool) -> Result<Repor
             overrides.push(text.clone());
         }
     }
-    let page = Report { cases, overrides, quick: options.quick, command: command(options), written: moment(now()) };
-    let path = out.join(format!("{}.html", options.name));
+    let page = Report { cases, overrides, quick: args.quick, command: command_line(args), written: moment(now()) };
+    let path = out.join(format!("{}.html", args.name));
     whole_file::write(&path, page.page()?.as_bytes())?;
     Ok(ReportOutcome::Page { path, failed })
 }
 
-fn default_out(options: &ReportOptions) -> PathBuf {
-    PathBuf::from(format!("out/report_{}{}", options.name, if options.quick { "_quick" } else { "" }))
+fn default_out(args: &ReportArgs) -> PathBuf {
+    PathBuf::from(format!("out/report_{}{}", args.name, if args.quick { "_quick" } else { "" }))
 }
 
 /// Reads and checks the scenes of all cases.
-fn plan(options: &ReportOptions) -> Result<Vec<Planned>> {
-    let folder = options.scenes.clone().unwrap_or_else(|| PathBuf::from(SCENES));
+fn plan(args: &ReportArgs) -> Result<Vec<Planned>> {
+    let folder = args.scenes.clone().unwrap_or_else(|| PathBuf::from(SCENES));
     let mut planned = Vec::new();
     for case in CASES {
         let path = folder.join(format!("{}.toml", case.name));
-        let quick = if options.quick { case.quick } else { Some(&[][..]) };
+        let quick = if args.quick { case.quick } else { Some(&[][..]) };
         let Some(quick) = quick else { continue };
         let text = match reading::text(&path, reading::most::SCENE) {
             Ok(text) => text,
@@ -155,12 +180,12 @@ fn plan(options: &ReportOptions) -> Result<Vec<Planned>> {
                 ));
             }
         };
-        let overrides: Vec<String> = quick.iter().map(|o| o.to_string()).chain(options.overrides.clone()).collect();
+        let overrides: Vec<String> = quick.iter().map(|o| o.to_string()).chain(args.overrides.clone()).collect();
         let scene = Scene::load(&path, &overrides)?;
         let made_from = Finished {
             scene: text,
             overrides,
-            engine: options.engine.key().into(),
+            engine: args.engine.key().into(),
             version: env!("CARGO_PKG_VERSION").into(),
             at: 0,
         };
@@ -178,11 +203,11 @@ impl Ledger {
 }
 
 /// What the folder holds already. A folder with results that no report made is refused unless `--force`.
-fn open_ledger(out: &Path, options: &ReportOptions, planned: &[Planned]) -> Result<Ledger> {
-    let new = Ledger { report: options.name.clone(), ..Default::default() };
+fn open_ledger(out: &Path, args: &ReportArgs, planned: &[Planned]) -> Result<Ledger> {
+    let new = Ledger { report: args.name.clone(), ..Default::default() };
     let path = out.join(LEDGER);
     let found = match reading::text(&path, reading::most::OWN) {
-        Ok(text) => serde_json::from_str::<Ledger>(&text).ok().filter(|ledger| ledger.report == options.name),
+        Ok(text) => serde_json::from_str::<Ledger>(&text).ok().filter(|ledger| ledger.report == args.name),
         Err(unread) if unread.is_missing() => {
             // Without a ledger the folder is new, unless there are results.
             planned.iter().all(|plan| !out.join(plan.case.name).exists()).then(|| new.clone())
@@ -190,11 +215,11 @@ fn open_ledger(out: &Path, options: &ReportOptions, planned: &[Planned]) -> Resu
         Err(_) => None,
     };
     let ledger = match found {
-        _ if options.force => new,
+        _ if args.force => new,
         Some(ledger) => ledger,
         None => {
             return Err(Error::input(
-                format!("folder {} holds results that are not those of the report {}", out.display(), options.name),
+                format!("folder {} holds results that are not those of the report {}", out.display(), args.name),
                 "give another folder with --out, or replace the results with --force",
             ));
         }
@@ -243,8 +268,8 @@ fn compute(
 ) -> Result<Option<(CaseResults, Finished)>> {
     let folder = out.join(plan.case.name);
     // What lies there is of a report: `open_ledger` has seen to it.
-    let run_options = RunOptions { engine, out: Some(folder.clone()), force: true, ..RunOptions::default() };
-    match run::run(plan.scene.clone(), &run_options, Instant::now(), interrupted) {
+    let args = RunArgs { engine, out: Some(folder.clone()), force: true, ..RunArgs::default() };
+    match run::run(plan.scene.clone(), &args, None, Instant::now(), interrupted) {
         Ok(outcome) if outcome.summary.status == Status::Interrupted => return Ok(None),
         Ok(outcome) => eprintln!("{}", run::describe(&outcome.summary)),
         // A failed run is a finding: its results stay, and the page tells why it ended.
@@ -257,15 +282,15 @@ fn compute(
 }
 
 /// The command line that makes the same page, without the folder.
-fn command(options: &ReportOptions) -> String {
-    let mut text = format!("stylet report {}", options.name);
-    if options.quick {
+fn command_line(args: &ReportArgs) -> String {
+    let mut text = format!("stylet report {}", args.name);
+    if args.quick {
         text += " --quick";
     }
-    if options.engine != EngineChoice::Auto {
-        text += &format!(" --engine {}", options.engine.key());
+    if args.engine != EngineChoice::Auto {
+        text += &format!(" --engine {}", args.engine.key());
     }
-    for set in &options.overrides {
+    for set in &args.overrides {
         text += &format!(" --set {set}");
     }
     text

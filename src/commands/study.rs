@@ -4,9 +4,11 @@
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::report::moment;
+use super::{SceneArgs, ended_between_runs, until_ended};
 use crate::error::{Error, Result};
 use crate::output::folder::safe_name;
 use crate::output::progress::time_left;
@@ -24,24 +26,33 @@ const SPARE_SHARE: f64 = 0.95;
 /// A study has fewer runs.
 const MOST_PARTS: usize = 1000;
 
-/// What the command line says.
-#[derive(Debug, Clone, Default)]
-pub struct StudyOptions {
-    pub scene: PathBuf,
-    /// `key=value` texts.
-    pub overrides: Vec<String>,
+#[derive(Debug, Clone, Default, Args)]
+pub struct StudyArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
-    /// Names of axes, separated by commas; `None`: all.
+    /// What is varied, separated by commas: mesh, mass, step, engine, effects [default: all]
+    #[arg(long, value_name = "LIST")]
     pub axes: Option<String>,
-    /// Time that the study may take [min].
+    /// Time that the study may take; it chooses mesh sizes and reference
+    #[arg(long, value_name = "MINUTES", default_value_t = 20.0)]
     pub budget: f64,
-    /// Folder of runs and page; `None`: `out/study_<scene>`.
+    /// Folder of the runs and of the page [default: out/study_<scene>]
+    #[arg(long)]
     pub out: Option<PathBuf>,
-    /// Finest cell edge that may be planned [mm].
+    /// Finest cell edge that may be planned [mm]
+    #[arg(long, value_name = "MM")]
     pub finest: Option<f64>,
-    /// `K/N`: only this part of the runs, without a page.
+    /// Run only part K of N, for another machine or job; join the parts with --merge
+    #[arg(long, value_name = "K/N")]
     pub shard: Option<String>,
-    /// Compute everything again.
+    /// Join the parts in these folders and write the page into --out
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
+    pub merge: Vec<PathBuf>,
+    /// Compute everything again, and replace the study that the folder holds
+    #[arg(long)]
     pub force: bool,
 }
 
@@ -56,33 +67,64 @@ pub enum StudyOutcome {
     Interrupted { done: usize, of: usize },
 }
 
+/// The command: prints the path of the page, or the folder of a part.
+///
+/// # Errors
+/// As [`study`] and [`merge`].
+pub fn execute(args: &StudyArgs) -> Result<u8> {
+    let outcome = match args.merge.is_empty() {
+        true => study(args, until_ended())?,
+        false => merge(&args.merge, args.out.as_ref(), args.force)?,
+    };
+    match outcome {
+        StudyOutcome::Page { path, sentences, missing } => {
+            for sentence in sentences {
+                eprintln!("{sentence}");
+            }
+            if missing > 0 {
+                eprintln!("note: {missing} planned runs are not there; the page lists them");
+            }
+            println!("{}", path.display());
+            Ok(0)
+        }
+        StudyOutcome::Part { part, folder, runs, of } => {
+            eprintln!(
+                "part {part}: {runs} of the {of} runs are here; join all parts with: stylet study --merge DIR... --out DIR"
+            );
+            println!("{}", folder.display());
+            Ok(0)
+        }
+        StudyOutcome::Interrupted { done, of } => Ok(ended_between_runs(done, of)),
+    }
+}
+
 /// Runs what is missing and writes the page, the table and the figures into the folder.
 ///
 /// # Errors
 /// Wrong options, scenes and folders come before anything is run.
-pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOutcome> {
-    let axes = options.axes.as_deref().map_or(Ok(Axis::ALL.to_vec()), Axis::list)?;
-    if !(options.budget > 0.0 && options.budget.is_finite()) {
+pub fn study(args: &StudyArgs, interrupted: &AtomicBool) -> Result<StudyOutcome> {
+    let axes = args.axes.as_deref().map_or(Ok(Axis::ALL.to_vec()), Axis::list)?;
+    if !(args.budget > 0.0 && args.budget.is_finite()) {
         return Err(Error::input(
-            format!("a budget of {} minutes is none", options.budget),
+            format!("a budget of {} minutes is none", args.budget),
             "give the minutes that the study may take, e.g. --budget 20",
         ));
     }
-    if let Some(finest) = options.finest.filter(|finest| !(*finest > 0.0 && finest.is_finite())) {
+    if let Some(finest) = args.finest.filter(|finest| !(*finest > 0.0 && finest.is_finite())) {
         return Err(Error::input(
             format!("a finest edge of {finest} mm is none"),
             "give the edge of the finest cells in mm, e.g. --finest 0.4",
         ));
     }
-    let part = options.shard.as_deref().map(parse_shard).transpose()?;
-    let subject = Subject::load(&options.scene, &options.overrides, options.engine)?;
+    let part = args.shard.as_deref().map(parse_shard).transpose()?;
+    let subject = Subject::load(&args.scene.file, &args.scene.overrides, args.engine)?;
     let name = safe_name(&subject.scene.name);
-    let out = options.out.clone().unwrap_or_else(|| match part {
+    let out = args.out.clone().unwrap_or_else(|| match part {
         None => PathBuf::from(format!("out/study_{name}")),
         Some((part, of)) => PathBuf::from(format!("out/study_{name}_part_{part}_of_{of}")),
     });
-    let store = Store::open(&out, &subject.scene.name, options.force)?;
-    let mut plan = plan(&store, &subject, &axes, options, part.is_some())?;
+    let store = Store::open(&out, &subject.scene.name, args.force)?;
+    let mut plan = plan(&store, &subject, &axes, args, part.is_some())?;
     tell_finished(&Row { store: &store, subject: &subject, plan: &plan, part: None, budget: 0.0, interrupted });
     if part.is_none()
         && let Done::Interrupted { done } = settle_reference(&store, &subject, &mut plan, interrupted)?
@@ -129,7 +171,7 @@ pub fn study(options: &StudyOptions, interrupted: &AtomicBool) -> Result<StudyOu
             return Ok(StudyOutcome::Interrupted { done: of - 1 - plan.given_up.len(), of });
         }
     }
-    write(&store, &plan, &command(options))
+    write(&store, &plan, &command_line(args))
 }
 
 /// How many runs the folder holds.
@@ -242,8 +284,8 @@ fn parse_shard(text: &str) -> Result<(usize, usize)> {
 }
 
 /// The plan that the folder holds, where it fits; else a new one, which is stored.
-fn plan(store: &Store, subject: &Subject, axes: &[Axis], options: &StudyOptions, part: bool) -> Result<Plan> {
-    let (budget, finest) = (60.0 * options.budget, options.finest.unwrap_or(0.0));
+fn plan(store: &Store, subject: &Subject, axes: &[Axis], args: &StudyArgs, part: bool) -> Result<Plan> {
+    let (budget, finest) = (60.0 * args.budget, args.finest.unwrap_or(0.0));
     let engines: Vec<Engine> = match subject.adapter {
         Some(_) => vec![Engine::Gpu, Engine::Cpu],
         None => vec![Engine::Cpu],
@@ -399,19 +441,19 @@ fn write(store: &Store, plan: &Plan, command: &str) -> Result<StudyOutcome> {
 }
 
 /// The command line that makes the same page, without the folder.
-fn command(options: &StudyOptions) -> String {
-    let mut text = format!("stylet study {}", options.scene.display());
-    if let Some(axes) = &options.axes {
+fn command_line(args: &StudyArgs) -> String {
+    let mut text = format!("stylet study {}", args.scene.file.display());
+    if let Some(axes) = &args.axes {
         text += &format!(" --axes {axes}");
     }
-    text += &format!(" --budget {}", options.budget);
-    if let Some(finest) = options.finest {
+    text += &format!(" --budget {}", args.budget);
+    if let Some(finest) = args.finest {
         text += &format!(" --finest {finest}");
     }
-    if options.engine != EngineChoice::Auto {
-        text += &format!(" --engine {}", options.engine.key());
+    if args.engine != EngineChoice::Auto {
+        text += &format!(" --engine {}", args.engine.key());
     }
-    for set in &options.overrides {
+    for set in &args.scene.overrides {
         text += &format!(" --set {set}");
     }
     text

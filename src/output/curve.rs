@@ -133,6 +133,17 @@ struct Point {
     force: f64,
 }
 
+/// Value at `x` between the points of a curve with ascending abscissae; `None` outside.
+pub fn interpolated(curve: &[(f64, f64)], x: f64) -> Option<f64> {
+    let after = curve.partition_point(|p| p.0 < x);
+    let b = curve.get(after)?;
+    if b.0 == x {
+        return Some(b.1);
+    }
+    let a = curve[after.checked_sub(1)?];
+    Some(a.1 + (x - a.0) / (b.0 - a.0) * (b.1 - a.1))
+}
+
 /// Frames deeper than every frame before them.
 pub fn frames_on_the_way_in(records: &[FrameRecord]) -> impl Iterator<Item = &FrameRecord> {
     let mut deepest = f64::NEG_INFINITY;

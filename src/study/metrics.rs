@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::store::RunRecord;
+use crate::output::curve::interpolated;
 
 /// How far a run is from the reference; relative errors are fractions. `None` where one of the two does not hold the number.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -49,17 +50,6 @@ pub fn curve_error(curve: &[(f64, f64)], reference: &[(f64, f64)]) -> Option<f64
         scale += half * pair.iter().map(|(_, r, _)| r.powi(2)).sum::<f64>();
     }
     (scale > 0.0).then(|| (difference / scale).sqrt())
-}
-
-/// Value at `x` between the points of a curve with ascending abscissae; `None` outside.
-pub fn interpolated(curve: &[(f64, f64)], x: f64) -> Option<f64> {
-    let after = curve.partition_point(|p| p.0 < x);
-    let b = curve.get(after)?;
-    if b.0 == x {
-        return Some(b.1);
-    }
-    let a = curve[after.checked_sub(1)?];
-    Some(a.1 + (x - a.0) / (b.0 - a.0) * (b.1 - a.1))
 }
 
 /// Relative L2 norm of the difference of two fields at the same points; `None` for other points, none, or a field at rest.

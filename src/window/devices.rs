@@ -4,7 +4,6 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::ViewOptions;
 use super::gamepad::{Gamepad, PadNotice, PadPort};
 use super::hand::{Desk, InputDevice};
 #[cfg(feature = "link")]
@@ -16,6 +15,7 @@ use super::texts;
 #[cfg(not(feature = "link"))]
 use crate::Error;
 use crate::Result;
+use crate::commands::view::ViewArgs;
 use crate::haptic::{ForceLoop, ForceTable, LoopTiming};
 use crate::needle::motion::HandPose;
 
@@ -37,7 +37,7 @@ impl Devices {
     ///
     /// # Errors
     /// Those of the link's port and of the file of forces. Without gamepads one goes on with keys and mouse.
-    pub fn open(options: &ViewOptions, speed: f64) -> Result<Self> {
+    pub fn open(options: &ViewArgs, speed: f64) -> Result<Self> {
         let mut devices = Devices::default();
         devices.open_link(options)?;
         devices.open_pads(speed);
@@ -48,9 +48,9 @@ impl Devices {
     }
 
     #[cfg(feature = "link")]
-    fn open_link(&mut self, options: &ViewOptions) -> Result<()> {
-        if let Some(choice) = &options.link {
-            let link = Link::start(choice)?;
+    fn open_link(&mut self, options: &ViewArgs) -> Result<()> {
+        if options.link.on {
+            let link = Link::start(&options.link)?;
             println!("OpenIGTLink at {}", link.address());
             self.link = Some(link);
         }
@@ -58,10 +58,10 @@ impl Devices {
     }
 
     #[cfg(not(feature = "link"))]
-    fn open_link(&mut self, options: &ViewOptions) -> Result<()> {
-        match options.link {
-            None => Ok(()),
-            Some(_) => Err(Error::input(
+    fn open_link(&mut self, options: &ViewArgs) -> Result<()> {
+        match options.link.on {
+            false => Ok(()),
+            true => Err(Error::input(
                 "this stylet was built without OpenIGTLink",
                 "build it with the link: cargo run --release --features window,link -- view --link",
             )),

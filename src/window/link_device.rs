@@ -2,9 +2,9 @@
 
 use std::net::SocketAddr;
 
-use super::LinkChoice;
 use super::hand::InputDevice;
 use super::practice::{Practice, State};
+use crate::commands::view::LinkArgs;
 use crate::error::Result;
 use crate::link::{LinkOptions, LinkServer, LinkState, Pose, RunState, WantedPose, basis_along};
 use crate::needle::motion::HandPose;
@@ -110,7 +110,7 @@ pub struct Link {
 impl Link {
     /// # Errors
     /// As [`LinkServer::start`].
-    pub fn start(choice: &LinkChoice) -> Result<Self> {
+    pub fn start(choice: &LinkArgs) -> Result<Self> {
         let defaults = LinkOptions::default();
         let server = LinkServer::start(LinkOptions {
             address: choice.address.unwrap_or(defaults.address),

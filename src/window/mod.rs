@@ -38,56 +38,7 @@ pub mod tuning;
 pub mod ultrasound;
 pub mod watch;
 
-use std::net::IpAddr;
-use std::path::PathBuf;
-
 pub use app::view;
-
-/// How the needle is shown to other programs (feature `link`).
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct LinkChoice {
-    /// `None`: this machine only.
-    pub address: Option<IpAddr>,
-    /// `None`: the usual one; 0: a free one.
-    pub port: Option<u16>,
-    /// Whether they may lead it.
-    pub allow_control: bool,
-}
 
 /// Simulated time over wall time that may be aimed at: from slow motion to as fast as this machine can.
 pub const PACES: std::ops::RangeInclusive<f64> = 0.1..=10.0;
-
-/// What the command line asks for.
-#[derive(Debug, Clone)]
-pub struct ViewOptions {
-    pub scene: PathBuf,
-    pub overrides: Vec<String>,
-    /// The motion of the scene leads, from the start on.
-    pub script: bool,
-    /// A recorded session leads.
-    pub session: Option<PathBuf>,
-    /// Folder of the tables and the session.
-    pub out: Option<PathBuf>,
-    pub force: bool,
-    /// The ultrasound slice is shown from the start on.
-    pub ultrasound: bool,
-    /// Simulated time over wall time that is aimed at, one of [`PACES`].
-    pub pace: f64,
-    /// Close after so many pictures.
-    pub frames: Option<u64>,
-    /// Write the last picture to this file.
-    pub screenshot: Option<PathBuf>,
-    /// A run whose force curve lies behind the live one: its folder.
-    pub reference: Option<PathBuf>,
-    /// Whose attempts are kept, in which folder.
-    pub trainee: Option<String>,
-    pub history: PathBuf,
-    /// Size of the window in points.
-    pub size: Option<[u32; 2]>,
-    /// Folder whose shaders stand in for the built-in ones, and are read anew when they change.
-    pub shaders: Option<PathBuf>,
-    /// OpenIGTLink beside the window.
-    pub link: Option<LinkChoice>,
-    /// File of the forces at 1 kHz.
-    pub haptic_log: Option<PathBuf>,
-}

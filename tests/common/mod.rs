@@ -7,14 +7,14 @@ use std::sync::{Arc, OnceLock};
 use glam::{DMat3, DVec3};
 use serde_json::Value;
 use stylet::cpu::CpuEngine;
-use stylet::effects::{EffectSet, TissueMaterial};
+use stylet::effects::TissueMaterial;
 use stylet::engine::{Engine, FramePlan, FrameSums, State, StepInput};
 use stylet::gpu::{Gpu, GpuEngine};
 use stylet::material::ElasticLaw;
-use stylet::mesh::{BlockMesh, Tissue};
+use stylet::mesh::BlockMesh;
 use stylet::model::Model;
 use stylet::needle::{Motion, Phase, Tool};
-use stylet::scene::{Face, FaceCondition, FaceDrive, Outputs, Scene, SolverSettings};
+use stylet::scene::{Face, FaceCondition, FaceDrive, Scene, SolverSettings};
 
 /// Material A of the reference files.
 pub const MATERIAL_A: ElasticLaw = ElasticLaw::mooney_rivlin(2300.0, 1000.0, 5.0e5);

@@ -10,12 +10,11 @@ fn everything(law: ElasticLaw, deletion: bool) -> Material {
     // Short enough that the path deletes the cell.
     let failure_displacement = if deletion { 2.0e-4 } else { 1.5e-3 };
     Material {
-        law,
-        density: 1060.0,
         plasticity: Some(plasticity::Params { yield_stress: 3000.0, hardening: 9000.0 }),
         fibres: Some(fibres::Params { direction: DVec3::new(2.0, 1.0, -1.0).normalize(), k1: 6.0e3, k2: 0.5 }),
         viscoelastic: Some(viscoelastic::Params::default()),
         damage: Some(damage::Params { onset: 0.1, failure_displacement, largest: 0.95, deletion }),
+        ..Material::elastic(law, 1060.0)
     }
 }
 

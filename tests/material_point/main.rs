@@ -23,7 +23,7 @@ const LATERAL: [usize; 2] = [1, 2];
 
 /// A material without effects.
 fn elastic(law: ElasticLaw) -> Material {
-    Material { law, density: 1060.0, plasticity: None, fibres: None, viscoelastic: None, damage: None }
+    Material::elastic(law, 1060.0)
 }
 
 /// H of a stretch along x; the lateral stretches are found.

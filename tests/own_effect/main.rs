@@ -75,7 +75,7 @@ fn a_block_that_cannot_grow_presses_and_holds_the_energy() {
         let theta = 0.2 * record.time;
         let volume = SIDE.powi(3);
         // J = 1: the pressure is K theta, the energy K/2 theta^2 per volume.
-    // The account belongs to the middle of the last step, half a step later than the memory: one part in the 1320 steps.
+        // The account belongs to the middle of the last step, half a step later than the memory: one part in the 1320 steps.
         close(&format!("{engine:?}: supplied"), record.energy.own[0], 0.5 * BULK * theta * theta * volume, 2e-3);
         close(&format!("{engine:?}: stored"), record.energy.elastic, 0.5 * BULK * theta * theta * volume, 1e-3);
         let reaction = record.reactions[stylet::scene::Face::ZMax as usize];

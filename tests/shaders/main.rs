@@ -1,5 +1,8 @@
 //! Every combination of effects composes and validates; layouts, bindings and budget. No adapter needed.
 
+#[path = "../own_effect/swelling.rs"]
+mod swelling;
+
 mod second_compiler;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,7 +12,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use stylet::effects::{EFFECTS, EffectSet, Kind, mass_scaling};
 use stylet::engine::Stage;
-use stylet::gpu::compose::{SCENE_DEFINES, SOURCES, compose, compose_without_effects};
+use stylet::gpu::compose::{Defines, SCENE_DEFINES, SOURCES, compose, compose_without_effects};
 use stylet::gpu::kernel::{BindingKind, Reflected, reflect};
 use stylet::gpu::plan::{Features, defines, stages};
 use stylet::gpu::structs::layouts;
@@ -79,6 +82,7 @@ fn effect_set(wanted: impl Fn(&str) -> bool) -> EffectSet {
         indentation: wanted("indentation").then(Default::default),
         friction: wanted("friction").then(Default::default),
         flexible_needle: wanted("flexible_needle").then(Default::default),
+        own: Vec::new(),
     };
     let expected: Vec<&str> = EFFECTS.iter().map(|e| e.key).filter(|key| wanted(key)).collect();
     assert_eq!(set.keys(), expected, "order of the effect table");
@@ -101,7 +105,7 @@ fn reflected(set: &EffectSet, features: &Features) -> Vec<Reflected> {
 }
 
 /// What a stage is called here, the stage, and what is defined for it.
-type Variant = (String, Stage, BTreeSet<&'static str>);
+type Variant = (String, Stage, Defines);
 
 /// Every stage of every set in every kind of scene; of those that compose to the same text only the first.
 fn variants() -> &'static [Variant] {
@@ -111,11 +115,18 @@ fn variants() -> &'static [Variant] {
         let (none, every) = (effect_set(|_| false), effect_set(|_| true));
         let of_laws = scenes_of_laws().into_iter().flat_map(|f| [(none.clone(), f.clone()), (every.clone(), f)]);
         let of_effects = all_sets().into_iter().flat_map(|set| scenes().into_iter().map(move |f| (set.clone(), f)));
+        // Beside none and all of them an effect that a program brings along.
+        let with_own = |set: EffectSet| EffectSet { own: vec![swelling::SWELLING.chosen()], ..set };
+        let of_own = scenes()
+            .into_iter()
+            .flat_map(|f| [none.clone(), every.clone()].map(|set| (with_own(set), f.clone())))
+            .collect::<Vec<_>>();
         let mut texts = Vec::new();
-        for (set, features) in of_effects.chain(of_laws) {
+        for (set, features) in of_effects.chain(of_laws).chain(of_own) {
             let defines = defines(&set, &features);
             for stage in stages(&set, &features) {
-                let what = format!("{} with {defines:?}", stage.name());
+                let own: Vec<&str> = defines.own.iter().map(|own| own.effect.key).collect();
+                let what = format!("{} with {:?} and {own:?}", stage.name(), defines.names);
                 let composed = compose(&format!("stages/{}", stage.name()), &defines);
                 let composed = composed.unwrap_or_else(|e| panic!("{what}: {e}"));
                 if seen.insert(composed.source) {
@@ -238,7 +249,7 @@ type ShaderStruct = (u32, Vec<(String, u32)>);
 fn shader_structs() -> BTreeMap<String, ShaderStruct> {
     let mut found: BTreeMap<String, ShaderStruct> = BTreeMap::new();
     let block = Features { regions: true, ..scene(true, true) };
-    let every = effect_set(|_| true);
+    let every = EffectSet { own: vec![swelling::SWELLING.chosen()], ..effect_set(|_| true) };
     let free = Features { free_path: true, ..block.clone() };
     let bore = Features { bore: true, ..block.clone() };
     let slit = Features { slit: true, ..block.clone() };
@@ -505,7 +516,7 @@ fn a_broken_stage_names_file_and_line() {
         assert_eq!(text.lines().nth(number.parse::<usize>().unwrap() - 1).unwrap(), line, "{place}");
     }
     // A define without the others that belong to it: `driven_faces` then names a step input that nobody imported.
-    let error = reflect(Stage::IntegrateNodes, &BTreeSet::from(["DRIVEN_FACES"]), false).err().unwrap().to_string();
+    let error = reflect(Stage::IntegrateNodes, &Defines::from(["DRIVEN_FACES"]), false).err().unwrap().to_string();
     assert!(error.contains("shaders/shared/driven_faces.wgsl:"), "{error}");
     let line: usize = error.split("driven_faces.wgsl:").nth(1).unwrap().split('\n').next().unwrap().parse().unwrap();
     let text = SOURCES.iter().find(|s| s.0 == "shared/driven_faces").unwrap().1;

@@ -1,6 +1,7 @@
 //! Reports: finished runs beside the numbers of a publication, as one page.
 
 pub mod lv2022;
+mod words;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
