@@ -36,6 +36,7 @@ pub mod solver;
 pub mod stability;
 pub mod study;
 pub mod training;
+pub mod units;
 pub mod untrusted;
 pub mod verdict;
 #[cfg(feature = "window")]

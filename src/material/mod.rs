@@ -32,6 +32,8 @@ pub use neo_hookean::NeoHookean;
 pub use ogden::Ogden;
 pub use yeoh::Yeoh;
 
+pub use crate::units::four_digits;
+
 use glam::{DMat3, DVec3};
 use kinematics::{
     J_CONTINUATION, cofactor, double_dot, invariants, is_measure_continued, isochoric_measure, jacobian_minus_one,
@@ -397,11 +399,6 @@ fn stable_range(slopes: &dyn Fn(f64) -> Slopes) -> Verdict {
     let mut stretches = (1..).map(|i| 1.0 + f64::from(i) * STEP).take_while(|l| *l < LARGEST_STRETCH);
     let limit = stretches.find(|l| !(0..=STATES).all(|state| elliptic(*l, state)));
     limit.map_or(Verdict::Stable, Verdict::StableBelow)
-}
-
-/// A number for a message: four significant digits, no trailing zeros.
-pub fn four_digits(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 /// The constants of a law with names and units.

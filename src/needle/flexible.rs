@@ -219,7 +219,7 @@ impl FlexibleNeedle {
         // expected and what the tissue did in the end differ by the error of the coupling, which stays in the balance.
         sums.tool_work += self.taken.gained + self.taken.damped - self.taken.relative_work - on_tissue;
         self.energy += self.taken.gained + self.taken.damped;
-        sums.needle_energy = self.energy;
+        sums.energy.needle = self.energy;
         let record = self.record();
         let Some((time, length)) = next else { return record };
         let mut loads = self.beam.loads();

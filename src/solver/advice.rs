@@ -182,7 +182,7 @@ mod tests {
         let told = |force: f64, nu: f64| {
             let text = MAIN.replace("0.47", &nu.to_string());
             let scene = scene(&format!("{text}[puncture]\npuncture_force_n = {force}\ncutting_force_n = 0.1\n"));
-            let model = Model::new(scene).unwrap();
+            let model = Model::new(scene.clone(), Mesh::of_scene(&scene));
             advice(&model).into_iter().find(|a| a.contains("section of the needle"))
         };
         // 16G: 2.138 mm2; 30 kPa times that is 64 mN.
@@ -201,7 +201,7 @@ mod tests {
         let (jump, moved, other) = edge_jump(&held).unwrap();
         assert!((jump - 0.8e-3).abs() < 1e-9);
         assert_eq!((moved, other), (Face::ZMax, Face::XMin));
-        let told = advice(&Model::new(held).unwrap());
+        let told = advice(&Model::new(held.clone(), Mesh::of_scene(&held)));
         assert!(told.iter().any(|t| t.contains("z_max moves by 0.800 mm (0.8 cells) against x_min")), "{told:?}");
         for side in ["free", "roller"] {
             assert_eq!(edge_jump(&scene(&text.replace("SIDE", side))), None, "{side}");

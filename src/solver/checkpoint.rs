@@ -10,7 +10,7 @@ use super::engine::State;
 use super::stiffening::DueStep;
 use crate::error::Error;
 use crate::needle::flexible::NeedleImage;
-use crate::observables::Recorder;
+use crate::observables::{FrameEnergies, Recorder};
 use crate::verdict::Judge;
 
 /// What an engine holds between two frames.
@@ -18,8 +18,8 @@ use crate::verdict::Judge;
 pub enum EngineImage {
     /// Every device buffer that a shader writes and that later steps read, by name; work of gravity since t = 0 [J].
     Gpu { buffers: Vec<(String, Vec<u8>)>, gravity_work: f64 },
-    /// The state, and the plastic and damage dissipation that earlier frames have told [J].
-    Cpu { state: Box<State>, booked: (f64, f64) },
+    /// The state, and what its points have dissipated and earlier frames have told.
+    Cpu { state: Box<State>, booked: FrameEnergies },
 }
 
 /// What a simulation holds between two frames.

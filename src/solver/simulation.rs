@@ -539,7 +539,7 @@ impl Simulation {
         let end = |frame: u64| clock.time_of(clock.first_step(frame + 1).min(last));
         let next = (self.collected < self.frames)
             .then(|| (end(self.collected), end(self.collected) - clock.time_of(clock.first_step(self.collected))));
-        let broken = sums.not_finite || !sums.needle_loads.iter().all(|l| l.is_finite());
+        let broken = sums.health.not_finite || !sums.needle_loads.iter().all(|l| l.is_finite());
         match (&mut self.needle, &self.kinematics) {
             // Loads of a broken state mean nothing; the run stops right after.
             (Some(needle), Some(tool)) if !broken => needle.answer(tool, sums, f64::from(sums.steps) * dt, next),

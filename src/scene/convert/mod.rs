@@ -26,9 +26,10 @@ use super::*;
 use crate::material::four_digits;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::reading::{self, Unread};
+use crate::units;
 
-const MM: f64 = 1e-3;
-const KPA: f64 = 1e3;
+const MM: f64 = units::MILLIMETRE.si;
+const KPA: f64 = units::KILOPASCAL.si;
 
 /// Distance that the path keeps from the sides and the bottom of the block [m].
 const PATH_MARGIN: f64 = 1.0e-3;
