@@ -11,13 +11,14 @@ use serde_json::Value;
 use crate::effects::parameter::Parameter;
 use crate::effects::{EFFECTS, Effect};
 use crate::engine::Stage;
-use crate::material::{LAWS, Law, four_digits};
+use crate::material::{LAWS, Law};
 use crate::observables::ForceParts;
+use crate::observables::quantity::{self, CORE, ENERGY, FORCE, Quantity};
 use crate::output::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, SAMPLE_TABLE, TARGET_TABLE};
-use crate::output::sample::SAMPLE_COLUMNS;
-use crate::output::tables::{CORE_COLUMNS, energy_columns, force_columns};
-use crate::output::target::TARGET_COLUMNS;
+use crate::output::sample::SAMPLE;
+use crate::output::target::TARGETS;
 use crate::scene::file::SceneFile;
+use crate::units::four_digits;
 use crate::verdict::{BOUNDS, Bound};
 use crate::{Error, Result};
 
@@ -51,6 +52,9 @@ pub fn parts(root: &Path) -> Result<Vec<Part>> {
         Part::new("files.md", "columns", columns()),
         Part::new("laws.md", "laws", law_table()),
     ];
+    for (file, rows) in run_tables() {
+        parts.push(Part::new("files.md", file, meanings(rows)));
+    }
     for effect in &EFFECTS {
         let page = format!("effects/{}.md", effect.key);
         parts.push(Part::new(&page, "head", head(effect)));
@@ -206,16 +210,29 @@ fn stage_tables() -> String {
     text
 }
 
+/// The tables of a run: name, and what stands in its columns.
+fn run_tables() -> [(&'static str, Vec<[String; 4]>); 5] {
+    [
+        (FORCE_TABLE, described(&FORCE)),
+        (ENERGY_TABLE, described(&ENERGY)),
+        (SAMPLE_TABLE, described(&SAMPLE)),
+        (TARGET_TABLE, described(&TARGETS)),
+        (CORE_TABLE, described(&CORE)),
+    ]
+}
+
+/// Column, unit, meaning and how the frames become a run, of every entry.
+fn described<T>(table: &[Quantity<T>]) -> Vec<[String; 4]> {
+    let row = |q: &Quantity<T>| [q.column.into(), q.unit.word().into(), q.meaning.into(), q.fold.word().into()];
+    table.iter().map(row).collect()
+}
+
 fn columns() -> String {
-    let list = |columns: &[&str]| columns.iter().map(|column| code(column)).collect::<Vec<_>>().join(", ");
-    let tables = [
-        (FORCE_TABLE, list(&force_columns())),
-        (ENERGY_TABLE, list(&energy_columns())),
-        (SAMPLE_TABLE, list(&SAMPLE_COLUMNS)),
-        (TARGET_TABLE, list(&TARGET_COLUMNS)),
-        (CORE_TABLE, list(&CORE_COLUMNS)),
-    ];
-    let mut text = table(["file", "columns, in this order"], tables.map(|(file, columns)| [code(file), columns]));
+    let list = |(file, rows): (&str, Vec<[String; 4]>)| {
+        let names: Vec<String> = rows.iter().map(|[column, ..]| code(column)).collect();
+        [code(file), names.join(", ")]
+    };
+    let mut text = table(["file", "columns, in this order"], run_tables().map(list));
     text += "\nParts of the axial force, from the bottom of the stack in `force_parts.svg` to its top:\n\n";
     text + &table(
         ["part", "column of `force.csv`"],
@@ -223,14 +240,16 @@ fn columns() -> String {
     )
 }
 
+/// What the columns of one table mean.
+fn meanings(rows: Vec<[String; 4]>) -> String {
+    let row = |[column, unit, meaning, fold]: [String; 4]| [code(&column), unit, meaning, fold];
+    table(["column", "unit", "meaning", "of a run"], rows.into_iter().map(row))
+}
+
 /// Names of all columns of the tables of a run.
 pub fn all_columns() -> Vec<&'static str> {
-    let mut all = force_columns();
-    all.extend(energy_columns());
-    all.extend(SAMPLE_COLUMNS);
-    all.extend(TARGET_COLUMNS);
-    all.extend(CORE_COLUMNS);
-    all
+    let frames = [&FORCE, &ENERGY, &CORE].into_iter().flat_map(|table| quantity::columns(table));
+    frames.chain(quantity::columns(&SAMPLE)).chain(quantity::columns(&TARGETS)).collect()
 }
 
 /// Every table of a scene file with its keys, from the schema that `stylet schema` prints.

@@ -40,6 +40,7 @@ pub mod simulation;
 pub mod stability;
 pub mod study;
 pub mod training;
+pub mod units;
 pub mod untrusted;
 pub mod verdict;
 pub mod whole_file;

@@ -186,7 +186,7 @@ impl Bound {
     /// A value of this quantity in words.
     pub fn show(&self, value: f64) -> String {
         match self.percent {
-            true => format!("{} %", crate::material::four_digits(100.0 * value)),
+            true => format!("{} %", crate::units::four_digits(100.0 * value)),
             false => format!("{value}"),
         }
     }
@@ -252,10 +252,10 @@ pub fn explain() -> String {
         let stop = match bound.stop {
             Some((0.0, _)) => "stops at once".to_string(),
             Some((value, 1)) => {
-                format!("stops beyond {}", crate::material::four_digits(100.0 * value).to_string() + " %")
+                format!("stops beyond {}", crate::units::four_digits(100.0 * value).to_string() + " %")
             }
             Some((value, frames)) => {
-                format!("stops beyond {} % in {frames} frames on end", crate::material::four_digits(100.0 * value))
+                format!("stops beyond {} % in {frames} frames on end", crate::units::four_digits(100.0 * value))
             }
             None => "never stops".into(),
         };

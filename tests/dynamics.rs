@@ -176,14 +176,21 @@ fn compressed_cube(hourglass: (f64, f64)) -> Vec<(&'static str, f64)> {
         for _ in 0..frames {
             sums = advance(engine.as_mut(), &model, dt, &mut step, steps);
             work += sums.load_work;
-            damped += sums.damping_dissipation;
+            damped += sums.energy.damping;
         }
-        assert!(sums.kinetic < 1e-5 * sums.elastic, "{name}: not at rest");
+        assert!(sums.energy.kinetic < 1e-5 * sums.energy.elastic, "{name}: not at rest");
         // The linear hourglass law folds the eight corner cells, the quartic one must not.
-        println!("{name}: {} folded cells, smallest corner J {:.3}", sums.inverted_cells, sums.min_corner_j);
-        assert!(hourglass.1 == 0.0 || sums.inverted_cells == 0, "{name}");
-        at_most(&format!("{name}, energy gap"), ((work - damped - sums.elastic - sums.hourglass) / work).abs(), 0.01);
-        println!("{name}: hourglass energy {:.2} % of elastic", 100.0 * sums.hourglass / sums.elastic);
+        println!(
+            "{name}: {} folded cells, smallest corner J {:.3}",
+            sums.health.inverted_cells, sums.health.min_corner_j
+        );
+        assert!(hourglass.1 == 0.0 || sums.health.inverted_cells == 0, "{name}");
+        at_most(
+            &format!("{name}, energy gap"),
+            ((work - damped - sums.energy.elastic - sums.energy.hourglass) / work).abs(),
+            0.01,
+        );
+        println!("{name}: hourglass energy {:.2} % of elastic", 100.0 * sums.energy.hourglass / sums.energy.elastic);
         let forces = engine.internal_forces().unwrap();
         let top = model.mesh.block().nodes()[2] - 1;
         let on_top = forces.iter().enumerate().filter(|(n, _)| model.mesh.block().node_coordinates(*n)[2] == top);
@@ -216,7 +223,7 @@ fn window(engine: &mut dyn Engine, model: &Model, dt: f64, step: &mut u64, frame
     let mut total = 0.0;
     for _ in 0..frames {
         let here = advance(engine, model, dt, step, steps);
-        total += here.elastic + here.hourglass + here.kinetic + here.half_step;
+        total += here.energy.elastic + here.energy.hourglass + here.energy.kinetic + here.energy.half_step;
     }
     total / frames as f64
 }
@@ -330,7 +337,7 @@ fn a_twisted_cube_is_the_same_on_both_engines() {
             .filter(|(n, _)| model.mesh.block().node_coordinates(*n)[2] == top)
             .map(|(n, f)| (model.mesh.rest_position(n) + state.displacement[n]).cross(*f).z)
             .sum();
-        println!("{name}: torque {torque:.6e} N m, work {work:.6e} J, elastic {:.6e} J", sums.elastic);
+        println!("{name}: torque {torque:.6e} N m, work {work:.6e} J, elastic {:.6e} J", sums.energy.elastic);
         assert!(torque > 0.0 && work > 0.0, "{name}");
         // The forces of the last step belong to the displacements before it.
         close(&format!("{name}, moment of the top over the sum of its nodes"), sums.face_moments[5], torque, 2e-3);
@@ -359,10 +366,10 @@ fn the_limit_from_power_iteration_divides_stable_from_unstable() {
             engine.write_state(&state).unwrap();
             let start = advance(engine.as_mut(), &model, dt, &mut 0, 1);
             let end = advance(engine.as_mut(), &model, dt, &mut 1, 3000);
-            let growth = (end.elastic + end.kinetic) / (start.elastic + start.kinetic);
-            println!("{name}, {factor} of the limit: energy times {growth:.2e}, {} clamped", end.clamped_nodes);
+            let growth = (end.energy.elastic + end.energy.kinetic) / (start.energy.elastic + start.energy.kinetic);
+            println!("{name}, {factor} of the limit: energy times {growth:.2e}, {} clamped", end.health.clamped_nodes);
             // At 0.95 of the limit the leapfrog conserves an energy that is within 1 / (1 - 0.95^2) of this one.
-            assert_eq!(growth < 20.0 && end.clamped_nodes == 0, bounded, "{name}, {factor}");
+            assert_eq!(growth < 20.0 && end.health.clamped_nodes == 0, bounded, "{name}, {factor}");
         }
     }
 }

@@ -10,12 +10,12 @@ use stylet::effects::{EffectSet, TissueMaterial};
 use stylet::material::ElasticLaw;
 use stylet::mesh::{BlockMesh, Mesh, Tissue};
 use stylet::needle::{Motion, NeedleShape, Phase, Tool};
+use stylet::observables::quantity::{ENERGY, FORCE, columns};
 use stylet::observables::{EnergyAccount, FieldSnapshot, ForceParts, FrameRecord, Health};
 use stylet::output::folder::{
     ENERGY_TABLE, FORCE_CHART, FORCE_PARTS_CHART, FORCE_TABLE, SAMPLE_CHART, SAMPLE_TABLE, SUMMARY,
 };
-use stylet::output::sample::{Motion as FaceMotion, SAMPLE_COLUMNS};
-use stylet::output::tables::{energy_columns, force_columns};
+use stylet::output::sample::{Motion as FaceMotion, SAMPLE};
 use stylet::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Status, Summary, Tables, write_force_chart,
     write_parts_chart, write_sample_chart,
@@ -322,9 +322,9 @@ fn tables_grow_row_by_row_and_survive_without_being_closed() {
         assert!(text.ends_with('\n'));
     }
     std::mem::forget(tables);
-    for (name, columns) in [(FORCE_TABLE, &force_columns()[..]), (ENERGY_TABLE, &energy_columns()[..])] {
+    for (name, columns) in [(FORCE_TABLE, columns(&FORCE)), (ENERGY_TABLE, columns(&ENERGY))] {
         let mut reader = csv::Reader::from_path(folder.file(name)).unwrap();
-        assert_eq!(reader.headers().unwrap(), columns);
+        assert_eq!(reader.headers().unwrap(), columns.as_slice());
         let rows: Vec<Vec<f64>> =
             reader.records().map(|row| row.unwrap().iter().map(|f| f.parse().unwrap()).collect()).collect();
         assert_eq!(rows.len(), 5);
@@ -601,7 +601,7 @@ fn parts_of_the_force_add_up_in_tables_and_charts() {
         assert!((sum - record.force.axial).abs() < 1e-12);
     }
     for part in ForceParts::PARTS {
-        assert!(force_columns().contains(&part.column), "{}", part.column);
+        assert!(columns(&FORCE).contains(&part.column), "{}", part.column);
     }
     let mut broken = all.clone();
     broken[50].force.friction = f64::NAN;
@@ -661,7 +661,7 @@ fn a_sample_is_written_per_driven_face() {
         assert_eq!((text.lines().count(), text.ends_with('\n')), (rows + 2, true));
     }
     let mut reader = csv::Reader::from_path(folder.file(SAMPLE_TABLE)).unwrap();
-    assert_eq!(reader.headers().unwrap(), &SAMPLE_COLUMNS[..]);
+    assert_eq!(reader.headers().unwrap(), columns(&SAMPLE).as_slice());
     let row = reader.records().nth(45).unwrap().unwrap();
     assert_eq!(
         row.iter().collect::<Vec<_>>(),

@@ -12,10 +12,11 @@ use glam::{DMat3, DVec3};
 use stylet::commands::run::{RunOptions, RunOutcome, describe, run};
 use stylet::mesh::{BlockMesh, Mesh, TissuePoint};
 use stylet::model::Model;
+use stylet::observables::quantity::columns;
 use stylet::observables::{FrameRecord, TargetRecord};
 use stylet::output::TargetFigures;
 use stylet::output::folder::{SUMMARY, TARGET_TABLE};
-use stylet::output::target::TARGET_COLUMNS;
+use stylet::output::target;
 use stylet::scene::{Scene, Target};
 use stylet::simulation::{EngineChoice, Simulation};
 
@@ -282,7 +283,7 @@ fn a_run_writes_its_targets_and_only_where_there_are_any() {
     let outcome = run_into(short("target.toml", &with_picture), choice, &base.path().join("a"));
     let table = read("a", TARGET_TABLE);
     let mut reader = csv::Reader::from_reader(table.as_bytes());
-    assert_eq!(reader.headers().unwrap(), &TARGET_COLUMNS[..]);
+    assert_eq!(reader.headers().unwrap(), columns(&target::TARGETS).as_slice());
     let rows: Vec<csv::StringRecord> = reader.records().map(|r| r.unwrap()).collect();
     let frames = read("a", "force.csv").lines().count() - 1;
     assert_eq!(rows.len(), 2 * frames);

@@ -14,7 +14,8 @@ use crate::study::plan::UnitCost;
 use crate::study::runner::{measure_engine, predicted_factor};
 use crate::study::store::Store;
 use crate::study::subject::Subject;
-use crate::study::{MeshSize, Settings, digits, trimmed};
+use crate::study::{MeshSize, Settings};
+use crate::units::{rounded, three_decimals, trimmed};
 
 /// Wall time of the measurement of one mesh [s].
 const MEASURED_S: f64 = 0.4;
@@ -147,9 +148,9 @@ pub fn advise(options: &AdviseOptions) -> Result<String> {
                     Some(e) if p.same_mesh => format!(
                         "{} % of the force over depth by mass scaling and step; that of the mesh is not known, it is the \
                          reference's own",
-                        digits(100.0 * e)
+                        three_decimals(100.0 * e)
                     ),
-                    Some(e) => format!("{} % of the force over depth", digits(100.0 * e)),
+                    Some(e) => format!("{} % of the force over depth", three_decimals(100.0 * e)),
                 },
             );
             line(
@@ -233,7 +234,7 @@ fn by_rule(subject: &Subject, cost: &UnitCost, rate: f64) -> std::result::Result
     let mut fastest: f64 = 0.0;
     let edges: &[f64] = if subject.has_block() { &EDGES } else { &[1.0] };
     for edge in edges {
-        settings.cell_size_mm = trimmed_to(edge * subject.base.cell_size_mm, 3);
+        settings.cell_size_mm = rounded(edge * subject.base.cell_size_mm, 3);
         let Ok(size) = subject.mesh_size(settings.cell_size_mm) else { continue };
         let factor = predicted_factor(size, &settings, cost, rate);
         fastest = fastest.max(factor);
@@ -245,11 +246,6 @@ fn by_rule(subject: &Subject, cost: &UnitCost, rate: f64) -> std::result::Result
         "none: even the coarsest mesh tried is predicted at {}; take a faster adapter or a lower rate",
         speed(fastest)
     ))
-}
-
-fn trimmed_to(value: f64, decimals: i32) -> f64 {
-    let scale = 10f64.powi(decimals);
-    (value * scale).round() / scale
 }
 
 fn sets(overrides: &[String]) -> String {

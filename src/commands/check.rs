@@ -6,12 +6,13 @@ use std::time::Instant;
 use crate::effects::{EffectSet, TissueMaterial, damage, fibres, plasticity, viscoelastic};
 use crate::engine::stable_dt::power_iteration;
 use crate::error::{Result, brief};
-use crate::material::{describe_constants, describe_verdict, four_digits};
+use crate::material::{describe_constants, describe_verdict};
 use crate::mesh::Mesh;
 use crate::needle::{TipShape, Tool};
 use crate::scene::{Face, FaceDrive, RegionShape, Scene};
 use crate::simulation::advice::tool_mach;
 use crate::simulation::{EngineChoice, Simulation};
+use crate::units::four_digits;
 
 /// Wall time that the trial of the prediction may take [s].
 const TRIAL: f64 = 0.5;

@@ -19,6 +19,7 @@ use crate::output::fit_chart::fit_chart;
 use crate::output::folder::probe;
 use crate::reading;
 use crate::scene::presets::bulk_modulus_from_poisson;
+use crate::units::{digits, significant};
 use crate::whole_file;
 
 /// Names of the files in the folder `--out`.
@@ -808,17 +809,9 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
 }
 
-/// A number for a person: this many significant digits, no trailing zeros.
-fn digits(value: f64, count: usize) -> String {
-    // Adding zero turns -0 into 0.
-    let rounded = format!("{value:.*e}", count - 1).parse().unwrap_or(value) + 0.0;
-    if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) { format!("{rounded:e}") } else { rounded.to_string() }
-}
-
 /// A number for a file: six significant digits, always read back as a floating-point number.
 fn number(value: f64) -> String {
-    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
-    format!("{rounded:?}")
+    format!("{:?}", significant(value, 6))
 }
 
 fn counted(count: usize, what: &str) -> String {

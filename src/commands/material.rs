@@ -13,12 +13,13 @@ use crate::effects::viscoelastic::{LARGEST_TERM_COUNT, Term};
 use crate::effects::{damage, fibres, plasticity, viscoelastic};
 use crate::error::{Error, Result};
 use crate::material::law::{Constant, constants, owners};
-use crate::material::{Continuation, ElasticLaw, LAWS, LawWord, Mode, Verdict, describe_verdict, four_digits};
+use crate::material::{Continuation, ElasticLaw, LAWS, LawWord, Mode, Verdict, describe_verdict};
 use crate::material_point::Material;
 use crate::material_test::{self, Leg, Protocol, Row};
 use crate::output::material_chart::material_chart;
 use crate::scene::document::closest;
 use crate::scene::{Scene, presets};
+use crate::units::four_digits;
 use crate::whole_file;
 
 const KPA: f64 = 1e3;

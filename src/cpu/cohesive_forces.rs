@@ -44,7 +44,7 @@ impl CpuEngine {
             let closed = normal_opening < 0.0;
             // A closed face keeps its normal stiffness, so that damage takes from its shear only.
             let taken = opening.dot(before) - if closed { normal_opening * before.dot(n) } else { 0.0 };
-            self.sums.cohesive_dissipation += 0.5 * k * (*damage - old) * taken;
+            self.sums.energy.cohesive += 0.5 * k * (*damage - old) * taken;
             let touches =
                 closed && (*damage < 1.0 || (-normal_opening < TORN_REACH * h && shear.length() < TORN_REACH * h));
             let kept = 1.0 - *damage;
@@ -56,7 +56,7 @@ impl CpuEngine {
             self.added_bound[a] += 2.0 * k;
             self.added_bound[b] += 2.0 * k;
         }
-        self.sums.cohesive_energy = stored;
+        self.sums.energy.cohesive_stored = stored;
     }
 }
 

@@ -206,8 +206,8 @@ impl CpuEngine {
             let lost: f64 = pairs.map(|(b, a)| on * spring * a.0.max(0.0) * (b.0.max(0.0) - a.0.max(0.0))).sum();
             let force = after.anchors.iter().map(|a| on * spring * a.0.max(0.0)).sum();
             let beyond = lost * share_beyond(force, capped);
-            self.sums.cap_dissipation += beyond;
-            self.sums.tip_dissipation += lost - beyond + p.tip_stiffness * sway.dot(before.sway - sway);
+            self.sums.energy.advance_cap += beyond;
+            self.sums.energy.tip += lost - beyond + p.tip_stiffness * sway.dot(before.sway - sway);
         }
         self.tip_sway = sway * spring;
         self.tip_energy = 0.5 * p.tip_stiffness * sway.length_squared()

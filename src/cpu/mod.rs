@@ -15,8 +15,8 @@ use rayon::prelude::*;
 use crate::effects::adhesion::Bond;
 use crate::engine::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use crate::engine::{
-    ContactState, Engine, EngineImage, EngineInfo, FramePlan, FrameSums, State, StepInput, WATCHED_STEP_RATIO,
-    foreign_image,
+    ContactState, Engine, EngineImage, EngineInfo, FrameEnergies, FramePlan, FrameSums, State, StepInput,
+    WATCHED_STEP_RATIO, foreign_image,
 };
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
@@ -72,8 +72,8 @@ pub struct CpuEngine {
     /// Force across the needle on every anchor of a free tip [N].
     tip_sway: DVec3,
     contact_energy: f64,
-    /// Plastic and damage dissipation that earlier frames have told [J].
-    booked: (f64, f64),
+    /// What the points have dissipated and earlier frames have told.
+    booked: FrameEnergies,
     /// Centre-line of a flexible needle in the frame under way.
     centre_line: Option<CentreLine>,
     /// Impulse of that frame on each contact node [N s]; used with a centre-line only.
@@ -127,7 +127,7 @@ impl CpuEngine {
             tip_energy: 0.0,
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
-            booked: (0.0, 0.0),
+            booked: FrameEnergies::default(),
             centre_line: None,
             node_impulse: vec![DVec3::ZERO; model.contact_nodes.len()],
             finished: Default::default(),
@@ -211,7 +211,7 @@ impl CpuEngine {
                 u32::from(!met)
             })
             .sum();
-        self.sums.return_failures += failures;
+        self.sums.health.return_failures += failures;
     }
 
     /// Stage `integrate_nodes`: `v+ = ((1 - alpha dt/2) v + dt f/m) / (1 + alpha dt/2)`, `u+ = u + dt v+`.
@@ -305,22 +305,25 @@ impl CpuEngine {
         // In the order of the nodes: sums of threads that come as they come would differ in their last bits from run to run.
         let sums = &mut self.sums;
         for node in &nodes {
-            sums.damping_dissipation += node.damping;
+            sums.energy.damping += node.damping;
             sums.load_work += node.work;
-            sums.raised_mass_energy += node.raised_energy;
-            sums.speed_limit_energy += node.clamped_energy;
-            sums.clamped_nodes += node.clamped;
-            sums.raised_mass += node.raised;
+            sums.energy.raised_mass += node.raised_energy;
+            sums.energy.speed_limit += node.clamped_energy;
+            sums.health.clamped_nodes += node.clamped;
+            sums.health.raised_mass += node.raised;
             sums.step_ratio = sums.step_ratio.max(node.step_ratio);
         }
     }
 
-    /// Dissipated by plastic flow and by damage since t = 0 [J].
-    fn dissipated(&self) -> (f64, f64) {
-        self.state.points.iter().enumerate().fold((0.0, 0.0), |sum, (cell, p)| {
+    /// What the points keep as totals since t = 0.
+    fn dissipated(&self) -> FrameEnergies {
+        let mut total = FrameEnergies::default();
+        for (cell, p) in self.state.points.iter().enumerate() {
             let v = self.model.mesh.cell_volume(cell);
-            (sum.0 + v * p.plastic_dissipation, sum.1 + v * p.damage_dissipation)
-        })
+            total.plastic += v * p.plastic_dissipation;
+            total.damage += v * p.damage_dissipation;
+        }
+        total
     }
 
     /// Stages `measure_cells`, `measure_contact`, `measure_faces`, `measure_separation`: stored energies and health, between the forces of
@@ -335,25 +338,25 @@ impl CpuEngine {
             .collect();
         let dissipated = self.dissipated();
         let sums = &mut self.sums;
-        sums.elastic = measures.iter().map(|m| m.elastic).sum();
-        sums.hourglass = measures.iter().map(|m| m.hourglass).sum();
-        sums.viscous_dissipation = measures.iter().map(|m| m.viscous).sum();
+        sums.energy.elastic = measures.iter().map(|m| m.elastic).sum();
+        sums.energy.hourglass = measures.iter().map(|m| m.hourglass).sum();
+        sums.energy.viscous = measures.iter().map(|m| m.viscous).sum();
         // What deletion has taken out may be turned inside out.
         let is_severed = |cell: usize| state.stiffness.get(cell) == Some(&0.0);
         let present = || measures.iter().enumerate().filter(|(c, m)| m.damage < 1.0 && !is_severed(*c)).map(|(_, m)| m);
-        sums.deleted_cells = (measures.len() - present().count()) as u32;
-        sums.largest_damage = measures.iter().map(|m| m.damage).fold(0.0, f64::max);
-        sums.min_j = present().map(|m| m.jacobian).fold(f64::INFINITY, f64::min);
-        sums.min_corner_j = present().map(|m| m.corner_jacobian).fold(f64::INFINITY, f64::min);
+        sums.health.deleted_cells = (measures.len() - present().count()) as u32;
+        sums.health.largest_damage = measures.iter().map(|m| m.damage).fold(0.0, f64::max);
+        sums.health.min_j = present().map(|m| m.jacobian).fold(f64::INFINITY, f64::min);
+        sums.health.min_corner_j = present().map(|m| m.corner_jacobian).fold(f64::INFINITY, f64::min);
         let inverted = |m: &CellMeasure| m.damage < 1.0 && (m.jacobian <= 0.0 || m.corner_jacobian <= 0.0);
         let mut broken =
             measures.iter().enumerate().filter(|(c, m)| inverted(m) && !is_severed(*c)).map(|(c, _)| c as u32);
         let folded = |m: &CellMeasure| inverted(m) && m.jacobian > 0.0;
-        sums.folded_cells = measures.iter().enumerate().filter(|(c, m)| folded(m) && !is_severed(*c)).count() as u32;
-        sums.inverted_cell = broken.next();
-        sums.inverted_cells = u32::from(sums.inverted_cell.is_some()) + broken.count() as u32;
-        sums.plastic_dissipation = dissipated.0 - self.booked.0;
-        sums.damage_dissipation = dissipated.1 - self.booked.1;
+        sums.health.folded_cells =
+            measures.iter().enumerate().filter(|(c, m)| folded(m) && !is_severed(*c)).count() as u32;
+        sums.health.inverted_cell = broken.next();
+        sums.health.inverted_cells = u32::from(sums.health.inverted_cell.is_some()) + broken.count() as u32;
+        sums.energy += dissipated - self.booked;
         self.booked = dissipated;
         if model.has_driven_faces() {
             let forces = elements.nodal_forces(&model.mesh, &self.cells);
@@ -361,8 +364,8 @@ impl CpuEngine {
             sums.face_moments = face_moments(model, &forces, &self.state.displacement);
         }
         let torn = state.pairs.iter().zip(&model.separation.pairs).map(|(d, p)| d * p.area);
-        sums.torn_area = torn.sum();
-        sums.contact_energy = self.contact_energy;
+        sums.health.torn_area = torn.sum();
+        sums.energy.contact_stored = self.contact_energy;
         sums.tip_coordinate = state.tip_coordinate;
     }
 
@@ -374,11 +377,12 @@ impl CpuEngine {
         if sums.steps > 0 {
             let force = |node: usize| self.elements.gather(&model.mesh, &self.cells, node).0 + self.external[node];
             let power = state.velocity.iter().enumerate().map(|(node, v)| force(node).dot(*v)).sum::<f64>();
-            sums.half_step -= 0.5 * self.dt * power;
+            sums.energy.half_step -= 0.5 * self.dt * power;
         }
-        sums.kinetic = state.velocity.iter().zip(&model.node_mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
-        sums.max_speed = state.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
-        sums.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
+        sums.energy.kinetic =
+            state.velocity.iter().zip(&model.node_mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
+        sums.health.max_speed = state.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
+        sums.health.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
         sums.targets = model.targets.iter().map(|target| target.value(&state.displacement)).collect();
     }
 }
@@ -394,8 +398,8 @@ impl FrameSums {
         self.angular_impulse += c.torque * dt;
         self.tool_work += (total.dot(pose.velocity) + c.torque.dot(pose.angular_velocity)) * dt;
         self.last_tool_work += (total.dot(pose.velocity_ahead) + c.torque.dot(pose.angular_velocity_ahead)) * dt;
-        self.friction_dissipation += c.friction_work;
-        self.contact_dissipation += c.damping + c.released;
+        self.energy.friction += c.friction_work;
+        self.energy.contact_damping += c.damping + c.released;
     }
 }
 
@@ -461,7 +465,7 @@ impl Engine for CpuEngine {
             self.forces(input);
             if index + 1 == plan.steps.len() {
                 // What the tool does until the middle of the last step, with the speed that it has then, goes into the springs of contact.
-                self.sums.half_step = 0.5 * self.sums.last_tool_work;
+                self.sums.energy.half_step = 0.5 * self.sums.last_tool_work;
                 self.measure_stored();
                 if let Some(pose) = &input.pose {
                     self.share_needle_loads(pose);

@@ -91,8 +91,8 @@ impl CpuEngine {
             let lost: f64 = before.iter().zip(&anchors).map(|(b, p)| spring * p.gap * (b.gap - p.gap)).sum();
             let force = anchors.iter().map(|p| spring * p.gap).sum();
             let beyond = if advance == cap { puncture::share_beyond(force, threshold) } else { 0.0 };
-            self.sums.tip_dissipation += lost * (1.0 - beyond);
-            self.sums.cap_dissipation += lost * beyond;
+            self.sums.energy.tip += lost * (1.0 - beyond);
+            self.sums.energy.advance_cap += lost * beyond;
         }
         self.state.bond.gap = mean_distance(&anchors);
         let bond_energy = model.effects.adhesion.map_or(0.0, |p| 0.5 * p.stiffness * self.state.bond.stretch.powi(2));
@@ -121,7 +121,7 @@ impl CpuEngine {
         self.state.bond = Bond { stretch, slid, gap: old.gap };
         // Mean force of both steps times the slip; nothing slips where there was and is no bond.
         let slip = old.stretch + motion - stretch;
-        self.sums.adhesion_dissipation += 0.5 * p.stiffness * (old.stretch + stretch) * slip;
+        self.sums.energy.adhesion += 0.5 * p.stiffness * (old.stretch + stretch) * slip;
         p.stiffness * stretch
     }
 
@@ -159,7 +159,7 @@ impl CpuEngine {
         let intact = CellStates { points: &self.state.points, stiffness: &[] };
         let m = self.elements.measure_corners(&self.model, cell, &u, None, intact);
         // What Prony terms hold is booked with their work, which the softening does not touch.
-        self.sums.softening_dissipation += (old - factor) * (m.elastic - m.held + m.hourglass);
+        self.sums.energy.softening += (old - factor) * (m.elastic - m.held + m.hourglass);
         self.state.stiffness[cell] = factor;
     }
 }

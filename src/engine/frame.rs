@@ -1,7 +1,9 @@
 //! What passes between a run and its engine in a frame: the input of every step, and sums.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
+use super::energy::FrameEnergies;
 use crate::model::Model;
 use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
 use crate::needle::{Kinematics, ToolPose};
@@ -77,6 +79,34 @@ impl StepInput {
     }
 }
 
+/// Signs of trouble within one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Health {
+    /// Smallest J at cell centres, and at cell corners.
+    pub min_j: f64,
+    pub min_corner_j: f64,
+    /// Cells with J <= 0 at the centre or a corner.
+    pub inverted_cells: u32,
+    /// Of these the ones with J > 0 at the centre: only a corner is folded over, and the law is evaluated at the centre.
+    pub folded_cells: u32,
+    /// Index of one of them.
+    pub inverted_cell: Option<u32>,
+    /// Largest damage d; cells deleted so far; cell steps whose return mapping did not meet the yield condition.
+    pub largest_damage: f64,
+    pub deleted_cells: u32,
+    pub return_failures: u32,
+    /// Area of the cohesive faces that have parted: damage times area [m^2].
+    pub torn_area: f64,
+    /// Nodes whose speed was clamped, summed over the steps of the frame.
+    pub clamped_nodes: u32,
+    /// Largest nodal speed [m/s].
+    pub max_speed: f64,
+    /// Steps times nodes on which the selective mass was above the scaled mass.
+    pub raised_mass: u32,
+    /// True where a displacement or velocity is not a finite number in range.
+    pub not_finite: bool,
+}
+
 /// Sums over one frame as an engine delivers them. "Total" fields are values at the end of the frame, the others
 /// sums over the steps of the frame. SI.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -101,67 +131,21 @@ pub struct FrameSums {
     pub last_tool_work: f64,
     /// Impulse on the tissue, shared over the entries of the centre-line [N s]; zero without a flexible needle.
     pub needle_loads: [DVec3; ENTRY_COUNT],
-    /// Total: gained and damped by a flexible needle [J].
-    pub needle_energy: f64,
-    /// Dissipated by friction, by contact damping, by the tip law, by softening [J].
-    pub friction_dissipation: f64,
-    pub contact_dissipation: f64,
-    pub tip_dissipation: f64,
-    pub softening_dissipation: f64,
-    /// Dissipated by the tip law beyond the threshold, where the cap on the advance held the force above it [J].
-    pub cap_dissipation: f64,
-    /// Taken by nodes whose mass was raised, and by the speed limit [J].
-    pub raised_mass_energy: f64,
-    pub speed_limit_energy: f64,
+    /// Where the work went, and what is stored at the end.
+    pub energy: FrameEnergies,
     /// Largest `k dt^2 / (4 m)` of a node in a step, with the bound k of its stiffness and the mass m that it had; the step
     /// is unstable beyond 1. Zero where none was near it, see [`WATCHED_STEP_RATIO`].
     pub step_ratio: f64,
-    /// Dissipated by tissue that slips on the tip [J].
-    pub adhesion_dissipation: f64,
-    /// Dissipated by plastic flow and by damage [J].
-    pub plastic_dissipation: f64,
-    pub damage_dissipation: f64,
-    /// Total: dissipated by the Prony terms [J].
-    pub viscous_dissipation: f64,
-    /// Dissipated by cohesive faces [J]; total: stored in them [J].
-    pub cohesive_dissipation: f64,
-    pub cohesive_energy: f64,
-    /// Total: torn area, damage times area over all pairs [m^2].
-    pub torn_area: f64,
     /// What each face exerts on the tissue at the last step [N]; zero without driven faces.
     pub reactions: [DVec3; 6],
     /// Moment of the same about the axis along the normal of the face through the centre of the tissue at rest [N m].
     pub face_moments: [f64; 6],
-    /// Total: stored in contact, stick, tip and bond springs [J].
-    pub contact_energy: f64,
     /// Total: material coordinate a of the tip [m].
     pub tip_coordinate: f64,
-    /// Total: elastic and hourglass energy at the beginning of the last step [J], where its forces belong.
-    pub elastic: f64,
-    pub hourglass: f64,
-    /// Total: kinetic energy [J], of the velocities in the middle of the last step.
-    pub kinetic: f64,
-    /// Total: what stored energies gained from the beginning to the middle of the last step, `-dt/2 sum f v`, and half of the tool's work in it [J]; zero without a step.
-    pub half_step: f64,
-    /// Dissipated by mass damping [J].
-    pub damping_dissipation: f64,
     /// Work of driven faces, tractions and gravity [J].
     pub load_work: f64,
-    /// Health of the state at the end of the frame.
-    pub min_j: f64,
-    pub min_corner_j: f64,
-    pub inverted_cells: u32,
-    /// Of these the ones with J > 0 at the centre, where the law is evaluated.
-    pub folded_cells: u32,
-    pub inverted_cell: Option<u32>,
-    /// Largest d; cells that were deleted; cell steps whose return mapping did not meet the yield condition.
-    pub largest_damage: f64,
-    pub deleted_cells: u32,
-    pub return_failures: u32,
-    pub clamped_nodes: u32,
-    pub raised_mass: u32,
-    pub max_speed: f64,
-    pub not_finite: bool,
+    /// Of the state at the end of the frame.
+    pub health: Health,
     /// Total: displacement of every target [m].
     pub targets: Vec<DVec3>,
 }

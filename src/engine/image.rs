@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::energy::FrameEnergies;
 use super::state::State;
 use crate::error::Error;
 
@@ -10,8 +11,8 @@ use crate::error::Error;
 pub enum EngineImage {
     /// Every device buffer that a shader writes and that later steps read, by name; work of gravity since t = 0 [J].
     Gpu { buffers: Vec<(String, Vec<u8>)>, gravity_work: f64 },
-    /// The state, and the plastic and damage dissipation that earlier frames have told [J].
-    Cpu { state: Box<State>, booked: (f64, f64) },
+    /// The state, and what its points have dissipated and earlier frames have told.
+    Cpu { state: Box<State>, booked: FrameEnergies },
 }
 
 impl EngineImage {

@@ -6,6 +6,7 @@
 
 pub mod clock;
 pub mod elements;
+pub mod energy;
 pub mod frame;
 pub mod image;
 pub mod stable_dt;
@@ -16,7 +17,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use frame::{DriveStep, FramePlan, FrameSums, StepInput, WATCHED_STEP_RATIO};
+pub use energy::{EnergyAccount, EnergyPart, FrameEnergies};
+pub use frame::{DriveStep, FramePlan, FrameSums, Health, StepInput, WATCHED_STEP_RATIO};
 pub use image::{EngineImage, foreign_image};
 pub use stage::Stage;
 pub use state::{ContactState, State};

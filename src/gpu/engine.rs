@@ -19,7 +19,9 @@ use crate::effects::EffectSet;
 use crate::effects::adhesion::Bond;
 use crate::effects::cohesive::TORN_REACH;
 use crate::engine::elements::{HOURGLASS_MODULUS, PrismBase};
-use crate::engine::{ContactState, Engine, EngineImage, EngineInfo, FramePlan, FrameSums, Stage, State, foreign_image};
+use crate::engine::{
+    ContactState, Engine, EngineImage, EngineInfo, FramePlan, FrameSums, Health, Stage, State, foreign_image,
+};
 use crate::error::{Error, Result};
 use crate::material::law::Form;
 use crate::material::{LAWS, Law};
@@ -429,8 +431,7 @@ impl GpuEngine {
         let mut sums = FrameSums {
             frame: done.frame,
             steps: done.steps,
-            min_j: f64::INFINITY,
-            min_corner_j: f64::INFINITY,
+            health: Health { min_j: f64::INFINITY, min_corner_j: f64::INFINITY, ..Default::default() },
             ..Default::default()
         };
         let has_steps = if done.steps > 0 { 1.0 } else { 0.0 };
@@ -441,38 +442,38 @@ impl GpuEngine {
             match range.name {
                 "cell_sums" => {
                     for s in read_all::<CellSums>(bytes) {
-                        sums.elastic += f64::from(s.elastic);
-                        sums.hourglass += f64::from(s.hourglass);
-                        sums.min_j = sums.min_j.min(f64::from(s.min_jacobian));
-                        sums.min_corner_j = sums.min_corner_j.min(f64::from(s.min_corner_jacobian));
-                        sums.inverted_cells += s.inverted_cells;
-                        sums.folded_cells += s.folded_cells;
-                        sums.not_finite |= s.overstretched_cells > 0;
-                        sums.plastic_dissipation += f64::from(s.flow);
-                        sums.damage_dissipation += f64::from(s.degradation);
-                        sums.viscous_dissipation += f64::from(s.relaxation);
-                        sums.largest_damage = sums.largest_damage.max(1.0 - f64::from(s.least_intact));
-                        sums.deleted_cells += s.deleted_cells;
-                        sums.return_failures += s.failures as u32;
+                        sums.energy.elastic += f64::from(s.elastic);
+                        sums.energy.hourglass += f64::from(s.hourglass);
+                        sums.health.min_j = sums.health.min_j.min(f64::from(s.min_jacobian));
+                        sums.health.min_corner_j = sums.health.min_corner_j.min(f64::from(s.min_corner_jacobian));
+                        sums.health.inverted_cells += s.inverted_cells;
+                        sums.health.folded_cells += s.folded_cells;
+                        sums.health.not_finite |= s.overstretched_cells > 0;
+                        sums.energy.plastic += f64::from(s.flow);
+                        sums.energy.damage += f64::from(s.degradation);
+                        sums.energy.viscous += f64::from(s.relaxation);
+                        sums.health.largest_damage = sums.health.largest_damage.max(1.0 - f64::from(s.least_intact));
+                        sums.health.deleted_cells += s.deleted_cells;
+                        sums.health.return_failures += s.failures as u32;
                         if s.inverted_cells > 0 {
-                            sums.inverted_cell.get_or_insert(s.inverted_cell);
+                            sums.health.inverted_cell.get_or_insert(s.inverted_cell);
                         }
                     }
                 }
                 "node_sums" => {
                     for s in read_all::<NodeSums>(bytes) {
-                        sums.kinetic += f64::from(s.kinetic);
-                        sums.half_step += has_steps * f64::from(s.half_step);
-                        sums.damping_dissipation += f64::from(s.damping);
+                        sums.energy.kinetic += f64::from(s.kinetic);
+                        sums.energy.half_step += has_steps * f64::from(s.half_step);
+                        sums.energy.damping += f64::from(s.damping);
                         sums.load_work += f64::from(s.work);
                         weighted += DVec3::new(s.moment_x.into(), s.moment_y.into(), s.moment_z.into());
-                        sums.max_speed = sums.max_speed.max(f64::from(s.max_speed));
-                        sums.raised_mass += s.raised_mass;
-                        sums.clamped_nodes += s.clamped_nodes;
-                        sums.raised_mass_energy += f64::from(s.raised_energy);
-                        sums.speed_limit_energy += f64::from(s.clamped_energy);
+                        sums.health.max_speed = sums.health.max_speed.max(f64::from(s.max_speed));
+                        sums.health.raised_mass += s.raised_mass;
+                        sums.health.clamped_nodes += s.clamped_nodes;
+                        sums.energy.raised_mass += f64::from(s.raised_energy);
+                        sums.energy.speed_limit += f64::from(s.clamped_energy);
                         sums.step_ratio = sums.step_ratio.max(f64::from(s.step_ratio));
-                        sums.not_finite |= s.out_of_range > 0;
+                        sums.health.not_finite |= s.out_of_range > 0;
                     }
                 }
                 "face_sums" => {
@@ -490,9 +491,9 @@ impl GpuEngine {
                 }
                 "separation_sums" => {
                     for s in read_all::<SeparationSums>(bytes) {
-                        sums.cohesive_dissipation += f64::from(s.dissipation);
-                        sums.cohesive_energy += f64::from(s.stored);
-                        sums.torn_area += f64::from(s.torn_area);
+                        sums.energy.cohesive += f64::from(s.dissipation);
+                        sums.energy.cohesive_stored += f64::from(s.stored);
+                        sums.health.torn_area += f64::from(s.torn_area);
                     }
                 }
                 "contact_totals" => {
@@ -500,7 +501,7 @@ impl GpuEngine {
                         let vector = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
                         sums.impulse += vector(s.impulse);
                         // What the tool does until the middle of the last step goes into the springs of contact.
-                        sums.half_step += has_steps * 0.5 * f64::from(s.impulse[3]);
+                        sums.energy.half_step += has_steps * 0.5 * f64::from(s.impulse[3]);
                         sums.angular_impulse += vector(s.angular_impulse);
                         let [cutting, spreading, sliding, shaft] = s.parts.map(f64::from);
                         sums.cutting_impulse += cutting;
@@ -509,21 +510,21 @@ impl GpuEngine {
                         sums.shaft_impulse += shaft;
                         let [work, sliding, damping, stored] = s.energies.map(f64::from);
                         sums.tool_work += work;
-                        sums.friction_dissipation += sliding;
-                        sums.contact_dissipation += damping;
-                        sums.contact_energy += stored;
+                        sums.energy.friction += sliding;
+                        sums.energy.contact_damping += damping;
+                        sums.energy.contact_stored += stored;
                     }
                 }
                 _ => {
                     for s in read_all::<TipState>(bytes) {
                         sums.tip_coordinate = f64::from(s.coordinate);
-                        sums.tip_dissipation = f64::from(s.dissipation);
-                        sums.cap_dissipation = f64::from(s.cap_dissipation);
-                        sums.softening_dissipation = f64::from(s.softening);
-                        sums.contact_energy += f64::from(s.spring_energy);
+                        sums.energy.tip = f64::from(s.dissipation);
+                        sums.energy.advance_cap = f64::from(s.cap_dissipation);
+                        sums.energy.softening = f64::from(s.softening);
+                        sums.energy.contact_stored += f64::from(s.spring_energy);
                         sums.membrane_impulse = f64::from(s.membrane_impulse);
                         sums.adhesion_impulse = f64::from(s.bond_impulse);
-                        sums.adhesion_dissipation = f64::from(s.bond_dissipation);
+                        sums.energy.adhesion = f64::from(s.bond_dissipation);
                         // The contact nodes have booked the whole force of the anchors.
                         sums.cutting_impulse -= sums.membrane_impulse + sums.adhesion_impulse;
                     }

@@ -37,6 +37,8 @@ pub use mode::Mode;
 use glam::{DMat3, DVec3};
 use kinematics::{cofactor, double_dot, jacobian_minus_one};
 
+use crate::units::four_digits;
+
 laws! {
     neo_hookean::NeoHookean,
     mooney_rivlin::MooneyRivlin,
@@ -216,11 +218,6 @@ impl ElasticLaw {
     pub fn tangent_bound(&self, h: DMat3) -> TangentBound {
         self.isochoric.tangent_bound(h, self.bulk_modulus)
     }
-}
-
-/// A number for a message: four significant digits, no trailing zeros.
-pub fn four_digits(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 /// The constants of a law with names and units.

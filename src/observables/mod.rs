@@ -1,4 +1,5 @@
-//! What a run tells about itself: one record per display frame, fields on request.
+//! What a run tells about itself: one record per display frame, fields on request. [`quantity`] lists what stands in tables,
+//! [`crate::engine::energy`] where the work goes, [`field`] what is written and drawn of the tissue.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -39,6 +40,7 @@ pub struct ForcePart {
     pub name: &'static str,
     /// Column of `force.csv`.
     pub column: &'static str,
+    pub meaning: &'static str,
     /// Red, green, blue; people with colour-blindness tell the parts apart (Okabe and Ito 2008).
     pub colour: [u8; 3],
     /// Its share of the axial force [N].
@@ -49,149 +51,56 @@ impl ForceParts {
     /// The parts that add up to `axial`, from the bottom of a stack to its top. A new part is one line here: columns,
     /// charts and reports follow this list.
     pub const PARTS: [ForcePart; 7] = [
-        ForcePart { name: "cutting", column: "cutting_force_n", colour: [204, 121, 167], of: |f| f.cutting },
-        ForcePart { name: "membrane", column: "membrane_force_n", colour: [213, 94, 0], of: |f| f.membrane },
+        ForcePart {
+            name: "cutting",
+            column: "cutting_force_n",
+            meaning: "tip law in the bulk: puncture and cutting (the force that was measured, not the key of that name in a scene)",
+            colour: [204, 121, 167],
+            of: |f| f.cutting,
+        },
+        ForcePart {
+            name: "membrane",
+            column: "membrane_force_n",
+            meaning: "tip law while the tip is in a membrane",
+            colour: [213, 94, 0],
+            of: |f| f.membrane,
+        },
         ForcePart {
             name: "spreading, tip",
             column: "tip_spreading_force_n",
+            meaning: "contact normal on the tip of a needle, or on an indenter",
             colour: [0, 158, 115],
             of: |f| f.tip_spreading,
         },
         ForcePart {
             name: "spreading, shaft",
             column: "shaft_spreading_force_n",
+            meaning: "contact normal on the shaft",
             colour: [86, 180, 233],
             of: |f| f.shaft_spreading,
         },
-        ForcePart { name: "friction", column: "friction_force_n", colour: [230, 159, 0], of: |f| f.friction },
-        ForcePart { name: "adhesion", column: "adhesion_force_n", colour: [240, 228, 66], of: |f| f.adhesion },
-        ForcePart { name: "inertia", column: "inertia_force_n", colour: [128, 128, 128], of: |f| f.inertia },
+        ForcePart {
+            name: "friction",
+            column: "friction_force_n",
+            meaning: "friction",
+            colour: [230, 159, 0],
+            of: |f| f.friction,
+        },
+        ForcePart {
+            name: "adhesion",
+            column: "adhesion_force_n",
+            meaning: "tissue that sticks to the tip",
+            colour: [240, 228, 66],
+            of: |f| f.adhesion,
+        },
+        ForcePart {
+            name: "inertia",
+            column: "inertia_force_n",
+            meaning: "mass of the needle times the acceleration of its prescribed motion",
+            colour: [128, 128, 128],
+            of: |f| f.inertia,
+        },
     ];
-}
-
-/// One addend of the energy account.
-#[derive(Debug, Clone, Copy)]
-pub struct EnergyPart {
-    /// Column of `energy.csv`.
-    pub column: &'static str,
-    /// Its value [J].
-    pub of: fn(&EnergyAccount) -> f64,
-    /// 1 where external work turns into it, -1 where it was put in.
-    pub sign: f64,
-}
-
-/// Energies [J] at the end of a frame. Work and dissipation are totals since t = 0.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct EnergyAccount {
-    /// Work of tool, moved faces, tractions and gravity.
-    pub external: f64,
-    /// Elastic strain energy at the beginning of the last step.
-    pub elastic: f64,
-    /// In the middle of the last step, where velocities belong.
-    pub kinetic: f64,
-    /// What stored energies gained from the beginning of the last step to its middle: with it the account is exact wherever the energy
-    /// swings between motion and strain.
-    pub half_step: f64,
-    /// Hourglass energy (stored).
-    pub hourglass: f64,
-    /// Dissipated by mass damping.
-    pub damping: f64,
-    /// Dissipated by friction.
-    pub friction: f64,
-    /// Dissipated by the tip law and by the softening of the path.
-    pub cutting: f64,
-    /// Dissipated by faces that separate, plus what they store.
-    pub cohesive: f64,
-    /// Dissipated by tissue that slips on the tip.
-    pub adhesion: f64,
-    /// Dissipated by plastic flow, by damage and by the viscous terms.
-    pub plastic: f64,
-    pub damage: f64,
-    pub viscous: f64,
-    /// Stored in contact, stick, tip and bond springs, plus what contact damping dissipated.
-    pub contact: f64,
-    /// Gained and damped by a flexible needle since t = 0.
-    pub needle: f64,
-    /// Put in by changes of parameters while the run went on: the same state stores more or less with other constants.
-    pub changes: f64,
-    /// Taken by nodes whose mass was raised for a step: the kinetic energy of the mass that they have no more. Negative where
-    /// they gave.
-    pub raised_mass: f64,
-    /// Taken by the limit on the speed of nodes.
-    pub speed_limit: f64,
-    /// Dissipated at the tip beyond its law, while the cap on its advance holds its force above the threshold.
-    pub advance_cap: f64,
-    /// Largest |external| so far, the scale of the imbalance.
-    pub external_max: f64,
-}
-
-impl EnergyAccount {
-    /// Where external work goes, in the order of the columns of `energy.csv`. A new part is one line here: the account and the
-    /// columns follow this list.
-    pub const PARTS: [EnergyPart; 18] = [
-        EnergyPart { column: "elastic_j", of: |e| e.elastic, sign: 1.0 },
-        EnergyPart { column: "kinetic_j", of: |e| e.kinetic, sign: 1.0 },
-        EnergyPart { column: "half_step_j", of: |e| e.half_step, sign: 1.0 },
-        EnergyPart { column: "hourglass_j", of: |e| e.hourglass, sign: 1.0 },
-        EnergyPart { column: "damping_j", of: |e| e.damping, sign: 1.0 },
-        EnergyPart { column: "friction_j", of: |e| e.friction, sign: 1.0 },
-        EnergyPart { column: "cutting_j", of: |e| e.cutting, sign: 1.0 },
-        EnergyPart { column: "cohesive_j", of: |e| e.cohesive, sign: 1.0 },
-        EnergyPart { column: "adhesion_j", of: |e| e.adhesion, sign: 1.0 },
-        EnergyPart { column: "plastic_j", of: |e| e.plastic, sign: 1.0 },
-        EnergyPart { column: "damage_j", of: |e| e.damage, sign: 1.0 },
-        EnergyPart { column: "viscous_j", of: |e| e.viscous, sign: 1.0 },
-        EnergyPart { column: "contact_j", of: |e| e.contact, sign: 1.0 },
-        EnergyPart { column: "needle_j", of: |e| e.needle, sign: 1.0 },
-        EnergyPart { column: "changes_j", of: |e| e.changes, sign: -1.0 },
-        EnergyPart { column: "raised_mass_j", of: |e| e.raised_mass, sign: 1.0 },
-        EnergyPart { column: "speed_limit_j", of: |e| e.speed_limit, sign: 1.0 },
-        EnergyPart { column: "advance_cap_j", of: |e| e.advance_cap, sign: 1.0 },
-    ];
-
-    /// Sum of everything that external work turned into [J].
-    pub fn accounted(&self) -> f64 {
-        Self::PARTS.iter().map(|part| part.sign * (part.of)(self)).sum()
-    }
-
-    /// What nobody can explain, over the largest external work so far: (external - accounted) / largest |external|, positive
-    /// where energy is lost; 0 while nothing has happened. What a run is judged by has a floor: [`crate::verdict`].
-    pub fn imbalance(&self) -> f64 {
-        if self.external_max > 0.0 { (self.external - self.accounted()) / self.external_max } else { 0.0 }
-    }
-
-    /// Elastic and hourglass energy [J].
-    pub fn internal(&self) -> f64 {
-        self.elastic + self.hourglass
-    }
-}
-
-/// Signs of trouble within one frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Health {
-    /// Smallest J at cell centres, and at cell corners.
-    pub min_j: f64,
-    pub min_corner_j: f64,
-    /// Cells with J <= 0 at the centre or a corner.
-    pub inverted_cells: u32,
-    /// Of these the ones with J > 0 at the centre: only a corner is folded over, and the law is evaluated at the centre.
-    pub folded_cells: u32,
-    /// Index of one of them.
-    pub inverted_cell: Option<u32>,
-    /// Largest damage d; cells deleted so far; cell steps whose return mapping did not meet the yield condition.
-    pub largest_damage: f64,
-    pub deleted_cells: u32,
-    pub return_failures: u32,
-    /// Area of the cohesive faces that have parted: damage times area [m^2].
-    pub torn_area: f64,
-    /// Nodes whose speed was clamped, summed over the steps of the frame.
-    pub clamped_nodes: u32,
-    /// Largest nodal speed [m/s].
-    pub max_speed: f64,
-    /// Steps times nodes on which the selective mass was above the scaled mass.
-    pub raised_mass: u32,
-    /// True where a displacement or velocity is not a finite number in range.
-    pub not_finite: bool,
 }
 
 /// A flexible needle at the end of a frame.
@@ -282,11 +191,14 @@ pub struct FieldSnapshot {
 }
 
 mod core_sample;
+pub mod field;
 mod judge;
 mod needle_volume;
+pub mod quantity;
 mod recorder;
 mod target;
 
+pub use crate::engine::{EnergyAccount, EnergyPart, FrameEnergies, Health};
 pub use core_sample::CoreSample;
 pub use judge::{Judge, Sizes, Trouble};
 pub use needle_volume::cells_in_needle;

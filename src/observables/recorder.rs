@@ -3,9 +3,9 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{EnergyAccount, ForceParts, FrameRecord, Health};
-use crate::engine::FrameSums;
+use super::{ForceParts, FrameRecord};
 use crate::engine::clock::Clock;
+use crate::engine::{EnergyAccount, FrameEnergies, FrameSums};
 use crate::model::Model;
 use crate::needle::{Kinematics, Tool};
 
@@ -13,16 +13,16 @@ use crate::needle::{Kinematics, Tool};
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Recorder {
     totals: EnergyAccount,
-    contact_dissipation: f64,
-    cohesive_dissipation: f64,
+    /// What was taken so far of parts that hold something, too.
+    taken: FrameEnergies,
 }
 
 impl Recorder {
     /// Books what the state at the end of the last frame stores more after a change of constants; both sums are those of frames without
     /// a step. Springs of contact are not seen there: what they hold more shows in the balance.
     pub fn book_change(&mut self, before: &FrameSums, after: &FrameSums) {
-        let stored = |s: &FrameSums| s.elastic + s.kinetic + s.hourglass + s.viscous_dissipation + s.cohesive_energy;
-        self.totals.changes += stored(after) - stored(before);
+        let stored = |e: &FrameEnergies| e.elastic + e.kinetic + e.hourglass + e.viscous + e.cohesive_stored;
+        self.totals.changes += stored(&after.energy) - stored(&before.energy);
     }
 
     /// Books the frame whose steps begin with number `first` and returns its record.
@@ -40,25 +40,7 @@ impl Recorder {
         let e = &mut self.totals;
         e.external += sums.tool_work + sums.load_work;
         e.external_max = e.external_max.max(e.external.abs());
-        e.elastic = sums.elastic;
-        e.kinetic = sums.kinetic;
-        e.half_step = sums.half_step;
-        e.hourglass = sums.hourglass;
-        e.damping += sums.damping_dissipation;
-        e.friction += sums.friction_dissipation;
-        e.cutting += sums.tip_dissipation + sums.softening_dissipation;
-        e.advance_cap += sums.cap_dissipation;
-        e.raised_mass += sums.raised_mass_energy;
-        e.speed_limit += sums.speed_limit_energy;
-        self.cohesive_dissipation += sums.cohesive_dissipation;
-        e.cohesive = sums.cohesive_energy + self.cohesive_dissipation;
-        e.adhesion += sums.adhesion_dissipation;
-        e.plastic += sums.plastic_dissipation;
-        e.damage += sums.damage_dissipation;
-        e.viscous = sums.viscous_dissipation;
-        self.contact_dissipation += sums.contact_dissipation;
-        e.needle = sums.needle_energy;
-        e.contact = sums.contact_energy + self.contact_dissipation;
+        e.book(&mut self.taken, &sums.energy);
         let mean_pose = kinematics.map(|k| k.pose(0.5 * (begin + end)));
         let direction = mean_pose.map_or(DVec3::ZERO, |p| p.direction);
         let force = sums.impulse / duration;
@@ -91,21 +73,7 @@ impl Recorder {
             needle: Default::default(),
             core: None,
             targets: Vec::new(),
-            health: Health {
-                min_j: sums.min_j,
-                min_corner_j: sums.min_corner_j,
-                inverted_cells: sums.inverted_cells,
-                folded_cells: sums.folded_cells,
-                inverted_cell: sums.inverted_cell,
-                largest_damage: sums.largest_damage,
-                deleted_cells: sums.deleted_cells,
-                return_failures: sums.return_failures,
-                torn_area: sums.torn_area,
-                clamped_nodes: sums.clamped_nodes,
-                max_speed: sums.max_speed,
-                raised_mass: sums.raised_mass,
-                not_finite: sums.not_finite,
-            },
+            health: sums.health,
         }
     }
 }

@@ -12,7 +12,6 @@ pub mod folder;
 pub mod forensics;
 pub(crate) mod log_plot;
 pub mod material_chart;
-pub mod number;
 pub mod page;
 pub mod parts_chart;
 pub(crate) mod plot;

@@ -8,24 +8,45 @@ use glam::DVec3;
 
 use crate::mesh::Mesh;
 use crate::observables::FrameRecord;
+use crate::observables::quantity::Fold::{Largest, Last};
+use crate::observables::quantity::{Quantity, known, number, word};
 use crate::scene::{Face, FaceCondition, FaceDrive};
+use crate::units::{METRE, NEWTON, NEWTON_METRE, ONE, PASCAL, RADIAN, SECOND};
 
-/// Columns of `sample.csv`. A stress is empty where the area, a shear stress also where the direction is not known.
-pub const SAMPLE_COLUMNS: [&str; 13] = [
-    "time_s",
-    "face",
-    "displacement_x_m",
-    "displacement_y_m",
-    "displacement_z_m",
-    "rotation_rad",
-    "reaction_x_n",
-    "reaction_y_n",
-    "reaction_z_n",
-    "stretch",
-    "nominal_stress_pa",
-    "shear_stress_pa",
-    "moment_n_m",
+/// What a row of `sample.csv` is read off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampleRow {
+    pub face: Face,
+    pub point: SamplePoint,
+}
+
+/// `sample.csv`. A stress is empty where the area, a shear stress also where the direction is not known.
+pub const SAMPLE: [Quantity<SampleRow>; 13] = [
+    number("time_s", SECOND, Last, "end of the frame", |r| r.point.time),
+    word("face", "the driven face, e.g. `x_max`", |r| r.face.key()),
+    number("displacement_x_m", METRE, Last, PRESCRIBED, |r| r.point.displacement.x),
+    number("displacement_y_m", METRE, Last, PRESCRIBED, |r| r.point.displacement.y),
+    number("displacement_z_m", METRE, Last, PRESCRIBED, |r| r.point.displacement.z),
+    number("rotation_rad", RADIAN, Last, "prescribed rotation of the face about its axis", |r| r.point.rotation),
+    number("reaction_x_n", NEWTON, Largest, REACTION, |r| r.point.reaction.x),
+    number("reaction_y_n", NEWTON, Largest, REACTION, |r| r.point.reaction.y),
+    number("reaction_z_n", NEWTON, Largest, REACTION, |r| r.point.reaction.z),
+    number("stretch", ONE, Largest, "present over rest length between the face and the opposite one", |r| {
+        r.point.stretch
+    }),
+    known(
+        "nominal_stress_pa",
+        PASCAL,
+        Largest,
+        "reaction along the normal over the rest area, tension positive",
+        |r| r.point.nominal_stress,
+    ),
+    known("shear_stress_pa", PASCAL, Largest, "reaction along the drive over the rest area", |r| r.point.shear_stress),
+    number("moment_n_m", NEWTON_METRE, Largest, "moment about the axis of the face", |r| r.point.moment),
 ];
+
+const PRESCRIBED: &str = "prescribed motion of the face";
+const REACTION: &str = "what the face exerts on the tissue";
 
 /// A face that moves, and what turns its forces into stresses.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +61,7 @@ pub struct DrivenFace {
     rest_area: Option<f64>,
 }
 
-/// One row of `sample.csv`.
+/// A driven face at the end of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SamplePoint {
     /// [s]

@@ -6,9 +6,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::curve::{CurveFigures, MajorDrop, frames_on_the_way_in, major_drops};
 use super::sample::{DrivenFace, SamplePoint};
-use super::tables::{hourglass_to_internal, kinetic_to_internal};
 use super::target::TargetFigures;
 use crate::observables::FrameRecord;
+use crate::observables::quantity::{ENERGY, find};
 use crate::reading;
 use crate::verdict::Doubt;
 use crate::whole_file;
@@ -195,28 +195,28 @@ impl Summary {
         if let Some(last) = records.last() {
             self.doubts = last.verdict.doubts.clone();
             self.energy_imbalance = last.verdict.worst_imbalance;
-            self.raised_mass_j = last.energy.raised_mass;
-            self.speed_limit_j = last.energy.speed_limit;
-            self.advance_cap_j = last.energy.advance_cap;
         }
+        let total = |column: &str| find(&ENERGY, column).over(records).unwrap_or(0.0);
+        self.raised_mass_j = total("raised_mass_j");
+        self.speed_limit_j = total("speed_limit_j");
+        self.advance_cap_j = total("advance_cap_j");
         // A scene without a moving tool has no way in: every frame counts.
         let mut inward: Vec<&FrameRecord> = frames_on_the_way_in(records).collect();
         if inward.len() < 2 {
             inward = records.iter().collect();
         }
-        self.kinetic_to_internal = median(inward.iter().map(|r| kinetic_to_internal(&r.energy)));
-        self.hourglass_to_internal = median(inward.iter().map(|r| hourglass_to_internal(&r.energy)));
-        let internal = |r: &FrameRecord| r.energy.elastic + r.energy.hourglass;
+        self.kinetic_to_internal = median(inward.iter().map(|r| r.energy.kinetic_to_internal()));
+        self.hourglass_to_internal = median(inward.iter().map(|r| r.energy.hourglass_to_internal()));
+        let internal = |r: &FrameRecord| r.energy.internal();
         let telling = TELLING_ENERGY * records.iter().map(internal).fold(0.0, f64::max);
         self.hourglass_to_internal_max =
-            largest(records.iter().filter(|r| internal(r) >= telling).map(|r| hourglass_to_internal(&r.energy)));
-        self.clamped_nodes = records.iter().map(|r| u64::from(r.health.clamped_nodes)).sum();
-        let raised: u64 = records.iter().map(|r| u64::from(r.health.raised_mass)).sum();
+            largest(records.iter().filter(|r| internal(r) >= telling).map(|r| r.energy.hourglass_to_internal()));
+        self.clamped_nodes = total("clamped_nodes") as u64;
         let node_steps = self.nodes * records.last().map_or(0, |r| r.step);
-        self.raised_mass_share = if node_steps > 0 { raised as f64 / node_steps as f64 } else { 0.0 };
-        self.return_failures = records.iter().map(|r| u64::from(r.health.return_failures)).sum();
-        self.torn_area_m2 = records.last().map(|r| r.health.torn_area).filter(|area| *area > 0.0);
-        self.inverted_cells = records.iter().map(|r| u64::from(r.health.inverted_cells)).max().unwrap_or(0);
+        self.raised_mass_share = if node_steps > 0 { total("raised_mass") / node_steps as f64 } else { 0.0 };
+        self.return_failures = total("return_failures") as u64;
+        self.torn_area_m2 = Some(total("torn_area_m2")).filter(|area| *area > 0.0);
+        self.inverted_cells = total("inverted_cells") as u64;
     }
 
     /// Fills in the peak of the specimen between the driven faces.

@@ -4,40 +4,42 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::curve::frames_on_the_way_in;
-use super::number::number;
+use crate::observables::quantity::Fold::{Largest, Last, Smallest};
+use crate::observables::quantity::{Quantity, known, number, word};
 use crate::observables::{FrameRecord, TargetRecord};
 use crate::scene::Target;
+use crate::units::{METRE, SECOND};
 
-/// Columns of `targets.csv`. Time and depth are those of `force.csv`, the rest belongs to the end of the frame; the last two
-/// are empty without a tool.
-pub const TARGET_COLUMNS: [&str; 9] = [
-    "time_s",
-    "depth_m",
-    "target",
-    "displacement_x_m",
-    "displacement_y_m",
-    "displacement_z_m",
-    "displacement_m",
-    "axial_displacement_m",
-    "tip_distance_m",
-];
-
-/// One row.
-pub fn target_row(name: &str, record: &FrameRecord, target: &TargetRecord) -> [String; TARGET_COLUMNS.len()] {
-    let known = |value: Option<f64>| value.map_or(String::new(), number);
-    let [x, y, z] = target.displacement.to_array().map(number);
-    [
-        number(record.time),
-        number(record.depth),
-        name.into(),
-        x,
-        y,
-        z,
-        number(target.displacement.length()),
-        known(target.axial),
-        known(target.from_tip.map(|way| way.length())),
-    ]
+/// What a row of `targets.csv` is read off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TargetRow {
+    name: String,
+    /// [s], [m]
+    time: f64,
+    depth: f64,
+    target: TargetRecord,
 }
+
+impl TargetRow {
+    /// The target `name` at the end of the frame of `record`.
+    pub fn new(name: &str, record: &FrameRecord, target: &TargetRecord) -> Self {
+        TargetRow { name: name.into(), time: record.time, depth: record.depth, target: *target }
+    }
+}
+
+/// `targets.csv`. Time and depth are those of `force.csv`, the rest belongs to the end of the frame; the last two are empty without a
+/// tool.
+pub const TARGETS: [Quantity<TargetRow>; 9] = [
+    number("time_s", SECOND, Last, "end of the frame", |r| r.time),
+    number("depth_m", METRE, Last, "that of `force.csv`", |r| r.depth),
+    word("target", "its name", |r| &r.name),
+    number("displacement_x_m", METRE, Last, "displacement", |r| r.target.displacement.x),
+    number("displacement_y_m", METRE, Last, "displacement", |r| r.target.displacement.y),
+    number("displacement_z_m", METRE, Last, "displacement", |r| r.target.displacement.z),
+    number("displacement_m", METRE, Largest, "length of the displacement", |r| r.target.displacement.length()),
+    known("axial_displacement_m", METRE, Largest, "its part along the tool, positive ahead", |r| r.target.axial),
+    known("tip_distance_m", METRE, Smallest, "distance from the tip", |r| r.target.from_tip.map(|way| way.length())),
+];
 
 /// One target on the way in: the frames deeper than every frame before them, all frames where the tool stands still or there
 /// is none. Depths are those of the tool.

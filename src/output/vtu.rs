@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use super::folder::{FIELD_COLLECTION, FIELD_FOLDER, OutputFolder};
 use crate::mesh::Mesh;
 use crate::observables::FieldSnapshot;
+use crate::observables::field::{FIELDS, Field, VON_MISES, Values};
 use crate::whole_file;
 use crate::{Error, Result};
 
@@ -62,7 +63,6 @@ pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot) -> String {
     let cells = shown.len();
     assert_eq!(snapshot.displacement.len(), nodes, "a snapshot holds one displacement per node");
     let points = (0..nodes).flat_map(|n| mesh.rest_position(n).to_array());
-    let displacement = snapshot.displacement.iter().flat_map(|u| u.to_array());
     let connectivity = shown.iter().flat_map(|c| mesh.cell_nodes(*c).to_vec());
     let (corners, kind) = match mesh {
         Mesh::Block(_) => (8, VTK_HEXAHEDRON),
@@ -82,20 +82,18 @@ pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot) -> String {
     text += &array("offsets", "Int32", 1, integers(offsets));
     text += &array("types", "UInt8", 1, vec![kind; cells]);
     text += "</Cells>\n<PointData Vectors=\"displacement_m\">\n";
-    text += &array("displacement_m", "Float32", 3, floats(displacement));
-    text += "</PointData>\n<CellData Scalars=\"von_mises_pa\">\n";
-    for (name, field) in [
-        ("von_mises_pa", &snapshot.von_mises),
-        ("jacobian", &snapshot.jacobian),
-        ("pressure_pa", &snapshot.pressure),
-        ("stiffness", &snapshot.stiffness),
-        ("plastic_strain", &snapshot.plastic_strain),
-        ("damage", &snapshot.damage),
-        ("material", &snapshot.material),
-    ] {
+    for field in &FIELDS {
+        if let Values::Nodes(of) = field.values {
+            text += &array(field.key, "Float32", 3, floats(of(snapshot).iter().flat_map(|u| u.to_array())));
+        }
+    }
+    text += &format!("</PointData>\n<CellData Scalars=\"{}\">\n", VON_MISES.key);
+    for Field { key, values, .. } in &FIELDS {
+        let Values::Cells(of) = values else { continue };
+        let field = of(snapshot);
         if !field.is_empty() {
-            assert_eq!(field.len(), mesh.cell_count(), "a snapshot holds one {name} per cell");
-            text += &array(name, "Float32", 1, floats(shown.iter().map(|c| field[*c])));
+            assert_eq!(field.len(), mesh.cell_count(), "a snapshot holds one {key} per cell");
+            text += &array(key, "Float32", 1, floats(shown.iter().map(|c| field[*c])));
         }
     }
     text += "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";

@@ -21,7 +21,9 @@ use crate::needle::centre_line::{CentreLine, ENTRY_COUNT};
 use crate::needle::gap::Profile;
 use crate::needle::{NeedleShape, Tool};
 use crate::observables::FieldSnapshot;
+use crate::observables::field::VON_MISES;
 use crate::scene::Scene;
+use crate::units::{KILOPASCAL, MEGAPASCAL, PASCAL, three_digits};
 
 /// Width where the scene names none, and bounds of what it may name [px].
 const DEFAULT_WIDTH: u32 = 900;
@@ -690,13 +692,10 @@ fn draw_scale_bar(canvas: &mut Canvas, layout: &Layout, baseline: f64) -> f64 {
 fn draw_colour_bar(canvas: &mut Canvas, layout: &Layout, scale: &StressScale) {
     let unit = layout.unit;
     let left = layout.plot.right + 16.0 * unit;
-    let (factor, name) = match scale.top {
-        top if top >= 1e6 => (1e-6, "MPa"),
-        top if top >= 1e3 => (1e-3, "kPa"),
-        _ => (1.0, "Pa"),
-    };
+    let shown = [MEGAPASCAL, KILOPASCAL].into_iter().find(|u| scale.top >= u.si).unwrap_or(PASCAL);
     let capital = 10.5 * unit;
-    for (line, text) in ["von Mises".to_string(), format!("stress, {name}")].iter().enumerate() {
+    let (first, last) = VON_MISES.label.rsplit_once(' ').unwrap_or(("", VON_MISES.label));
+    for (line, text) in [first.to_string(), format!("{last}, {}", shown.name)].iter().enumerate() {
         let y = layout.plot.top + unit * (11.0 + 20.0 * line as f64);
         canvas.text(text, DVec2::new(left, y), capital, INK);
     }
@@ -717,7 +716,7 @@ fn draw_colour_bar(canvas: &mut Canvas, layout: &Layout, scale: &StressScale) {
         let share = step as f64 / scale.steps as f64;
         let y = bar.bottom + share * (bar.top - bar.bottom);
         canvas.round_line([DVec2::new(bar.right, y), DVec2::new(bar.right + 6.0 * unit, y)], 1.5 * unit, INK);
-        let mut label = three_digits(scale.top * factor * share);
+        let mut label = three_digits(shown.show(scale.top) * share);
         if scale.exceeded && step == scale.steps {
             label.insert(0, '≥');
         }
@@ -749,16 +748,6 @@ fn draw_path_legend(canvas: &mut Canvas, layout: &Layout) {
     canvas.text("cut path", DVec2::new(swatch.right + 8.0 * unit, swatch.bottom - 3.0 * unit), capital, INK);
 }
 
-/// At most three significant digits, no trailing zeros.
-fn three_digits(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -779,16 +768,6 @@ mod tests {
             assert!((found / top - 1.0).abs() < 1e-12, "{value}: {found}");
             assert!((3..=5).contains(&steps));
         }
-    }
-
-    #[test]
-    fn numbers_for_labels() {
-        assert_eq!(three_digits(0.6), "0.6");
-        assert_eq!(three_digits(0.0), "0");
-        assert_eq!(three_digits(12.34), "12.3");
-        assert_eq!(three_digits(2.5), "2.5");
-        assert_eq!(three_digits(1000.0), "1000");
-        assert_eq!(three_digits(0.375), "0.375");
     }
 
     #[test]

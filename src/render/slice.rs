@@ -10,6 +10,7 @@ use glam::{DVec2, DVec3};
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::needle::Tool;
 use crate::observables::FieldSnapshot;
+use crate::observables::field::VON_MISES;
 use crate::scene::Scene;
 
 /// Remaining stiffness below which a cell counts as opened by the tip.
@@ -153,7 +154,7 @@ pub struct Slice {
 /// Cuts the deformed mesh.
 pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64) -> Slice {
     let plane = plane.beside_grid_lines(cell_size);
-    let von_mises = smoothed_to_nodes(mesh, &snapshot.von_mises, &snapshot.stiffness);
+    let von_mises = smoothed_to_nodes(mesh, VON_MISES.cells(snapshot), &snapshot.stiffness);
     let (low, high) = mesh.bounds();
     let farthest = FARTHEST_MOVE * (high - low).max_element();
     let kinds = match mesh {

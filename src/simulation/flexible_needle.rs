@@ -220,7 +220,7 @@ impl FlexibleNeedle {
         // expected and what the tissue did in the end differ by the error of the coupling, which stays in the balance.
         sums.tool_work += self.taken.gained + self.taken.damped - self.taken.relative_work - on_tissue;
         self.energy += self.taken.gained + self.taken.damped;
-        sums.needle_energy = self.energy;
+        sums.energy.needle = self.energy;
         let record = self.record();
         let Some((time, length)) = next else { return record };
         let mut loads = self.beam.loads();
@@ -353,7 +353,7 @@ impl Simulation {
         let end = |frame: u64| clock.time_of(clock.first_step(frame + 1).min(last));
         let next = (self.collected < self.frames)
             .then(|| (end(self.collected), end(self.collected) - clock.time_of(clock.first_step(self.collected))));
-        let broken = sums.not_finite || !sums.needle_loads.iter().all(|l| l.is_finite());
+        let broken = sums.health.not_finite || !sums.needle_loads.iter().all(|l| l.is_finite());
         match (&mut self.needle, &self.kinematics) {
             // Loads of a broken state mean nothing; the run stops right after.
             (Some(needle), Some(tool)) if !broken => needle.answer(tool, sums, f64::from(sums.steps) * dt, next),

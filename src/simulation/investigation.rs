@@ -91,15 +91,15 @@ impl Simulation {
                 let record = StepRecord {
                     step: first_step + 1,
                     time: self.clock.time_of(first_step + 1),
-                    elastic: sums.elastic,
-                    kinetic: sums.kinetic,
-                    hourglass: sums.hourglass,
-                    min_j: sums.min_j,
-                    min_corner_j: sums.min_corner_j,
-                    inverted_cells: sums.inverted_cells,
-                    max_speed: sums.max_speed,
-                    clamped_nodes: sums.clamped_nodes,
-                    not_finite: sums.not_finite,
+                    elastic: sums.energy.elastic,
+                    kinetic: sums.energy.kinetic,
+                    hourglass: sums.energy.hourglass,
+                    min_j: sums.health.min_j,
+                    min_corner_j: sums.health.min_corner_j,
+                    inverted_cells: sums.health.inverted_cells,
+                    max_speed: sums.health.max_speed,
+                    clamped_nodes: sums.health.clamped_nodes,
+                    not_finite: sums.health.not_finite,
                 };
                 let new = |f: fn(&StepRecord) -> u32| f(&record) > steps.first().map_or(0, f);
                 sign = match () {

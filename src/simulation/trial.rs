@@ -47,7 +47,7 @@ impl Trial {
 fn cures(scene: &Scene, dt: f64) -> Vec<Cure> {
     let line = match scene.solver.time_step {
         Some(_) => format!("solver.time_step_us = {:.4}", 0.5 * dt * 1e6),
-        None => format!("solver.safety = {}", crate::material::four_digits(0.5 * scene.solver.safety)),
+        None => format!("solver.safety = {}", crate::units::four_digits(0.5 * scene.solver.safety)),
     };
     let mut cures =
         vec![Cure { name: format!("half the step ({:.3} us)", 0.5 * dt * 1e6), line, kind: Kind::HalfStep }];

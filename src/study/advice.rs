@@ -1,6 +1,7 @@
 //! What a study means for somebody who wants a frame rate or an accuracy.
 
-use super::{Settings, digits, trimmed};
+use super::Settings;
+use crate::units::{three_decimals, trimmed};
 
 /// Error of the force curve that counts as accurate.
 pub const ACCURATE: f64 = 0.01;
@@ -41,7 +42,7 @@ pub fn fastest_within(candidates: &[Candidate], error: f64) -> Option<&Candidate
 /// What to choose on an adapter, for real time and for 1 % error. No mesh is recommended for an accuracy that it was measured
 /// against itself.
 pub fn sentences(adapter: &str, candidates: &[Candidate]) -> Vec<String> {
-    let percent = |error: f64| format!("{} %", digits(100.0 * error));
+    let percent = |error: f64| format!("{} %", three_decimals(100.0 * error));
     let accuracy = format!("{} %", trimmed(100.0 * ACCURATE));
     let finished: Vec<Candidate> = candidates.iter().filter(|c| c.error.is_finite()).cloned().collect();
     if finished.is_empty() {
@@ -53,14 +54,14 @@ pub fn sentences(adapter: &str, candidates: &[Candidate]) -> Vec<String> {
             "For real time on {adapter} choose {}: error of the force curve {}, {} times real time.",
             choice.settings.describe(),
             percent(choice.error),
-            digits(choice.real_time_factor),
+            three_decimals(choice.real_time_factor),
         )),
         // Fast enough is only the mesh that has nothing to be compared with.
         (None, Some(fastest)) if fastest.real_time_factor >= 1.0 => sentences.push(format!(
             "Real time on {adapter}: {}, {} times real time. It is the mesh of the reference, so the error of the mesh is not known; \
              mass scaling and step alone change the force curve by {}.",
             fastest.settings.describe(),
-            digits(fastest.real_time_factor),
+            three_decimals(fastest.real_time_factor),
             percent(fastest.error)
         )),
         (None, Some(fastest)) => sentences.push(format!(
@@ -110,8 +111,8 @@ pub fn sentences(adapter: &str, candidates: &[Candidate]) -> Vec<String> {
 /// A real-time factor in words.
 pub fn speed(factor: f64) -> String {
     if factor >= 1.0 {
-        format!("{} times real time", digits(factor))
+        format!("{} times real time", three_decimals(factor))
     } else {
-        format!("{} times slower than real time", digits(1.0 / factor))
+        format!("{} times slower than real time", three_decimals(1.0 / factor))
     }
 }

@@ -2,14 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Settings;
 use super::advice::{self, Candidate};
 use super::metrics::{Errors, curve_error};
 use super::order::{self, Fit, Richardson};
 use super::pareto;
 use super::plan::{LeftOut, Plan, Role};
 use super::store::{RunRecord, Store};
-use super::{Settings, trimmed};
 use crate::error::{Error, Result};
+use crate::units::{three_decimals, trimmed};
 
 /// One finished run beside the reference.
 #[derive(Debug, Clone, PartialEq)]
@@ -304,7 +305,7 @@ pub fn convergence_in_words(orders: &[Order]) -> Vec<String> {
     let Some(curve) = orders.iter().find(|o| o.what == "force curve") else {
         return vec!["Mesh size was not varied, so there is nothing to say about convergence in it.".into()];
     };
-    let percent = |e: f64| format!("{} %", super::digits(100.0 * e));
+    let percent = |e: f64| format!("{} %", three_decimals(100.0 * e));
     let list: Vec<String> =
         curve.errors.iter().map(|(h, e)| format!("{} at {} mm", percent(*e), trimmed(*h))).collect();
     sentences.push(match curve.fit {

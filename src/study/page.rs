@@ -6,12 +6,13 @@ use super::advice::{self, ACCURATE};
 use super::analysis::{Analysis, Row, convergence_in_words};
 use super::metrics::Errors;
 use super::plan::{LeftOut, Role};
-use super::{Engine, Settings, digits, pareto, trimmed};
+use super::{Engine, Settings, pareto};
 use crate::error::{Error, Result};
 use crate::output::chart::{Curve, FINER, GREEN, INWARD, ORANGE, OUTWARD, PINK};
 use crate::output::log_plot::{LogPlot, Point, Shape};
 use crate::output::page::{document, escape, figure, numbers, table, words};
 use crate::output::plot::{Plot, legend_dot, legend_line, legend_row};
+use crate::units::{three_decimals, trimmed};
 
 /// Colour of a point by the reason of its run.
 const ROLES: [(Role, RGBColor, &str); 6] = [
@@ -326,7 +327,7 @@ impl Page<'_> {
                     run.cells.to_string(),
                     format!("{:.0}", run.dt_s * 1e6),
                     format!("{:.1}", run.wall_s),
-                    digits(run.real_time_factor()),
+                    three_decimals(run.real_time_factor()),
                     percent(row.errors.force_curve),
                     percent(row.errors.puncture_force),
                     percent(row.errors.deepest_force),
@@ -495,7 +496,7 @@ impl Page<'_> {
                 s.first_wall_s,
                 s.second_wall_s,
                 s.ratio(),
-                s.force_curve.map_or("an unknown part".into(), |e| if e == 0.0 { "nothing".into() } else { format!("{} %", digits(100.0 * e)) })
+                s.force_curve.map_or("an unknown part".into(), |e| if e == 0.0 { "nothing".into() } else { format!("{} %", three_decimals(100.0 * e)) })
             ),
             None => "The base was run once, so the scatter of the times is not known.".into(),
         });
@@ -572,7 +573,7 @@ impl Page<'_> {
                     r.cells.to_string(),
                     r.steps.to_string(),
                     format!("{:.2}", r.wall_s),
-                    digits(r.real_time_factor()),
+                    three_decimals(r.real_time_factor()),
                     r.cpu_ns_per_cell_step().map_or("-".into(), |ns| format!("{ns:.0}")),
                     percent(e.force_curve),
                     percent(e.puncture_force),
@@ -629,7 +630,7 @@ fn clamped(row: &Row) -> String {
 }
 
 fn percent(value: Option<f64>) -> String {
-    value.map_or("-".into(), |v| digits(100.0 * v))
+    value.map_or("-".into(), |v| three_decimals(100.0 * v))
 }
 
 fn beside(settings: &Settings, base: &Settings) -> String {

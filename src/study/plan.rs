@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::subject::{Subject, Variant, round4};
-use super::{Axis, Engine, MeshSize, Settings, trimmed};
+use super::subject::{DECIMALS, Subject, Variant};
+use super::{Axis, Engine, MeshSize, Settings};
 use crate::error::{Error, Result};
+use crate::units::{rounded, trimmed};
 
 /// Part of the budget that the reference may take, and that all runs together may be predicted to take: predictions from short
 /// runs are off by some, and machines drift.
@@ -200,7 +201,7 @@ struct Meshes<'a> {
 
 impl Meshes<'_> {
     fn edge(&self, level: i32) -> f64 {
-        if level == 0 { self.base_mm } else { round4(self.base_mm * MESH_RATIO.powi(level)) }
+        if level == 0 { self.base_mm } else { rounded(self.base_mm * MESH_RATIO.powi(level), DECIMALS) }
     }
 
     fn size(&mut self, level: i32) -> std::result::Result<MeshSize, String> {
@@ -251,10 +252,12 @@ impl Plan {
         };
         let coarsest = subject.coarsest_mm();
         let mut size_of = |edge: f64| match edge {
-            _ if edge < finest.1 => Err(format!("finer than {} mm is not planned", trimmed(round4(finest.1)))),
+            _ if edge < finest.1 => {
+                Err(format!("finer than {} mm is not planned", trimmed(rounded(finest.1, DECIMALS))))
+            }
             _ if edge > coarsest => Err(format!(
                 "wider than the path of the needle, {} mm: what such cells give does not converge",
-                trimmed(round4(coarsest))
+                trimmed(rounded(coarsest, DECIMALS))
             )),
             _ => subject.mesh_size(edge),
         };
@@ -341,7 +344,8 @@ pub fn choose(
         Error::input(format!("the scene does not run as it is: {reason}"), "see `stylet check` on the scene")
     })?;
     let with_mass = |settings: Settings, factor: f64| {
-        let mut settings = Settings { mass_scaling: round4((base.mass_scaling * factor).max(1.0)), ..settings };
+        let mut settings =
+            Settings { mass_scaling: rounded((base.mass_scaling * factor).max(1.0), DECIMALS), ..settings };
         let key = "mass_scaling".to_string();
         if settings.mass_scaling > 1.0 && !settings.effects.contains(&key) {
             settings.effects.insert(0, key);
@@ -423,7 +427,7 @@ pub fn choose(
         }
     }
     if has(Axis::Step) {
-        let safeties = STEP_FACTORS.map(|factor| round4((base.safety * factor).min(1.0)));
+        let safeties = STEP_FACTORS.map(|factor| rounded((base.safety * factor).min(1.0), DECIMALS));
         wanted.extend(safeties.map(|safety| (Role::Step, Settings { safety, ..base.clone() }, 0)));
     }
     if has(Axis::Effects) {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::{Engine, MeshSize, Settings, trimmed};
+use super::{Engine, MeshSize, Settings};
 use crate::effects::EFFECTS;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::error::{Error, Result};
@@ -17,6 +17,10 @@ use crate::needle::{Phase, Tool};
 use crate::reading;
 use crate::scene::Scene;
 use crate::simulation::EngineChoice;
+use crate::units::{rounded, trimmed};
+
+/// Of numbers as the overrides have them.
+pub(super) const DECIMALS: i32 = 4;
 
 /// Sample points of the displacement per axis, and the part of the block that they span.
 const SAMPLES: usize = 9;
@@ -80,8 +84,8 @@ impl Subject {
         let adapter = gpu.map(|gpu| describe(&gpu.info));
         let engine = if adapter.is_some() { Engine::Gpu } else { Engine::Cpu };
         let base = Settings {
-            cell_size_mm: round4(scene.tissue.cell_size * 1e3),
-            mass_scaling: round4(scene.effects.mass_scaling.map_or(1.0, |p| p.factor)),
+            cell_size_mm: rounded(scene.tissue.cell_size * 1e3, DECIMALS),
+            mass_scaling: rounded(scene.effects.mass_scaling.map_or(1.0, |p| p.factor), DECIMALS),
             safety: scene.solver.safety,
             engine,
             effects: scene.effects.keys().into_iter().map(str::to_string).collect(),
@@ -270,11 +274,6 @@ fn insertion(mut scene: Scene) -> Result<(Scene, Vec<String>)> {
         ));
     }
     Ok((scene, changes))
-}
-
-/// As the overrides have it: four decimals.
-pub(super) fn round4(value: f64) -> f64 {
-    (value * 1e4).round() / 1e4
 }
 
 /// First line of a message that stands in the middle of a page.

@@ -8,8 +8,8 @@ use super::task::{self, GoalResult};
 use super::texts::{self, Better};
 use crate::observables::FrameRecord;
 use crate::output::OutputFolder;
-use crate::output::number::number;
 use crate::scene::Scene;
+use crate::units::number;
 use crate::whole_file;
 use crate::{Error, Result};
 
@@ -115,9 +115,9 @@ fn with_texts(figures: Vec<(String, Option<f64>)>) -> Vec<Row> {
             rows.push(Row {
                 key: key.clone(),
                 label,
-                unit: text.unit.into(),
+                unit: text.unit.name.into(),
                 // An empty sum is -0.
-                value: value.map(|v| v * text.per_si + 0.0).filter(|v| v.is_finite()),
+                value: value.map(|v| text.unit.show(v) + 0.0).filter(|v| v.is_finite()),
                 reference: None,
                 better: text.better,
             });
@@ -142,8 +142,7 @@ impl Score {
         let trust = Trust::of(records);
         let mut rows = kinematic_rows(&kinematic);
         for (key, value) in physical_rows(&physical) {
-            let optional = ["separated_area", "largest_damage", "core_mass", "core_length"].contains(&key.as_str());
-            if value.is_some() || !optional {
+            if value.is_some() || !texts::figure_of(&key).is_some_and(|text| text.optional) {
                 rows.push((key, value));
             }
         }

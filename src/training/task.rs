@@ -20,6 +20,7 @@ use super::kinematic::{KinematicFigures, Sample};
 use super::physical::PhysicalFigures;
 use super::texts;
 use crate::scene::Scene;
+use crate::units::{CUBIC_MILLIMETRE, MILLIGRAM, MILLIMETRE, SECOND, Unit};
 
 /// One goal and what was measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,11 +42,10 @@ pub struct GoalResult {
 
 impl GoalResult {
     /// A goal that is met where the measured figure lies within its bounds; a figure that is missing or no number meets none.
-    /// `per_si`: how many of `unit` make one SI unit.
     fn of(
         key: &str,
         text: String,
-        (unit, per_si): (&str, f64),
+        unit: Unit,
         measured: Option<f64>,
         least: Option<f64>,
         most: Option<f64>,
@@ -54,16 +54,14 @@ impl GoalResult {
         GoalResult {
             key: key.into(),
             text,
-            unit: unit.into(),
-            measured: measured.filter(|x| x.is_finite()).map(|x| x * per_si),
-            least: least.map(|x| x * per_si),
-            most: most.map(|x| x * per_si),
+            unit: unit.name.into(),
+            measured: measured.filter(|x| x.is_finite()).map(|x| unit.show(x)),
+            least: least.map(|x| unit.show(x)),
+            most: most.map(|x| unit.show(x)),
             met: Some(measured.is_some_and(|x| x.is_finite() && within(x))),
         }
     }
 }
-
-const MM: (&str, f64) = ("mm", 1e3);
 
 /// The goals of a task in its order, the time limit behind them.
 pub fn judge(
@@ -78,28 +76,28 @@ pub fn judge(
         Goal::HitTarget { target, tolerance } => {
             let name = scene.targets.get(*target).map_or("", |t| &t.name);
             let distance = physical.targets.iter().find(|t| t.name == name).and_then(|t| t.tip_distance_at_end_m);
-            GoalResult::of("hit_target", texts::hit_target(name), MM, distance, None, Some(*tolerance))
+            GoalResult::of("hit_target", texts::hit_target(name), MILLIMETRE, distance, None, Some(*tolerance))
         }
         Goal::Avoid { name, obstacle, clearance } => {
             let distance = clearance_of(scene, samples, obstacle);
-            let mut result = GoalResult::of("avoid", texts::avoid(name), MM, distance, Some(*clearance), None);
+            let mut result = GoalResult::of("avoid", texts::avoid(name), MILLIMETRE, distance, Some(*clearance), None);
             // To touch is not to stay away.
             result.met = result.met.map(|met| met && distance.is_some_and(|d| d > 0.0));
             result
         }
         Goal::StopInLayer { name, from, to } => {
             let depth = Some(physical.deepest_cut);
-            GoalResult::of("stop_in_layer", texts::stop_in_layer(name), MM, depth, Some(*from), Some(*to))
+            GoalResult::of("stop_in_layer", texts::stop_in_layer(name), MILLIMETRE, depth, Some(*from), Some(*to))
         }
-        Goal::CoreMass { least } => GoalResult::of("core", texts::CORE.into(), ("mg", 1e6), core, Some(*least), None),
+        Goal::CoreMass { least } => GoalResult::of("core", texts::CORE.into(), MILLIGRAM, core, Some(*least), None),
         Goal::CoreVolume { least } => {
             let volume = core.map(|mass| mass / scene.material.density);
-            GoalResult::of("core", texts::CORE.into(), ("mm3", 1e9), volume, Some(*least), None)
+            GoalResult::of("core", texts::CORE.into(), CUBIC_MILLIMETRE, volume, Some(*least), None)
         }
     });
     let limit = task.time_limit.map(|limit| {
         let text = texts::TIME_LIMIT.into();
-        GoalResult::of("time_limit", text, ("s", 1.0), Some(kinematic.elapsed_time), None, Some(limit))
+        GoalResult::of("time_limit", text, SECOND, Some(kinematic.elapsed_time), None, Some(limit))
     });
     goals.chain(limit).collect()
 }

@@ -3,6 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::units::short;
+use crate::units::{self, Unit};
+
 /// Which way a figure gets better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -29,52 +32,57 @@ pub struct FigureText {
     /// Stays the same in every language and version.
     pub key: &'static str,
     pub label: &'static str,
-    pub unit: &'static str,
-    /// How many of the unit make one SI unit.
-    pub per_si: f64,
+    pub unit: Unit,
     pub better: Better,
+    /// Has no row where no run of the scene holds it.
+    pub optional: bool,
 }
 
-const fn figure(key: &'static str, label: &'static str, unit: &'static str, per_si: f64, better: Better) -> FigureText {
-    FigureText { key, label, unit, per_si, better }
+const fn figure(key: &'static str, label: &'static str, unit: Unit, better: Better) -> FigureText {
+    FigureText { key, label, unit, better, optional: false }
+}
+
+/// One that needs a bore, faces that part, or damage in the scene.
+const fn optional(key: &'static str, label: &'static str, unit: Unit, better: Better) -> FigureText {
+    FigureText { optional: true, ..figure(key, label, unit, better) }
 }
 
 /// All figures, in the order in which they are shown. A key that ends in a dot stands for one row per layer or target,
 /// whose name is put behind key and label.
 pub const FIGURES: [FigureText; 33] = [
-    figure("overshoot", "Overshoot behind the last layer", "mm", 1e3, Better::Lower),
-    figure("passes", "Passes through the surface", "", 1.0, Better::Lower),
-    figure("redirections", "Redirections inside tissue", "", 1.0, Better::Lower),
-    figure("target_distance.", "Tip to target", "mm", 1e3, Better::Lower),
-    figure("target_displacement.", "Target pushed by", "mm", 1e3, Better::Lower),
-    figure("entry_error", "Entry point off the plan", "mm", 1e3, Better::Lower),
-    figure("entry_angle_error", "Entry angle off the plan", "deg", 180.0 / std::f64::consts::PI, Better::Lower),
-    figure("core_mass", "Core in the bore", "mg", 1e6, Better::Higher),
-    figure("core_length", "Core length at rest", "mm", 1e3, Better::Higher),
-    figure("peak_axial_force", "Largest axial force", "N", 1.0, Better::Lower),
-    figure("mean_axial_force", "Mean axial force in tissue", "N", 1.0, Better::Lower),
-    figure("largest_force_rate", "Fastest rise of force (0.1 s)", "N/s", 1.0, Better::Lower),
-    figure("peak_lateral_force", "Largest lateral force", "N", 1.0, Better::Lower),
-    figure("impulse", "Force over time", "N s", 1.0, Better::Lower),
-    figure("injury_energy", "Injury energy", "mJ", 1e3, Better::Lower),
-    figure("injury_energy.", "Injury energy", "mJ", 1e3, Better::Lower),
-    figure("dissipated_energy", "Dissipated energy", "mJ", 1e3, Better::Lower),
-    figure("dissipated_energy.", "Dissipated", "mJ", 1e3, Better::Lower),
-    figure("layer_force.", "Largest force", "N", 1.0, Better::Lower),
-    figure("separated_area", "Separated area", "mm2", 1e6, Better::Lower),
-    figure("largest_damage", "Largest damage", "", 1.0, Better::Lower),
-    figure("deepest_cut", "Deepest cut in the material", "mm", 1e3, Better::None),
-    figure("motion_smoothness", "Jerk (motion smoothness)", "mm/s2.5", 1e3, Better::Lower),
-    figure("translational_motions", "Translational motions", "", 1.0, Better::Lower),
-    figure("rotational_actions", "Rotational actions", "", 1.0, Better::Lower),
-    figure("punctures", "Tissue punctures (+-5 mm)", "", 1.0, Better::Lower),
-    figure("swept_area", "Swept area (potential damage)", "mm2", 1e6, Better::Lower),
-    figure("path_inefficiency", "Path inefficiency", "%", 100.0, Better::Lower),
-    figure("depth_perception", "Travel along the needle", "mm", 1e3, Better::Lower),
-    figure("path_length", "Path length", "mm", 1e3, Better::Lower),
-    figure("path_in_tissue", "Path in tissue", "mm", 1e3, Better::Lower),
-    figure("time_in_tissue", "Time in tissue", "s", 1.0, Better::Lower),
-    figure("elapsed_time", "Elapsed time", "s", 1.0, Better::Lower),
+    figure("overshoot", "Overshoot behind the last layer", units::MILLIMETRE, Better::Lower),
+    figure("passes", "Passes through the surface", units::ONE, Better::Lower),
+    figure("redirections", "Redirections inside tissue", units::ONE, Better::Lower),
+    figure("target_distance.", "Tip to target", units::MILLIMETRE, Better::Lower),
+    figure("target_displacement.", "Target pushed by", units::MILLIMETRE, Better::Lower),
+    figure("entry_error", "Entry point off the plan", units::MILLIMETRE, Better::Lower),
+    figure("entry_angle_error", "Entry angle off the plan", units::DEGREE, Better::Lower),
+    optional("core_mass", "Core in the bore", units::MILLIGRAM, Better::Higher),
+    optional("core_length", "Core length at rest", units::MILLIMETRE, Better::Higher),
+    figure("peak_axial_force", "Largest axial force", units::NEWTON, Better::Lower),
+    figure("mean_axial_force", "Mean axial force in tissue", units::NEWTON, Better::Lower),
+    figure("largest_force_rate", "Fastest rise of force (0.1 s)", units::NEWTON_PER_SECOND, Better::Lower),
+    figure("peak_lateral_force", "Largest lateral force", units::NEWTON, Better::Lower),
+    figure("impulse", "Force over time", units::NEWTON_SECOND, Better::Lower),
+    figure("injury_energy", "Injury energy", units::MILLIJOULE, Better::Lower),
+    figure("injury_energy.", "Injury energy", units::MILLIJOULE, Better::Lower),
+    figure("dissipated_energy", "Dissipated energy", units::MILLIJOULE, Better::Lower),
+    figure("dissipated_energy.", "Dissipated", units::MILLIJOULE, Better::Lower),
+    figure("layer_force.", "Largest force", units::NEWTON, Better::Lower),
+    optional("separated_area", "Separated area", units::SQUARE_MILLIMETRE, Better::Lower),
+    optional("largest_damage", "Largest damage", units::ONE, Better::Lower),
+    figure("deepest_cut", "Deepest cut in the material", units::MILLIMETRE, Better::None),
+    figure("motion_smoothness", "Jerk (motion smoothness)", units::SMOOTHNESS, Better::Lower),
+    figure("translational_motions", "Translational motions", units::ONE, Better::Lower),
+    figure("rotational_actions", "Rotational actions", units::ONE, Better::Lower),
+    figure("punctures", "Tissue punctures (+-5 mm)", units::ONE, Better::Lower),
+    figure("swept_area", "Swept area (potential damage)", units::SQUARE_MILLIMETRE, Better::Lower),
+    figure("path_inefficiency", "Path inefficiency", units::PERCENT, Better::Lower),
+    figure("depth_perception", "Travel along the needle", units::MILLIMETRE, Better::Lower),
+    figure("path_length", "Path length", units::MILLIMETRE, Better::Lower),
+    figure("path_in_tissue", "Path in tissue", units::MILLIMETRE, Better::Lower),
+    figure("time_in_tissue", "Time in tissue", units::SECOND, Better::Lower),
+    figure("elapsed_time", "Elapsed time", units::SECOND, Better::Lower),
 ];
 
 /// The text of a key.
@@ -143,20 +151,6 @@ pub fn bounds(least: Option<f64>, most: Option<f64>, unit: &str) -> String {
         (None, Some(most)) => format!("at most {} {unit}", short(most)),
         (None, None) => String::new(),
     }
-}
-
-/// A number with four significant digits, without an exponent where it can do without. Below a millionth of its unit it is
-/// rounding.
-pub fn short(value: f64) -> String {
-    if value.abs() < 1e-6 {
-        return "0".into();
-    }
-    if !value.is_finite() || !(1e-4..1e7).contains(&value.abs()) {
-        return format!("{value:.3e}");
-    }
-    let decimals = (3 - value.abs().log10().floor() as i32).max(0) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
 // Wrong input.

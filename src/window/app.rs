@@ -23,7 +23,7 @@ use super::marks;
 use super::panels::{self, Choices, ReferenceCurve, Wishes};
 use super::practice::{Latency, Leader, Practice, Renewed, State};
 use super::scan::{self, Scan};
-use super::scene_view::{Area, Field, SceneView};
+use super::scene_view::{Area, SceneView};
 use super::section::RestPlane;
 use super::source::Source;
 use super::texts;
@@ -35,6 +35,7 @@ use crate::ending;
 use crate::gpu::compose::{SOURCES, read_sources};
 use crate::gpu::{Gpu, Memory};
 use crate::haptic::LoopTiming;
+use crate::observables::field::{Lane, Range};
 use crate::reading;
 use crate::scene::Scene;
 use crate::session::Session;
@@ -905,14 +906,13 @@ impl Open {
     /// Brings the ends of the scale to what the field holds now.
     fn follow_range(&mut self) -> Result<()> {
         let scale = &mut self.choices.scale;
-        if !matches!(scale.field, Field::VonMises | Field::Pressure) {
+        let (Lane::Node(lane), Range::Positive(_) | Range::Signed(_)) = (scale.field.lane, scale.field.range) else {
             *scale = panels::default_scale(scale.field);
             return Ok(());
-        }
+        };
         let Some(engine) = self.practice.simulation.on_device() else { return Ok(()) };
         let Some(buffer) = engine.memory("drawn_nodes").and_then(Memory::buffer) else { return Ok(()) };
         let bytes = self.gpu.read_back(buffer)?;
-        let lane = scale.field as usize;
         let mut values: Vec<f32> =
             bytes.chunks_exact(16).map(|b| bytemuck::pod_read_unaligned::<[f32; 4]>(b)[lane].abs()).collect();
         values.sort_unstable_by(f32::total_cmp);
@@ -920,8 +920,8 @@ impl Open {
         // A scale with three digits that moves little from look to look; never below 0.1 kPa.
         let high = f64::from(values.get(at).copied().unwrap_or(0.0)).max(100.0);
         scale.high = if (high / scale.high - 1.0).abs() > 0.1 { high } else { scale.high };
-        scale.low = match scale.field {
-            Field::Pressure => -scale.high,
+        scale.low = match scale.field.range {
+            Range::Signed(_) => -scale.high,
             _ if scale.logarithmic => 0.01 * scale.high,
             _ => 0.0,
         };

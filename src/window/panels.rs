@@ -7,10 +7,11 @@ use super::appearance::{self, ColourMap, Look};
 use super::camera::{Camera, Preset};
 use super::hand::Desk;
 use super::practice::{Leader, Practice, State};
-use super::scene_view::{Field, Scale};
+use super::scene_view::Scale;
 use super::texts;
 use crate::haptic::LoopTiming;
 use crate::observables::ForceParts;
+use crate::observables::field::{Field, Range, VON_MISES};
 use crate::training::score::Score;
 
 /// What the user has chosen.
@@ -33,7 +34,7 @@ pub struct Choices {
 impl Choices {
     pub fn new(cut: Option<(usize, f64)>, pace: f64) -> Self {
         Choices {
-            scale: Scale { field: Field::VonMises, low: 0.0, high: 10e3, logarithmic: false },
+            scale: default_scale(&VON_MISES),
             automatic: true,
             cut,
             pace,
@@ -137,24 +138,24 @@ pub fn controls(
         choices.accuracy.get_or_insert_with(|| Accuracy::new(scene)).show(ui, scene, tuning, &timing, now);
     });
     ui.separator();
-    egui::ComboBox::from_label(texts::FIELD).selected_text(choices.scale.field.name()).show_ui(ui, |ui| {
-        for field in Field::ALL.into_iter().filter(|field| field.is_in(practice.scene())) {
-            if ui.selectable_label(choices.scale.field == field, field.name()).clicked() {
+    egui::ComboBox::from_label(texts::FIELD).selected_text(choices.scale.field.label).show_ui(ui, |ui| {
+        for field in Field::drawn_of(practice.scene()) {
+            if ui.selectable_label(choices.scale.field == field, field.label).clicked() {
                 choices.scale = default_scale(field);
             }
         }
     });
-    let (unit, size) = choices.scale.field.unit();
+    let unit = choices.scale.field.unit;
     ui.checkbox(&mut choices.automatic, texts::AUTOMATIC);
     ui.add_enabled_ui(!choices.automatic, |ui| {
-        let (mut low, mut high) = (choices.scale.low / size, choices.scale.high / size);
+        let (mut low, mut high) = (unit.show(choices.scale.low), unit.show(choices.scale.high));
         ui.horizontal(|ui| {
-            ui.add(egui::DragValue::new(&mut low).speed(0.1).suffix(format!(" {unit}")));
-            ui.add(egui::DragValue::new(&mut high).speed(0.1).suffix(format!(" {unit}")));
+            ui.add(egui::DragValue::new(&mut low).speed(0.1).suffix(format!(" {}", unit.word())));
+            ui.add(egui::DragValue::new(&mut high).speed(0.1).suffix(format!(" {}", unit.word())));
         });
-        (choices.scale.low, choices.scale.high) = (low * size, high.max(low + 1e-6) * size);
+        (choices.scale.low, choices.scale.high) = (unit.read(low), unit.read(high.max(low + 1e-6)));
     });
-    if matches!(choices.scale.field, Field::VonMises) {
+    if matches!(choices.scale.field.range, Range::Positive(_)) {
         ui.checkbox(&mut choices.scale.logarithmic, texts::LOGARITHMIC);
     }
     colour_bar(ui, &choices.scale, choices.look.map);
@@ -190,14 +191,8 @@ pub fn controls(
 }
 
 /// Scale that a field begins with.
-pub fn default_scale(field: Field) -> Scale {
-    let (low, high) = match field {
-        Field::VonMises => (0.0, 10e3),
-        Field::Pressure => (-10e3, 10e3),
-        Field::Stretch => (1.0, 1.5),
-        Field::Damage => (0.0, 1.0),
-        Field::Opening => (0.0, 2e-3),
-    };
+pub fn default_scale(field: &'static Field) -> Scale {
+    let (low, high) = field.range.ends();
     Scale { field, low, high, logarithmic: false }
 }
 
@@ -213,13 +208,13 @@ fn colour_bar(ui: &mut egui::Ui, scale: &Scale, map: ColourMap) {
         let cell = egui::Rect::from_min_size(egui::pos2(left, rect.top()), egui::vec2(width + 0.5, rect.height()));
         painter.rect_filled(cell, 0.0, egui::Color32::from_rgb(r, g, b));
     }
-    let (unit, size) = scale.field.unit();
+    let unit = scale.field.unit;
     let middle = if scale.logarithmic { (scale.low * scale.high).sqrt() } else { 0.5 * (scale.low + scale.high) };
     ui.columns(3, |columns| {
-        columns[0].label(format!("{:.2}", scale.low / size));
-        columns[1].vertical_centered(|ui| ui.label(format!("{:.2}", middle / size)));
+        columns[0].label(format!("{:.2}", unit.show(scale.low)));
+        columns[1].vertical_centered(|ui| ui.label(format!("{:.2}", unit.show(middle))));
         columns[2].with_layout(egui::Layout::right_to_left(egui::Align::TOP), |ui| {
-            ui.label(format!("{:.2} {unit}", scale.high / size))
+            ui.label(format!("{:.2} {}", unit.show(scale.high), unit.word()))
         });
     });
 }

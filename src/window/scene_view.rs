@@ -9,7 +9,7 @@ use super::section::{self, Outline, RestPlane, TissueCorner};
 use super::tool_shape::ToolCorner;
 use crate::gpu::{Bound, Gpu, GpuEngine};
 use crate::model::Model;
-use crate::scene::Scene;
+use crate::observables::field::Field;
 use crate::{Error, Result};
 
 const SHADER: &str = include_str!("../../shaders/render/tissue.wgsl");
@@ -17,56 +17,10 @@ const SHADER: &str = include_str!("../../shaders/render/tissue.wgsl");
 const PARTED: &str = include_str!("../../shaders/render/parted.wgsl");
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// A field that can be shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Field {
-    VonMises,
-    Pressure,
-    Stretch,
-    /// Part of the stiffness that damage and the needle's path have taken.
-    Damage,
-    /// How far faces that separate have parted.
-    Opening,
-}
-
-impl Field {
-    pub const ALL: [Field; 5] = [Field::VonMises, Field::Pressure, Field::Stretch, Field::Damage, Field::Opening];
-
-    /// Whether a scene has it.
-    pub fn is_in(self, scene: &Scene) -> bool {
-        self != Field::Opening || scene.effects.cohesive.is_some()
-    }
-
-    /// For people, with the unit of [`Field::unit`].
-    pub fn name(self) -> &'static str {
-        match self {
-            Field::VonMises => "von Mises stress",
-            Field::Pressure => "pressure",
-            Field::Stretch => "largest stretch",
-            Field::Damage => "damage",
-            Field::Opening => "opening of torn faces",
-        }
-    }
-
-    /// Unit, and its size in SI.
-    pub fn unit(self) -> (&'static str, f64) {
-        match self {
-            Field::VonMises | Field::Pressure => ("kPa", 1e3),
-            Field::Stretch | Field::Damage => ("-", 1.0),
-            Field::Opening => ("mm", 1e-3),
-        }
-    }
-
-    /// Its place in the fields of a node; beyond them the shader measures it.
-    fn lane(self) -> usize {
-        self as usize
-    }
-}
-
 /// The colour scale: ends in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
-    pub field: Field,
+    pub field: &'static Field,
     pub low: f64,
     pub high: f64,
     pub logarithmic: bool,
@@ -328,7 +282,7 @@ impl SceneView {
             range: [
                 scale.low as f32,
                 scale.high as f32,
-                scale.field.lane() as f32,
+                scale.field.lane.number().unwrap_or(0) as f32,
                 f32::from(u8::from(scale.logarithmic)),
             ],
             surface: [look.opacity, look.veil, 0.0, 0.0],

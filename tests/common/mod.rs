@@ -143,7 +143,7 @@ pub fn advance(engine: &mut dyn Engine, model: &Model, dt: f64, step: &mut u64, 
     *step += steps as u64;
     engine.start_frame(&plan).unwrap();
     let sums = engine.collect(true).unwrap().expect("a finished frame");
-    assert!(!sums.not_finite, "state out of range after step {step}");
+    assert!(!sums.health.not_finite, "state out of range after step {step}");
     sums
 }
 
@@ -298,11 +298,11 @@ pub fn pull(engine: &mut dyn Engine, model: &Model, dt: f64, frames: usize, step
             nominal: sums.reactions[Face::ZMax as usize].z / (size.x * size.y),
             lateral: [1.0 + u.x / size.x, 1.0 + u.y / size.y],
             alpha: state.points.iter().map(|p| p.plastic.alpha).fold(0.0, f64::max),
-            damage: sums.largest_damage,
+            damage: sums.health.largest_damage,
             work: last.work + sums.load_work,
-            plastic: last.plastic + sums.plastic_dissipation,
-            degradation: last.degradation + sums.damage_dissipation,
-            damping: last.damping + sums.damping_dissipation,
+            plastic: last.plastic + sums.energy.plastic,
+            degradation: last.degradation + sums.energy.damage,
+            damping: last.damping + sums.energy.damping,
             sums,
         });
     }

@@ -122,11 +122,11 @@ fn a_full_separation_takes_the_fracture_energy_on_three_meshes() {
         let dt = 0.8 * wave_speed_bound(&model);
         for (name, mut engine) in engines(&model, dt, 50) {
             let (rows, sums) = tear(engine.as_mut(), &model, dt, 50);
-            let taken: f64 = sums.iter().map(|s| s.cohesive_dissipation).sum();
+            let taken: f64 = sums.iter().map(|s| s.energy.cohesive).sum();
             let expected = law.energy * area;
             let what = format!("{name}, cells of {cell} mm");
             close(&format!("{what}: dissipation"), taken, expected, 0.01);
-            close(&format!("{what}: torn area"), sums.last().unwrap().torn_area, area, 1e-5);
+            close(&format!("{what}: torn area"), sums.last().unwrap().health.torn_area, area, 1e-5);
             // The traction that the law gives at the opening that was reached. The start of the motion sends a wave of
             // rho c v (8 % of the strength at this mass scaling) to and fro; after a tenth of the time it has died.
             let mut worst: f64 = 0.0;

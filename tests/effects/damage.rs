@@ -66,10 +66,15 @@ fn the_dissipation_does_not_depend_on_the_mesh() {
             let last = samples.last().unwrap();
             assert!((last.damage - 0.95).abs() < 1e-5, "{name}: damage {}", last.damage);
             let s = &last.sums;
-            let accounted =
-                s.elastic + s.hourglass + s.kinetic + s.half_step + last.plastic + last.degradation + last.damping;
+            let accounted = s.energy.elastic
+                + s.energy.hourglass
+                + s.energy.kinetic
+                + s.energy.half_step
+                + last.plastic
+                + last.degradation
+                + last.damping;
             at_most(&format!("{name}: imbalance"), (last.work - accounted).abs() / last.work, 1e-2);
-            assert_eq!(s.return_failures, 0);
+            assert_eq!(s.health.return_failures, 0);
         }
     }
 }
@@ -121,14 +126,19 @@ fn a_deleted_cell_carries_nothing_and_keeps_its_mass() {
     close("mass", mass, 1060.0 * 3e-9, 1e-12);
     for (name, samples) in run(&model, 1e-5, 200, 500) {
         let last = samples.last().unwrap();
-        assert_eq!(last.sums.deleted_cells, 1, "{name}");
+        assert_eq!(last.sums.health.deleted_cells, 1, "{name}");
         let stress = last.sums.reactions[Face::ZMax as usize].x / 1e-6;
         assert!(stress.abs() < 2.0, "{name}: {stress} Pa");
         let s = &last.sums;
-        let accounted =
-            s.elastic + s.hourglass + s.kinetic + s.half_step + last.plastic + last.degradation + last.damping;
+        let accounted = s.energy.elastic
+            + s.energy.hourglass
+            + s.energy.kinetic
+            + s.energy.half_step
+            + last.plastic
+            + last.degradation
+            + last.damping;
         at_most(&format!("{name}: imbalance"), (last.work - accounted).abs() / last.work, 1e-2);
-        assert_eq!(s.inverted_cells, 0, "{name}");
+        assert_eq!(s.health.inverted_cells, 0, "{name}");
     }
 }
 

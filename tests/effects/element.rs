@@ -248,14 +248,14 @@ fn cell_measures_of_both_engines_agree() {
         cpu.write_state(&state).unwrap();
         let found = advance(&mut gpu, &model, dt, &mut 0, 1);
         let expected = advance(&mut cpu, &model, dt, &mut 0, 1);
-        close("elastic energy", found.elastic, expected.elastic, 1e-5);
-        close("hourglass energy", found.hourglass, expected.hourglass, 1e-5);
-        at_most("J", (found.min_j - expected.min_j).abs(), 1e-5);
-        at_most("corner J", (found.min_corner_j - expected.min_corner_j).abs(), 1e-5);
-        assert_eq!(found.inverted_cells, expected.inverted_cells);
-        assert_eq!(found.inverted_cell.is_some(), expected.inverted_cell.is_some());
+        close("elastic energy", found.energy.elastic, expected.energy.elastic, 1e-5);
+        close("hourglass energy", found.energy.hourglass, expected.energy.hourglass, 1e-5);
+        at_most("J", (found.health.min_j - expected.health.min_j).abs(), 1e-5);
+        at_most("corner J", (found.health.min_corner_j - expected.health.min_corner_j).abs(), 1e-5);
+        assert_eq!(found.health.inverted_cells, expected.health.inverted_cells);
+        assert_eq!(found.health.inverted_cell.is_some(), expected.health.inverted_cell.is_some());
         if amplitude > 0.7 {
-            assert!(found.inverted_cells > 0);
+            assert!(found.health.inverted_cells > 0);
         }
     }
 }

@@ -68,7 +68,7 @@ fn check_coulomb(name: &str, sums: &FrameSums, mu: f64) {
         "{name}: {sideways:e} of {:e}",
         sums.spreading_impulse
     );
-    assert!(sums.friction_dissipation >= -1e-6 * sideways * 1e-3, "{name}: {:e}", sums.friction_dissipation);
+    assert!(sums.energy.friction >= -1e-6 * sideways * 1e-3, "{name}: {:e}", sums.energy.friction);
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn a_sliding_block_stops_where_coulomb_says() {
                     let now = steps.min(500);
                     let sums = advance(engine, &model, DT, step, now);
                     check_coulomb(name, &sums, mu);
-                    *lost += sums.friction_dissipation + sums.contact_dissipation;
+                    *lost += sums.energy.friction + sums.energy.contact_damping;
                     steps -= now;
                 }
             };
@@ -217,9 +217,9 @@ fn shaft_friction_opposes_the_motion_and_only_dissipates() {
     let mut last = Vec::new();
     for (name, mut engine) in engines(&model, dt, 50) {
         let frames = frames(engine.as_mut(), &model, dt);
-        let scale: f64 = frames.iter().map(|f| f.friction_dissipation).sum();
+        let scale: f64 = frames.iter().map(|f| f.energy.friction).sum();
         assert!(scale > 0.0, "{name}");
-        let least = frames.iter().map(|f| f.friction_dissipation).fold(0.0, f64::min);
+        let least = frames.iter().map(|f| f.energy.friction).fold(0.0, f64::min);
         assert!(least >= -1e-9 * scale, "{name}: {least:e} of {scale:e}");
         // On the way in the tissue is dragged along, after the stick springs have turned it is dragged back.
         let way_in = frames.iter().map(|f| f.friction_impulse).fold(0.0, f64::max);

@@ -41,7 +41,11 @@ fn a_column_settles_under_its_weight() {
             let top = state.displacement.last().unwrap().z;
             // Lumped masses give the exact nodal value of the continuous column.
             close(&format!("{name}, S = {factor}, settlement"), top, expected, 0.01);
-            let audit = sums.elastic + sums.hourglass + sums.kinetic + sums.half_step + sums.damping_dissipation;
+            let audit = sums.energy.elastic
+                + sums.energy.hourglass
+                + sums.energy.kinetic
+                + sums.energy.half_step
+                + sums.energy.damping;
             close(&format!("{name}, S = {factor}, work of the weight"), sums.load_work, audit, 0.01);
         }
     }
@@ -90,15 +94,19 @@ fn in_free_fall_the_work_is_the_kinetic_energy() {
                 let sums = advance(engine.as_mut(), &model, dt, &mut step, steps);
                 work += sums.load_work;
                 // The true mass falls; the kinetic energy is that of the scaled one, which falls slower.
-                close(&format!("{name}, S = {factor}, after {step} steps"), work, sums.kinetic, allowed);
-                assert!(sums.elastic < 1e-3 * work, "{name}: {} J in a block that falls freely", sums.elastic);
+                close(&format!("{name}, S = {factor}, after {step} steps"), work, sums.energy.kinetic, allowed);
+                assert!(
+                    sums.energy.elastic < 1e-3 * work,
+                    "{name}: {} J in a block that falls freely",
+                    sums.energy.elastic
+                );
             }
             // What was booked goes on over a stop.
             let image = engine.save().unwrap();
             engine.restore(&image).unwrap();
             let sums = advance(engine.as_mut(), &model, dt, &mut step, 5);
             work += sums.load_work;
-            close(&format!("{name}, S = {factor}, after a stop"), work, sums.kinetic, allowed);
+            close(&format!("{name}, S = {factor}, after a stop"), work, sums.energy.kinetic, allowed);
         }
     }
 }

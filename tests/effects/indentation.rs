@@ -45,10 +45,15 @@ fn force_at_rest(model: &Arc<Model>) -> Vec<(&'static str, f64)> {
         for _ in 0..frames {
             sums = advance(engine.as_mut(), model, dt, &mut step, steps);
             work += sums.tool_work;
-            damped += sums.damping_dissipation + sums.contact_dissipation;
+            damped += sums.energy.damping + sums.energy.contact_damping;
         }
-        assert!(sums.kinetic < 1e-4 * sums.elastic, "{name}: not at rest");
-        let audit = sums.elastic + sums.hourglass + sums.kinetic + sums.half_step + sums.contact_energy + damped;
+        assert!(sums.energy.kinetic < 1e-4 * sums.energy.elastic, "{name}: not at rest");
+        let audit = sums.energy.elastic
+            + sums.energy.hourglass
+            + sums.energy.kinetic
+            + sums.energy.half_step
+            + sums.energy.contact_stored
+            + damped;
         at_most(&format!("{name}, energy gap over the work"), (work - audit).abs() / work, 0.02);
         let force = sums.impulse.z / (steps as f64 * dt);
         at_most(

@@ -58,7 +58,7 @@ fn every_law_in_its_kernel() {
             );
             // Ogden's energy is a difference of powers near 1: strains of 0.2 % leave four digits of it.
             let allowed = if amplitude < 0.01 { 3e-4 } else { 3e-5 };
-            close("elastic energy", found.elastic, expected.elastic, allowed);
+            close("elastic energy", found.energy.elastic, expected.energy.elastic, allowed);
         }
         // One wrong constant is seen.
         scene.material.law.bulk_modulus *= 1.001;
@@ -152,13 +152,13 @@ fn regions_and_all_effects_together() {
         let found = advance(&mut gpu, &model, dt, &mut a, 20);
         let expected = advance(&mut cpu, &model, dt, &mut b, 20);
         for (total, s) in totals.iter_mut().zip([&found, &expected]) {
-            total[0] += s.plastic_dissipation;
-            total[1] += s.damage_dissipation;
-            total[2] = s.viscous_dissipation;
+            total[0] += s.energy.plastic;
+            total[1] += s.energy.damage;
+            total[2] = s.energy.viscous;
         }
-        close("elastic energy", found.elastic, expected.elastic, 1e-3);
-        assert_eq!((found.return_failures, expected.return_failures), (0, 0));
-        at_most("damage", (found.largest_damage - expected.largest_damage).abs(), 1e-3);
+        close("elastic energy", found.energy.elastic, expected.energy.elastic, 1e-3);
+        assert_eq!((found.health.return_failures, expected.health.return_failures), (0, 0));
+        at_most("damage", (found.health.largest_damage - expected.health.largest_damage).abs(), 1e-3);
     }
     for (name, i) in [("plastic", 0), ("damage", 1), ("viscous", 2)] {
         assert!(totals[1][i] > 0.0, "{name}: nothing happened");

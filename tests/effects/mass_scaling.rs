@@ -41,7 +41,7 @@ fn a_factor_of_one_changes_nothing_at_small_strain() {
                 state.velocity.iter_mut().for_each(|v| *v = random.vector() * 1e-2);
                 engine.write_state(&state).unwrap();
                 let sums = advance(engine.as_mut(), model, dt, &mut 0, 300);
-                assert_eq!(sums.raised_mass, 0, "{name}");
+                assert_eq!(sums.health.raised_mass, 0, "{name}");
                 (name, engine.read_state().unwrap())
             })
             .collect::<Vec<_>>()
@@ -58,7 +58,12 @@ fn static_reaction(engine: &mut dyn Engine, model: &Model, dt: f64, steps: usize
     for _ in 0..4 {
         sums = advance(engine, model, dt, &mut step, steps / 4);
     }
-    assert!(sums.kinetic < 1e-6 * sums.elastic, "not at rest: {:e} of {:e}", sums.kinetic, sums.elastic);
+    assert!(
+        sums.energy.kinetic < 1e-6 * sums.energy.elastic,
+        "not at rest: {:e} of {:e}",
+        sums.energy.kinetic,
+        sums.energy.elastic
+    );
     let forces = engine.internal_forces().unwrap();
     let top = model.mesh.block().nodes()[2] - 1;
     let on_top = forces.iter().enumerate().filter(|(n, _)| model.mesh.block().node_coordinates(*n)[2] == top);
@@ -110,13 +115,15 @@ fn squeezed_cells_get_the_mass_that_keeps_them_stable() {
         state.displacement.iter_mut().for_each(|u| *u += random.vector() * 1e-6);
         engine.write_state(&state).unwrap();
         let start = advance(engine.as_mut(), &model, dt, &mut 0, 1);
-        assert!(start.raised_mass > 0, "{name}");
+        assert!(start.health.raised_mass > 0, "{name}");
         let end = advance(engine.as_mut(), &model, dt, &mut 1, 2000);
-        let (before, after) =
-            (start.elastic + start.kinetic + start.hourglass, end.elastic + end.kinetic + end.hourglass);
+        let (before, after) = (
+            start.energy.elastic + start.energy.kinetic + start.energy.hourglass,
+            end.energy.elastic + end.energy.kinetic + end.energy.hourglass,
+        );
         println!(
             "{name}: energy {before:.3e} -> {after:.3e} J, {} raised masses, {} clamped",
-            end.raised_mass, end.clamped_nodes
+            end.health.raised_mass, end.health.clamped_nodes
         );
         assert!(after < 1.05 * before, "{name}: energy {before:e} -> {after:e}");
     }
@@ -163,8 +170,8 @@ fn the_inertia_of_a_sheared_block_stays_within_its_bound_with_auto() {
         let (mut kinetic, mut internal, mut step) = (0.0, 0.0, 0);
         for _ in 0..20 {
             let sums = advance(engine.as_mut(), &model, dt, &mut step, steps / 20);
-            kinetic += sums.kinetic;
-            internal += sums.elastic + sums.hourglass;
+            kinetic += sums.energy.kinetic;
+            internal += sums.energy.elastic + sums.energy.hourglass;
         }
         at_most(&format!("{name}: inertia"), kinetic / internal, 0.05);
     }

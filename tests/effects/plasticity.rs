@@ -68,12 +68,13 @@ fn the_energy_of_flow_is_accounted_for() {
     for (name, samples) in runs(1.5, plasticity::Params { yield_stress: 6.0e3, hardening: 8.0e3 }) {
         let last = samples.last().unwrap();
         let s = &last.sums;
-        let accounted = s.elastic + s.hourglass + s.kinetic + s.half_step + last.plastic + last.damping;
+        let accounted =
+            s.energy.elastic + s.energy.hourglass + s.energy.kinetic + s.energy.half_step + last.plastic + last.damping;
         println!("{name}: work {:.4e} J, of it plastic {:.4e} J", last.work, last.plastic);
         assert!(last.plastic > 0.3 * last.work);
         at_most(&format!("{name}: imbalance"), (last.work - accounted).abs() / last.work, 2e-3);
         assert!(samples.windows(2).all(|w| w[1].plastic >= w[0].plastic), "{name}: flow gave energy back");
-        assert_eq!(samples.iter().map(|s| s.sums.return_failures).sum::<u32>(), 0);
+        assert_eq!(samples.iter().map(|s| s.sums.health.return_failures).sum::<u32>(), 0);
     }
 }
 

@@ -80,11 +80,11 @@ fn the_tip_waits_for_the_puncture_force_and_never_goes_back() {
         for pair in frames.windows(2) {
             assert!(pair[1].tip_coordinate >= pair[0].tip_coordinate, "{name}: the tip went back");
         }
-        let scale: f64 = frames.iter().map(|f| f.tip_dissipation).sum();
+        let scale: f64 = frames.iter().map(|f| f.energy.tip).sum();
         for f in &frames {
-            assert!(f.tip_dissipation >= -1e-9 * scale, "{name}: {:e}", f.tip_dissipation);
-            assert!(f.softening_dissipation >= -1e-9 * scale, "{name}: {:e}", f.softening_dissipation);
-            assert_eq!(f.inverted_cells, 0, "{name}");
+            assert!(f.energy.tip >= -1e-9 * scale, "{name}: {:e}", f.energy.tip);
+            assert!(f.energy.softening >= -1e-9 * scale, "{name}: {:e}", f.energy.softening);
+            assert_eq!(f.health.inverted_cells, 0, "{name}");
         }
         // Steady cutting: the tip force is F_cut.
         let steady: Vec<f64> =
@@ -139,8 +139,8 @@ fn both_engines_see_the_same_first_millimetres() {
     at_most("difference of the forces over the largest", worst, 0.02);
     for (what, pick) in [
         ("tool work", (|f: &FrameSums| f.tool_work) as fn(&FrameSums) -> f64),
-        ("tip dissipation", |f| f.tip_dissipation),
-        ("softening dissipation", |f| f.softening_dissipation),
+        ("tip dissipation", |f| f.energy.tip),
+        ("softening dissipation", |f| f.energy.softening),
     ] {
         let total = |run: &[FrameSums]| run.iter().map(pick).sum::<f64>();
         close(what, total(gpu), total(cpu), 0.02);
@@ -157,18 +157,25 @@ fn the_energy_account_of_an_insertion_closes() {
         let lost: f64 = frames
             .iter()
             .map(|f| {
-                f.damping_dissipation
-                    + f.contact_dissipation
-                    + f.tip_dissipation
-                    + f.cap_dissipation
-                    + f.softening_dissipation
-                    + f.raised_mass_energy
-                    + f.speed_limit_energy
-                    + f.friction_dissipation
+                f.energy.damping
+                    + f.energy.contact_damping
+                    + f.energy.tip
+                    + f.energy.advance_cap
+                    + f.energy.softening
+                    + f.energy.raised_mass
+                    + f.energy.speed_limit
+                    + f.energy.friction
             })
             .sum();
         let end = frames.last().unwrap();
-        let gap = (work - lost - end.elastic - end.hourglass - end.kinetic - end.half_step - end.contact_energy) / work;
+        let gap = (work
+            - lost
+            - end.energy.elastic
+            - end.energy.hourglass
+            - end.energy.kinetic
+            - end.energy.half_step
+            - end.energy.contact_stored)
+            / work;
         println!("{name}: work {work:.3e} J, gap {gap:.4}");
         at_most(&format!("{name}, energy gap over the work"), gap.abs(), 0.02);
     }
@@ -239,13 +246,14 @@ fn the_tip_leaves_through_a_free_bottom() {
         for f in &frames {
             work += f.tool_work;
             largest = largest.max(work.abs());
-            assert!(f.tip_dissipation >= -1e-9 && f.softening_dissipation >= -1e-9);
-            lost += f.damping_dissipation + f.contact_dissipation + f.tip_dissipation + f.softening_dissipation;
-            let gap = work - lost - f.elastic - f.hourglass - f.kinetic - f.contact_energy;
+            assert!(f.energy.tip >= -1e-9 && f.energy.softening >= -1e-9);
+            lost += f.energy.damping + f.energy.contact_damping + f.energy.tip + f.energy.softening;
+            let gap = work - lost - f.energy.elastic - f.energy.hourglass - f.energy.kinetic - f.energy.contact_stored;
             worst = worst.max(-gap);
         }
         let end = frames.last().unwrap();
-        let gap = work - lost - end.elastic - end.hourglass - end.kinetic - end.contact_energy;
+        let gap =
+            work - lost - end.energy.elastic - end.energy.hourglass - end.energy.kinetic - end.energy.contact_stored;
         println!("{name}: out in frame {out} of {}, work {work:.3e} J, gap {:.4}", frames.len(), gap / largest);
         at_most(&format!("{name}, energy created over the work"), worst / largest, 0.02);
         ends.push((out, work));

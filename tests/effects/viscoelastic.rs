@@ -127,12 +127,16 @@ fn relaxation_dissipates_and_the_account_closes() {
         let mut worst: f64 = 0.0;
         for s in &samples[1..] {
             let sums = &s.sums;
-            let accounted =
-                sums.elastic + sums.hourglass + sums.kinetic + sums.half_step + sums.viscous_dissipation + s.damping;
+            let accounted = sums.energy.elastic
+                + sums.energy.hourglass
+                + sums.energy.kinetic
+                + sums.energy.half_step
+                + sums.energy.viscous
+                + s.damping;
             worst = worst.max((s.work - accounted).abs() / largest);
         }
         at_most(&format!("{name}: imbalance"), worst, 2e-3);
-        let viscous: Vec<f64> = samples.iter().map(|s| s.sums.viscous_dissipation).collect();
+        let viscous: Vec<f64> = samples.iter().map(|s| s.sums.energy.viscous).collect();
         assert!(viscous.windows(2).all(|w| w[1] >= w[0] - 1e-4 * largest), "{name}: energy came back: {viscous:?}");
         assert!(viscous.last().unwrap() > &(0.1 * largest), "{name}: {:?} of {largest}", viscous.last());
         // Held at the end: about half of the stress is left.

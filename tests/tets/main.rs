@@ -316,15 +316,15 @@ fn both_engines_take_the_same_steps() {
             relative_difference(&states[0].velocity, &states[1].velocity),
             1e-3,
         );
-        close(&format!("{what}, elastic energy"), found.elastic, expected.elastic, 1e-3);
-        close(&format!("{what}, kinetic energy"), found.kinetic, expected.kinetic, 1e-3);
-        at_most(&format!("{what}, J"), (found.min_j - expected.min_j).abs(), 1e-4);
-        assert_eq!(found.inverted_cells, expected.inverted_cells);
+        close(&format!("{what}, elastic energy"), found.energy.elastic, expected.energy.elastic, 1e-3);
+        close(&format!("{what}, kinetic energy"), found.energy.kinetic, expected.energy.kinetic, 1e-3);
+        at_most(&format!("{what}, J"), (found.health.min_j - expected.health.min_j).abs(), 1e-4);
+        assert_eq!(found.health.inverted_cells, expected.health.inverted_cells);
         if what == "all effects" {
-            close("plastic dissipation", found.plastic_dissipation, expected.plastic_dissipation, 0.01);
-            close("damage dissipation", found.damage_dissipation, expected.damage_dissipation, 0.01);
-            close("viscous dissipation", found.viscous_dissipation, expected.viscous_dissipation, 0.01);
-            close("largest damage", found.largest_damage, expected.largest_damage, 0.01);
+            close("plastic dissipation", found.energy.plastic, expected.energy.plastic, 0.01);
+            close("damage dissipation", found.energy.damage, expected.energy.damage, 0.01);
+            close("viscous dissipation", found.energy.viscous, expected.energy.viscous, 0.01);
+            close("largest damage", found.health.largest_damage, expected.health.largest_damage, 0.01);
         }
     }
 }
@@ -423,8 +423,8 @@ fn the_energy_of_a_free_vibration_stays() {
         displaced(engine.as_mut(), &model, |x| DVec3::new(5.0 * x.z * x.z, 0.0, 0.0));
         let mut step = 0;
         let energy = |sums: &FrameSums| {
-            assert_eq!(sums.clamped_nodes, 0);
-            sums.elastic + sums.kinetic + sums.half_step
+            assert_eq!(sums.health.clamped_nodes, 0);
+            sums.energy.elastic + sums.energy.kinetic + sums.energy.half_step
         };
         // Of the second step: nothing moves yet in the first.
         let sums = advance(engine.as_mut(), &model, dt, &mut step, 2);
@@ -433,8 +433,8 @@ fn the_energy_of_a_free_vibration_stays() {
         for _ in 0..20 {
             let sums = advance(engine.as_mut(), &model, dt, &mut step, 500);
             worst = worst.max((energy(&sums) / first - 1.0).abs());
-            least_kinetic = least_kinetic.min(sums.kinetic / first);
-            most_kinetic = most_kinetic.max(sums.kinetic / first);
+            least_kinetic = least_kinetic.min(sums.energy.kinetic / first);
+            most_kinetic = most_kinetic.max(sums.energy.kinetic / first);
         }
         println!("{name}: {step} steps of {:.2} us, kinetic share {least_kinetic:.2} to {most_kinetic:.2}", dt * 1e6);
         at_most(&format!("{name}, drift of the energy"), worst, 0.01);
@@ -460,12 +460,12 @@ fn reactions_of_driven_faces_and_their_work() {
         for _ in 0..frames {
             last = advance(engine.as_mut(), &model, dt, &mut step, 20);
             work += last.load_work;
-            damped += last.damping_dissipation;
+            damped += last.energy.damping;
             for (sum, r) in impulse.iter_mut().zip(last.reactions) {
                 *sum += r;
             }
         }
-        let stored = last.elastic + last.kinetic + last.half_step + damped;
+        let stored = last.energy.elastic + last.energy.kinetic + last.energy.half_step + damped;
         println!("{name}: work {work:.6e} J, found again {stored:.6e} J, reactions {:?}", last.reactions);
         close(&format!("{name}, work of the face against energy"), stored, work, 0.01);
         let state = engine.read_state().unwrap();
@@ -526,8 +526,8 @@ fn slivers_run_with_a_short_step() {
         for _ in 0..4 {
             last = advance(engine.as_mut(), &model, dt, &mut step, 500);
         }
-        assert_eq!(last.clamped_nodes, 0);
-        let energy = |s: &FrameSums| s.elastic + s.kinetic + s.half_step;
+        assert_eq!(last.health.clamped_nodes, 0);
+        let energy = |s: &FrameSums| s.energy.elastic + s.energy.kinetic + s.energy.half_step;
         close(&format!("{name}, energy"), energy(&last), energy(&first), 0.01);
     }
 }

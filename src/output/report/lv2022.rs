@@ -11,6 +11,7 @@ use crate::output::page::{document, escape, figure, numbers, picture, table, wor
 use crate::output::plot::{Area, Mark, Plot, legend_dot, legend_line, legend_row, legend_swatch};
 use crate::output::summary::Status;
 use crate::scene::Scene;
+use crate::units::trimmed;
 use crate::{Error, Result};
 
 /// Folder of the scenes in the repository.
@@ -900,13 +901,6 @@ fn bounds(values: &[f64]) -> (f64, f64) {
 fn percent_off(fraction: f64) -> String {
     let text = format!("{:+.1}", 100.0 * fraction);
     format!("{} %", if matches!(text.as_str(), "-0.0" | "+0.0") { "0.0" } else { &text })
-}
-
-/// Up to six digits, without those that a conversion of units adds.
-fn trimmed(value: f64) -> String {
-    let text = format!("{value:.6}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
 }
 
 /// `2, 5 and 10`.

@@ -5,9 +5,9 @@ use super::super::file::*;
 use super::{Check, MM, Within, parameters};
 use crate::effects::mass_scaling::Loading;
 use crate::effects::{self, EFFECTS, EffectSet, TissueMaterial};
-use crate::material::four_digits;
 use crate::needle::beam::{BeamParams, Section};
 use crate::needle::{Motion, NeedleShape, Tool};
+use crate::units::four_digits;
 
 impl Check<'_> {
     pub(super) fn effects(

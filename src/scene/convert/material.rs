@@ -6,10 +6,9 @@ use super::super::tissue_preset::TissuePreset;
 use super::{Check, KPA, MM, Within, library};
 use crate::effects::TissueMaterial;
 use crate::material::law::{constants, owners};
-use crate::material::{
-    ElasticLaw, Isochoric, LawWord, NeoHookean, Verdict, describe_verdict, four_digits, ripple_growth_time,
-};
+use crate::material::{ElasticLaw, Isochoric, LawWord, NeoHookean, Verdict, describe_verdict, ripple_growth_time};
 use crate::reading;
+use crate::units::four_digits;
 
 /// Young's modulus above which a material is no soft tissue [Pa].
 const LARGEST_TISSUE_MODULUS: f64 = 10.0e6;

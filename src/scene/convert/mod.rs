@@ -26,13 +26,14 @@ use missing::{refusal, unreadable};
 use super::document::{Document, Problems, closest};
 use super::file::*;
 use super::*;
-use crate::material::four_digits;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::needle::Phase;
 use crate::reading::{self, Unread};
+use crate::units;
+use crate::units::four_digits;
 
-const MM: f64 = 1e-3;
-const KPA: f64 = 1e3;
+const MM: f64 = units::MILLIMETRE.si;
+const KPA: f64 = units::KILOPASCAL.si;
 
 /// Distance that the path keeps from the sides and the bottom of the block [m].
 const PATH_MARGIN: f64 = 1.0e-3;

@@ -9,7 +9,7 @@ use super::super::tissue_preset::TissuePreset;
 use super::{Check, KPA, MM, Within};
 use crate::effects::puncture::Cutting;
 use crate::effects::{self, EffectSet, TissueMaterial, damage, fibres, plasticity, viscoelastic};
-use crate::material::four_digits;
+use crate::units::four_digits;
 
 /// The plastic displacement that Lv et al. 2022 print without a unit, read as mm [m].
 const PRINTED_FAILURE_DISPLACEMENT: f64 = 4e-9;

@@ -9,9 +9,9 @@ use super::mesh::list_tags;
 use super::parameters::{all_materials, cutting, damage_limit, preset_cutting, written_cutting};
 use super::{Check, MM, Within};
 use crate::effects::{EffectSet, TissueMaterial};
-use crate::material::four_digits;
 use crate::mesh::{Mesh, TetMesh, Tissue};
 use crate::needle::Tool;
+use crate::units::four_digits;
 
 /// Most regions of a scene: the shaders hold 16 materials, and one is the tissue's own.
 const LARGEST_REGION_COUNT: usize = 15;

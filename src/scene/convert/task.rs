@@ -6,6 +6,7 @@ use super::super::file::{CylinderTable, GoalKind, GoalTable, SceneFile, SphereSh
 use super::super::{Goal, Obstacle, Target, Task};
 use super::{Check, MM, Within};
 use crate::needle::Tool;
+use crate::units;
 
 /// Most goals of a task: more cannot be kept in mind with a needle in the hand.
 const LARGEST_GOAL_COUNT: usize = 16;
@@ -13,8 +14,8 @@ const LARGEST_GOAL_COUNT: usize = 16;
 /// Longest name [characters]: it is a part of the names of files.
 const LONGEST_NAME: usize = 80;
 
-const MILLIGRAM: f64 = 1e-6;
-const MM3: f64 = 1e-9;
+const MILLIGRAM: f64 = units::MILLIGRAM.si;
+const MM3: f64 = units::CUBIC_MILLIMETRE.si;
 
 /// Keys that a goal may have beside its kind.
 fn keys(kind: GoalKind) -> &'static [&'static str] {

@@ -5,9 +5,9 @@ use glam::DVec3;
 use super::super::file::*;
 use super::super::needles;
 use super::{Check, MM, Within};
-use crate::material::four_digits;
 use crate::needle::motion::Placement;
 use crate::needle::{BoreShape, Motion, NeedleShape, Phase, TipShape, Tool, Vibration};
+use crate::units::four_digits;
 
 impl Check<'_> {
     pub(super) fn tool(&mut self, file: &SceneFile) -> Option<Tool> {
