@@ -103,6 +103,7 @@ impl GpuEngine {
             .map(|stage| gpu.kernels.compiled(&gpu.device, stage, &defines, &numbers, gpu.texels))
             .collect::<Result<Vec<Arc<Compiled>>>>()?;
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        compiled.iter().try_for_each(|kernel| binds_few(kernel))?;
         let mut buffers = BTreeMap::new();
         let mut bytes = 0;
         for binding in compiled.iter().flat_map(|r| &r.bindings) {
@@ -139,8 +140,10 @@ impl GpuEngine {
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
         let sums = arrays::all()
-            .filter(|array| array.life == Life::Result)
-            .filter_map(|array| buffers.get(array.name).map(|b| (array.name, 0, b.size())));
+            .filter(|array| array.add.is_some())
+            .filter_map(|array| Some((array, buffers.get(array.name)?.size())))
+            .map(|(array, size)| (array.name, (array.told_from)(&source), size))
+            .map(|(name, from, size)| (name, from, size - from));
         // Of the displacements only those around the targets.
         let corners = model.targets.iter().flat_map(|target| target.nodes).map(|node| {
             let size = size_of::<[i32; 4]>() as u64;
@@ -414,6 +417,19 @@ impl GpuEngine {
             kernel.encode(pass, offset);
         }
     }
+}
+
+/// Refuses a stage that binds more arrays than a portable device does: with many effects and one of the program's own.
+fn binds_few(kernel: &Compiled) -> Result<()> {
+    let most = wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize;
+    let count = kernel.bindings.iter().filter(|b| b.kind == BindingKind::Storage).count();
+    if count <= most {
+        return Ok(());
+    }
+    Err(Error::input(
+        format!("the stage {} would bind {count} arrays, a portable device binds {most}", kernel.stage.name()),
+        "remove one of the effects that remember something in a cell, or the regions, or use --engine cpu",
+    ))
 }
 
 /// Asks for a mapping; the flag becomes 1 when it is there, 2 when it failed.
