@@ -15,6 +15,7 @@
 #[macro_use]
 pub mod terminal;
 
+#[cfg(feature = "cli")]
 pub mod commands;
 pub mod cpu;
 pub mod docs;
@@ -46,6 +47,7 @@ pub mod stability;
 pub mod study;
 pub mod training;
 pub mod units;
+#[cfg(feature = "cli")]
 pub mod untrusted;
 pub mod verdict;
 pub mod whole_file;
