@@ -51,6 +51,7 @@ pub mod verdict;
 pub mod whole_file;
 #[cfg(feature = "window")]
 pub mod window;
+pub mod within;
 
 // What a program that embeds the library needs first.
 pub use effects::TissueMaterial;
