@@ -150,3 +150,79 @@ macro_rules! parameters {
 }
 
 pub(crate) use parameters;
+
+#[cfg(test)]
+mod tests {
+    use super::Table;
+    use crate::units::{MILLIMETRE, ONE};
+    use crate::within::Within::{Between, Positive};
+
+    parameters! {
+        /// A table of a test.
+        pub struct MadeUpTable;
+        /// In SI.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Params;
+        "made_up": _numbers => None;
+
+        /// A length [mm].
+        length_mm: MILLIMETRE, Positive(10.0) =>
+        /// A length [m].
+        length = 2e-3, slider("length", [0.1, 1.0], "test").logarithmic();
+
+        /// A word.
+        key word: Option<String>;
+        /// What the word and a share make.
+        field both: [f64; 2] = [0.5, 0.25];
+
+        /// A share of both.
+        share: ONE, Between(0.0, 1.0) =>
+        in params: params.both[1];
+    }
+
+    #[test]
+    fn all_of_a_key_follows_from_its_entry() {
+        let table: MadeUpTable = toml::from_str("length_mm = 4\nword = \"a\"").unwrap();
+        assert_eq!(table.word.as_deref(), Some("a"));
+        assert_eq!(table.over(Params::default()), Params { length: 4e-3, both: [0.5, 0.25] });
+        let share = MadeUpTable { share: Some(0.75), ..Default::default() };
+        assert_eq!(share.over(Params::default()), Params { length: 2e-3, both: [0.5, 0.75] });
+        assert_eq!(MadeUpTable::KEYS.iter().map(|key| key.key).collect::<Vec<_>>(), ["length_mm", "share"]);
+        let [slider] = PARAMETERS else { panic!("one slider") };
+        assert_eq!((slider.key, slider.unit, slider.logarithmic), ("made_up.length_mm", "mm", true));
+        let refused = toml::from_str::<MadeUpTable>("lenth_mm = 4").unwrap_err().to_string();
+        assert!(refused.contains("`length_mm`, `word`, `share`"), "{refused}");
+        let schema = serde_json::to_value(schemars::schema_for!(MadeUpTable)).unwrap();
+        assert_eq!(schema["properties"]["length_mm"]["description"], "A length [mm].");
+        assert_eq!(present(&crate::effects::Numbers { effects: &Default::default(), material: &tissue() }), None);
+    }
+
+    fn tissue() -> crate::effects::TissueMaterial {
+        crate::effects::TissueMaterial::preset("across-fibre").unwrap()
+    }
+
+    /// The keys whose default is outside of what is accepted.
+    fn wrong<T: Table<Params: Default>>() -> Vec<&'static str> {
+        let mut default = T::Params::default();
+        let accepted = |key: &super::Key<T>, value: f64| key.within.holds(value / key.unit.si);
+        let keys = T::KEYS.iter();
+        keys.filter_map(|key| (!accepted(key, *(key.place)(&mut default))).then_some(key.key)).collect()
+    }
+
+    #[test]
+    fn every_default_is_accepted() {
+        use crate::effects::*;
+        let wrong = [
+            wrong::<adhesion::AdhesionTable>(),
+            wrong::<cohesive::CohesiveTable>(),
+            wrong::<damage::DamageTable>(),
+            wrong::<fibres::FibresTable>(),
+            wrong::<flexible_needle::FlexibleNeedleTable>(),
+            wrong::<friction::FrictionTable>(),
+            wrong::<indentation::IndentationTable>(),
+            wrong::<plasticity::PlasticityTable>(),
+            wrong::<puncture::PunctureTable>(),
+        ];
+        assert_eq!(wrong.concat(), [""; 0]);
+    }
+}
