@@ -46,16 +46,16 @@ struct FreeCell {
 @group(3) @binding(12) var<storage, read_write> free_cells: array<FreeCell>;
 
 // Constants of src/needle/free_path.rs.
-const SAMPLES: f32 = 4.0;
-const SLACK: f32 = 0.2e-3;
-const TURNING: f32 = 0.3e-3;
-const MARKED_BEHIND: f32 = 0.5;
-const LOOK_AHEAD: f32 = 1.05;
-const PASSED_MARGIN: f32 = 0.05e-3;
-const WATCHED: f32 = 1.5;
-const SLIP_CAP: f32 = 22e-6;
-const SOFTENING_RATE: f32 = 1.5;
-const END_FADE: f32 = 0.25;
+#const SAMPLES
+#const SLACK
+#const TURNING
+#const MARKED_BEHIND
+#const LOOK_AHEAD
+#const PASSED_MARGIN
+#const WATCHED
+#const SLIP_CAP
+#const SOFTENING_RATE
+#const END_FADE
 
 // Place of an anchor in the tip's plane, along `across` and along T x `across` [m].
 fn anchor_offset(anchor: u32) -> vec2<f32> {

@@ -112,13 +112,17 @@ struct PathCell {
 // Remaining stiffness per cell, 1 = intact.
 @group(3) @binding(0) var<storage, read_write> cell_stiffness: array<f32>;
 
-// Constants of src/effects/puncture.rs [m].
-const FIRST_ADVANCE: f32 = 5e-6;
-const LARGEST_ADVANCE: f32 = 22e-6;
+// Constants of src/effects/puncture.rs.
+#const FIRST_ADVANCE
+#const LARGEST_ADVANCE
+#const LEAST_TRAVELS
+#const MOST_TRAVELS
+#const LEAST_STRETCH
+#const MOST_STRETCH
 
 // How far the tip may advance in a step in which the needle travels `travel` [m]; `first`: it is still at the surface.
 fn advance_limit(first: bool, travel: f32) -> f32 {
-    return min(max(select(LARGEST_ADVANCE, FIRST_ADVANCE, first), 1.25 * travel), 4.0 * travel);
+    return min(max(select(LARGEST_ADVANCE, FIRST_ADVANCE, first), LEAST_TRAVELS * travel), MOST_TRAVELS * travel);
 }
 
 // Part of the tip force that is above the threshold.
@@ -143,16 +147,20 @@ fn rate_factor(speed: f32) -> f32 {
     return select(pow(ratio, puncture.rate_exponent), 1.0, puncture.rate_exponent == 0.0);
 }
 
+// Threshold of the tip force at `way` [m] behind the entry of a material with the forces y and z, see `segments` [N].
+fn material_threshold(forces: vec4<f32>, way: f32) -> f32 {
+    let entry = max(0.0, 1.0 - way / forces.w);
+    return forces.z + (forces.y - forces.z) * entry;
+}
+
 // Threshold of the tip force at material coordinate a of a needle that moves at `speed` [N].
 fn tip_threshold(a: f32, speed: f32) -> f32 {
     var segment = puncture.segments[0];
     for (var i = 1u; i < 16u; i++) {
         segment = select(segment, puncture.segments[i], puncture.segments[i].x <= a);
     }
-    let entry = max(0.0, 1.0 - (a - segment.x) / segment.w);
-    let rate = rate_factor(speed);
     let left = clamp((puncture.exit - a) / puncture.transition_length, 0.0, 1.0);
-    return (segment.z + (segment.y - segment.z) * entry) * left * rate;
+    return material_threshold(segment, a - segment.x) * left * rate_factor(speed);
 }
 
 // 1 where the material at coordinate a is a membrane, else 0.

@@ -10,6 +10,6 @@ struct NodeCures {
 }
 
 // Steps are unstable beyond 1; raised masses have 0.81.
-const WATCHED_STEP_RATIO: f32 = 0.85;
+#const WATCHED_STEP_RATIO
 
 @group(2) @binding(3) var<storage, read_write> node_cures: array<NodeCures>;

@@ -154,7 +154,7 @@ fn move_tip() {
     sway -= t * dot(sway, t);
     old_sway = sway;
     let direction = free_tip.along.xyz;
-    let stretch = clamp(dot(fx * direction.x + fy * direction.y + fz * direction.z, t), 0.2, 3.0);
+    let stretch = clamp(dot(fx * direction.x + fy * direction.y + fz * direction.z, t), LEAST_STRETCH, MOST_STRETCH);
 
     // What lies just ahead: farther than a sample that the tip's plane has marked.
     let X = free_tip.place.xyz;
@@ -171,14 +171,13 @@ fn move_tip() {
     let material = select(free_tip.material, free_cells[cell].material, known);
     var entry = select(free_tip.entry, free_tip.coordinate, material != free_tip.material);
     let forces = puncture.segments[material];
-    let fading = max(0.0, 1.0 - (free_tip.coordinate - entry) / forces.w);
     let speed = length(step_input.velocity.xyz);
-    let threshold = select((forces.z + (forces.y - forces.z) * fading) * rate_factor(speed), 0.0, open);
+    let threshold = select(material_threshold(forces, free_tip.coordinate - entry) * rate_factor(speed), 0.0, open);
 
     let at_surface = free_tip.coordinate == 0.0;
     let travel = (speed + puncture.needle_radius * length(angular_velocity())) * params.dt;
     let cap = advance_limit(at_surface, travel);
-    let slip_cap = 4.0 * travel + SLIP_CAP;
+    let slip_cap = MOST_TRAVELS * travel + SLIP_CAP;
     let advance = clamp((force - threshold) / (puncture.tip_stiffness * stretch), 0.0, cap);
     capped = select(NO_CAP, threshold, advance == cap);
     let retreat = clamp((-SLACK - gap) / stretch, 0.0, slip_cap);

@@ -105,7 +105,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         var advance = 0.0;
         if (excess > 0.0) {
             let cap = advance_limit(before == 0.0, speed * params.dt);
-            let lambda = clamp(stretch / f32(ANCHOR_COUNT), 0.2, 3.0);
+            let lambda = clamp(stretch / f32(ANCHOR_COUNT), LEAST_STRETCH, MOST_STRETCH);
             advance = min(excess / (puncture.tip_stiffness * lambda), cap);
             capped = advance == cap;
         }

@@ -3,15 +3,15 @@
 use glam::{DMat3, DVec3};
 
 use super::CpuEngine;
-use crate::effects::puncture::{advance_limit, share_beyond};
+use crate::effects::puncture::{
+    advance_limit, bounded_stretch, retreat, share_beyond, slip_limit, sway_beyond, tip_advance,
+};
 use crate::engine::elements::CORNERS;
 use crate::material::kinematics::cofactor;
 use crate::mesh::BlockMesh;
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
 use crate::needle::ToolPose;
-use crate::needle::free_path::{
-    FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SLACK, SLIP_CAP, SOFTENING_RATE, TURNING, anchor_offset,
-};
+use crate::needle::free_path::{FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SOFTENING_RATE, TURNING, anchor_offset};
 
 /// A material point in the deformed mesh.
 struct MaterialPlace {
@@ -132,7 +132,7 @@ impl CpuEngine {
         if tip.inside {
             let f = before.gradient;
             let direction = tip.along;
-            let stretch = (f * direction).dot(t).clamp(0.2, 3.0);
+            let stretch = bounded_stretch((f * direction).dot(t));
             // What lies just ahead: farther than a sample that the tip's plane has marked.
             let (cell, _, width) = grid_place(mesh, within_block(mesh, tip.place));
             let samples = SAMPLES as f64;
@@ -149,26 +149,22 @@ impl CpuEngine {
                 (tip.material, tip.entry) = (material, tip.coordinate);
             }
             let cutting = free.cuttings[material];
-            let fading = (1.0 - (tip.coordinate - tip.entry) / p.transition_length).max(0.0);
             let threshold = match open {
                 true => 0.0,
                 false => {
-                    let force = cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * fading;
-                    force * p.rate_factor(pose.velocity.length())
+                    cutting.threshold(tip.coordinate - tip.entry, p.transition_length)
+                        * p.rate_factor(pose.velocity.length())
                 }
             };
             let travel = (pose.velocity.length() + radius * pose.angular_velocity.length()) * self.dt;
             let cap = advance_limit(tip.coordinate == 0.0, travel);
-            let slip_cap = 4.0 * travel + SLIP_CAP;
-            let advance = ((force - threshold) / (p.tip_stiffness * stretch)).clamp(0.0, cap);
+            let slip_cap = slip_limit(travel);
+            let advance = tip_advance(force, threshold, p.tip_stiffness, stretch, cap);
             if advance == cap {
                 capped = threshold;
             }
-            let retreat = ((-SLACK - before.mean_gap) / stretch).clamp(0.0, slip_cap);
-            let sway = before.sway.length();
-            let held = threshold.min(force) / p.tip_stiffness;
-            let excess = if sway > held { before.sway * (1.0 - held / sway) } else { DVec3::ZERO };
-            let mut slip = pulled_back(f, excess);
+            let retreat = retreat(before.mean_gap, stretch, slip_cap);
+            let mut slip = pulled_back(f, sway_beyond(before.sway, force, threshold, p.tip_stiffness));
             if slip.length() > slip_cap {
                 slip *= slip_cap / slip.length();
             }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::{ContactSums, CpuEngine};
+use crate::effects::friction::stick_or_slide;
 use crate::effects::indentation::{Plan, penetration};
 use crate::engine::State;
 use crate::model::{ContactNode, Model};
@@ -49,20 +50,12 @@ impl CpuEngine {
                 if let Some(friction) = model.effects.friction {
                     let n = sums.normal.normalize_or_zero();
                     let kt = friction.stiffness_ratio * k;
-                    let trial = memory.stick + (v - n * v.dot(n)) * dt;
-                    let trial = trial - n * trial.dot(n);
-                    let length = trial.length();
-                    let allowed = friction.coefficient * points.pressing / kt;
-                    // Without contact the spring lets go.
-                    let stick = match memory.touching {
-                        true if length <= allowed => trial,
-                        true => trial * (allowed / length),
-                        false => DVec3::ZERO,
-                    };
-                    sums.friction_work = 0.5 * kt * (memory.stick + stick).dot(trial - stick);
-                    memory.stick = stick;
-                    sums.friction = stick * -kt;
-                    sums.stored += 0.5 * kt * stick.length_squared();
+                    let motion = (v - n * v.dot(n)) * dt;
+                    let stick = stick_or_slide(memory.stick, motion, n, kt, friction.coefficient * points.pressing);
+                    memory.stick = stick.stretch;
+                    sums.friction = stick.force;
+                    sums.friction_work = stick.dissipated;
+                    sums.stored += stick.stored;
                 }
                 sums.torque += (x - pose.tip).cross(sums.friction);
             }

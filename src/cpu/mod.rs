@@ -13,6 +13,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::effects::adhesion::Bond;
+use crate::effects::mass_scaling::stable_mass;
 use crate::engine::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use crate::engine::{
     ContactState, Engine, EngineImage, EngineInfo, FrameEnergies, FramePlan, FrameSums, LARGEST_DISPLACEMENT, State,
@@ -248,14 +249,8 @@ impl CpuEngine {
                 force += load;
                 let share = if copies.len() > 1 { model.node_mass[node] / scaled } else { 1.0 };
                 let mut sums = NodeSums::default();
-                let mut mass = scaled;
-                if selective {
-                    let needed = bound * dt * dt / (4.0 * 0.81);
-                    if needed > scaled {
-                        mass = needed.min(100.0 * scaled);
-                        sums.raised = 1;
-                    }
-                }
+                let mass = if selective { stable_mass(scaled, bound, dt) } else { scaled };
+                sums.raised = u32::from(mass > scaled);
                 let ratio = bound * dt * dt / (4.0 * mass);
                 sums.step_ratio = if ratio > WATCHED_STEP_RATIO { ratio } else { 0.0 };
                 let old = *v;

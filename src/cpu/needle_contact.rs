@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::slit_contact::SlitContact;
 use super::{ContactSums, CpuEngine};
+use crate::effects::friction::{part_on_shaft, stick_or_slide};
 use crate::engine::{ContactState, State};
 use crate::model::{ANCHOR_COUNT, ContactSurface, PuncturePlan};
 use crate::needle::centre_line::Bend;
@@ -147,23 +148,18 @@ impl CpuEngine {
                 self.added_bound[node] += 2.0 * k * steep * steep * nearness;
                 memory.on_shaft = depth > 0.0 && s >= cone;
                 let fade = model.effects.friction.map_or(1.0, |f| f.fade_length);
-                let rubs = ((s - cone) / fade).clamp(0.0, 1.0);
+                let rubs = part_on_shaft(s, cone, fade);
                 sums.torque = relative.cross(sums.normal);
                 bend_power += sums.normal.dot(bend.rate);
                 grip = Some((n, v, coefficient * rubs * normal, k));
             }
             if let (Some((n, v, limit, k)), Some(friction)) = (grip, model.effects.friction) {
                 let kt = friction.stiffness_ratio * k;
-                let trial = memory.stick + (v - n * v.dot(n)) * self.dt;
-                let trial = trial - n * trial.dot(n);
-                let length = trial.length();
-                let allowed = limit / kt;
-                let stick = if length > allowed { trial * (allowed / length) } else { trial };
-                // Mean friction force of the last step times slip.
-                sums.friction_work = 0.5 * kt * (memory.stick + stick).dot(trial - stick);
-                memory.stick = stick;
-                sums.friction = stick * -kt;
-                sums.stored += 0.5 * kt * memory.stick.length_squared();
+                let stick = stick_or_slide(memory.stick, (v - n * v.dot(n)) * self.dt, n, kt, limit);
+                memory.stick = stick.stretch;
+                sums.friction = stick.force;
+                sums.friction_work = stick.dissipated;
+                sums.stored += stick.stored;
             }
             memory.stored = sums.stored;
             let total = sums.tip + sums.normal + sums.friction;

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::effects::friction::part_on_shaft;
 use crate::model::{ContactNode, Model, PuncturePlan};
 use crate::needle::ToolPose;
 use crate::needle::centre_line::{Bend, CentreLine};
@@ -86,7 +87,7 @@ impl SlitContact<'_> {
                 if s >= self.profile.tip_length {
                     sum.on_shaft += force;
                 }
-                sum.rubbing += w[0] * normal * ((s - self.profile.tip_length) / fade).clamp(0.0, 1.0);
+                sum.rubbing += w[0] * normal * part_on_shaft(s, self.profile.tip_length, fade);
                 sum.stored += w[0] * 0.5 * k * overlap.value * overlap.value;
                 sum.damping += n * (w[0] * (normal - elastic));
                 sum.bend_power += force.dot(bend.rate);

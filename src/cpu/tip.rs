@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::CpuEngine;
 use crate::effects::adhesion::{self, Bond};
-use crate::effects::puncture::{self, advance_limit};
+use crate::effects::puncture::{self, advance_limit, bounded_stretch, tip_advance};
 use crate::engine::elements::{CORNERS, CellStates};
 use crate::mesh::BlockMesh;
 use crate::model::PuncturePlan;
@@ -82,7 +82,7 @@ impl CpuEngine {
         if force > threshold {
             let lambda = anchors.iter().map(|p| p.stretch).sum::<f64>() / count;
             let cap = advance_limit(a == 0.0, speed * self.dt);
-            let advance = ((force - threshold) / (p.tip_stiffness * lambda.clamp(0.2, 3.0))).min(cap);
+            let advance = tip_advance(force, threshold, p.tip_stiffness, bounded_stretch(lambda), cap);
             self.state.tip_coordinate = a + advance;
             let before = anchors;
             anchors = place(&self.state.displacement, a + advance);

@@ -7,10 +7,47 @@
 //! force step for every layer of nodes that the base passes. A regularisation by `tanh` would creep and
 //! cannot stick. Source: Wriggers 2006, ch. 5 (return mapping); coefficient 0.3: Lv2022, section 3.2.
 
+use glam::DVec3;
+
 use super::parameters::parameters;
 use super::{Effect, Kind};
 use crate::units::{MILLIMETRE, ONE};
 use crate::within::Within::{NotNegative, Positive};
+
+/// What the stick spring of a contact does in one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stick {
+    /// Its stretch g after the step [m].
+    pub stretch: DVec3,
+    /// Force on the tissue [N].
+    pub force: DVec3,
+    /// Dissipated by sliding in the step, and stored after it [J].
+    pub dissipated: f64,
+    pub stored: f64,
+}
+
+/// Return mapping of the stick spring with the stiffness `k_t` [N/m]: the stretch `old` [m] and the motion `v dt` [m] of the tissue
+/// past the tool, `motion`, in the plane normal to `n`; beyond the largest friction `limit`, mu N [N], it slides. A spring without
+/// a normal force lets go.
+pub fn stick_or_slide(old: DVec3, motion: DVec3, n: DVec3, kt: f64, limit: f64) -> Stick {
+    let trial = old + motion;
+    let trial = trial - n * trial.dot(n);
+    let (length, allowed) = (trial.length(), limit / kt);
+    let stretch = if length > allowed { trial * (allowed / length) } else { trial };
+    Stick {
+        stretch,
+        force: stretch * -kt,
+        // Mean friction force of the last step and this one times slip.
+        dissipated: 0.5 * kt * (old + stretch).dot(trial - stretch),
+        stored: 0.5 * kt * stretch.length_squared(),
+    }
+}
+
+/// Part of the coefficient that acts at `s` [m] behind the tip: none on the tip of the length `tip_length` [m], growing over `fade`
+/// [m] behind it.
+pub fn part_on_shaft(s: f64, tip_length: f64, fade: f64) -> f64 {
+    ((s - tip_length) / fade).clamp(0.0, 1.0)
+}
 
 pub const EFFECT: Effect = Effect {
     key: "friction",

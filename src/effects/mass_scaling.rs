@@ -33,6 +33,20 @@ const PARAMETERS: [Parameter; 1] = [Parameter::new(
 )
 .logarithmic()];
 
+/// Ratio `k dt^2 / (4 m)` of a node whose mass is raised: a step of 0.9 times the stable one (dimensionless).
+pub const RAISED_STEP_RATIO: f64 = 0.81;
+
+/// Most by which the mass of a node is raised (dimensionless).
+pub const MOST_RAISED: f64 = 100.0;
+
+/// What the shaders have of this file.
+pub const SHADER_CONSTANTS: [(&str, f64); 2] = [("RAISED_STEP_RATIO", RAISED_STEP_RATIO), ("MOST_RAISED", MOST_RAISED)];
+
+/// Mass m* of a node in one step of `dt` [s]: its own [kg], raised where the bound `bound` of its stiffness [N/m] asks for it.
+pub fn stable_mass(mass: f64, bound: f64, dt: f64) -> f64 {
+    (bound * dt * dt / (4.0 * RAISED_STEP_RATIO)).max(mass).min(MOST_RAISED * mass)
+}
+
 /// Largest ratio of tool speed to scaled shear wave speed that `auto` allows, and beyond which a scene is told that inertia will show
 /// (dimensionless).
 pub const AUTO_MACH: f64 = 0.03;

@@ -34,12 +34,14 @@
 //! (src/needle/free_path.rs). Source: this project; F_cut = G_c w with the toughness of liver under needles, 76 to 185 J/m^2 [Azar2008],
 //! 164 J/m^2 [Gokgol2012].
 
+use glam::DVec3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::parameter::Parameter;
 use super::parameters::parameters;
 use super::{Effect, Kind, Numbers};
+use crate::needle::free_path::{SLACK, SLIP_CAP};
 use crate::units::{MILLIMETRE, MILLIMETRE_PER_SECOND, NEWTON, NEWTON_PER_MILLIMETRE, OF_CRITICAL, ONE};
 use crate::within::Within::{Between, NotNegative, Positive};
 
@@ -49,11 +51,79 @@ use crate::within::Within::{Between, NotNegative, Positive};
 pub const FIRST_ADVANCE: f64 = 5e-6;
 pub const LARGEST_ADVANCE: f64 = 22e-6;
 
+/// The same in ways that the needle travels in the step: the tip may always go the first, and never more than the second.
+pub const LEAST_TRAVELS: f64 = 1.25;
+pub const MOST_TRAVELS: f64 = 4.0;
+
+/// Bounds of lambda, the stretch of the material lines at the tip: a tip in squeezed or torn cells neither leaps nor stands.
+pub const LEAST_STRETCH: f64 = 0.2;
+pub const MOST_STRETCH: f64 = 3.0;
+
+/// What the shaders have of this file.
+pub const SHADER_CONSTANTS: [(&str, f64); 6] = [
+    ("FIRST_ADVANCE", FIRST_ADVANCE),
+    ("LARGEST_ADVANCE", LARGEST_ADVANCE),
+    ("LEAST_TRAVELS", LEAST_TRAVELS),
+    ("MOST_TRAVELS", MOST_TRAVELS),
+    ("LEAST_STRETCH", LEAST_STRETCH),
+    ("MOST_STRETCH", MOST_STRETCH),
+];
+
 /// How far the tip may advance in a step in which the needle travels `travel` [m]; `first`: it is still at the surface. At most four
 /// times that way: a faster tip would leave nodes inside the needle. A stab travels more than [`LARGEST_ADVANCE`] in a step.
 pub fn advance_limit(first: bool, travel: f64) -> f64 {
     let least = if first { FIRST_ADVANCE } else { LARGEST_ADVANCE };
-    least.max(1.25 * travel).min(4.0 * travel)
+    least.max(LEAST_TRAVELS * travel).min(MOST_TRAVELS * travel)
+}
+
+/// How far the tip advances in a step, da [m], under the force F and the threshold F_c [N]: as far as its springs are too long,
+/// `(F - F_c)/(k_tip lambda)`, at most `cap` [m]. `tip_stiffness`: k_tip [N/m]; `stretch`: lambda, within its bounds.
+pub fn tip_advance(force: f64, threshold: f64, tip_stiffness: f64, stretch: f64, cap: f64) -> f64 {
+    ((force - threshold) / (tip_stiffness * stretch)).max(0.0).min(cap)
+}
+
+/// Stretch lambda of the material lines at the tip, as the tip law takes it.
+pub fn bounded_stretch(stretch: f64) -> f64 {
+    stretch.clamp(LEAST_STRETCH, MOST_STRETCH)
+}
+
+/// How far a tip on a free path may slip sideways or draw back in a step in which the needle travels `travel` [m]
+/// (src/needle/free_path.rs).
+pub fn slip_limit(travel: f64) -> f64 {
+    MOST_TRAVELS * travel + SLIP_CAP
+}
+
+/// How far a tip on a free path draws back in its own track [m], `(-SLACK - <g_k>)/lambda`, at most `cap` [m]. `gap`: mean gap
+/// <g_k> of the tip springs [m]; `stretch`: lambda, within its bounds.
+pub fn retreat(gap: f64, stretch: f64, cap: f64) -> f64 {
+    ((-SLACK - gap) / stretch).clamp(0.0, cap)
+}
+
+/// The part of the sway l [m] that is too long: the tissue holds the tip with min(F, F_c), so with `k_tip |l|` at most.
+pub fn sway_beyond(sway: DVec3, force: f64, threshold: f64, tip_stiffness: f64) -> DVec3 {
+    let (length, held) = (sway.length(), threshold.min(force) / tip_stiffness);
+    if length > held { sway * (1.0 - held / length) } else { DVec3::ZERO }
+}
+
+/// Part of the threshold that is left at `ahead` [m] before the end of the material: over the last transition length it fades to
+/// nothing, since a spring that ended at once would throw the tissue back.
+pub fn left_before_exit(ahead: f64, transition_length: f64) -> f64 {
+    (ahead / transition_length).clamp(0.0, 1.0)
+}
+
+impl Cutting {
+    /// Threshold F_c [N] at `way` [m] behind the entry a_0 of the material: from F_pun down to F_cut over the transition length
+    /// l_p [m]. Without the rate ([`Params::rate_factor`]) and the end of the material ([`left_before_exit`]).
+    pub fn threshold(&self, way: f64, transition_length: f64) -> f64 {
+        let entry = (1.0 - way / transition_length).max(0.0);
+        self.cutting_force + (self.puncture_force - self.cutting_force) * entry
+    }
+
+    /// The same material as a membrane: F_pun [N] from the energy W [J] that its puncture takes beyond that of cutting,
+    /// `F_cut + 2 W/l`, over the length l [m].
+    pub fn of_membrane(self, energy: f64, length: f64) -> Self {
+        Cutting { puncture_force: self.cutting_force + 2.0 * energy / length, ..self }
+    }
 }
 
 /// Largest puncture force over the section of the needle that tissue bears, as part of Young's modulus E: a sharp needle enters at

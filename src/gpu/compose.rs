@@ -1,25 +1,35 @@
-//! The text composer of the shaders: `#import`, `#ifdef`, `#ifndef`, `#else`, `#endif`, `#for`, `#end`.
+//! The text composer of the shaders: `#import`, `#ifdef`, `#ifndef`, `#else`, `#endif`, `#for`, `#end`, `#const`.
 //!
 //! A file is included once, where it is first imported. `#for law ... #end` repeats its lines for every elastic law whose key is
 //! among the defines, in the order of [`LAWS`]: `$law` is its key, `$number` its place; `#for invariant law` and `#for stretch law`
 //! are those of one [`Form`]. So the dispatch stands in WGSL, once for all laws. `#for own ... #end` does the same for the effects that
 //! a program brings along ([`OwnEffect`]): `$own` is the key, `$count` how many there are, and `own/<key>` the file that the effect
-//! holds. Unknown files, names and stray directives are
-//! errors. Compiler messages are mapped back to file and line.
+//! holds. `#const NAME` declares a number of [`CONSTANTS`], which the laws in f64 have too. Unknown files, names and stray
+//! directives are errors. Compiler messages are mapped back to file and line.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
+use crate::effects;
 use crate::effects::own::OwnEffect;
+use crate::engine::WATCHED_STEP_RATIO;
 use crate::error::{Error, Result};
 use crate::material::law::Form;
 use crate::material::{LAWS, Law};
-use crate::reading;
+use crate::{needle, reading};
 
 // Every shader file by its path under `shaders/`, without extension: `SOURCES: &[(&str, &str)]`, written by build.rs.
 include!(concat!(env!("OUT_DIR"), "/shader_sources.rs"));
+
+/// Numbers that stand in the Rust sources alone, by the files that own them: `#const NAME` is `const NAME: f32 = value;`.
+pub const CONSTANTS: [&[(&str, f64)]; 4] = [
+    &effects::puncture::SHADER_CONSTANTS,
+    &needle::free_path::SHADER_CONSTANTS,
+    &effects::mass_scaling::SHADER_CONSTANTS,
+    &[("WATCHED_STEP_RATIO", WATCHED_STEP_RATIO)],
+];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
 pub const SCENE_DEFINES: [&str; 16] = [
@@ -287,6 +297,15 @@ fn include(
                     return fail(file, number, "stray #endif".into());
                 }
             }
+            "const" if active => match CONSTANTS.iter().copied().flatten().find(|(name, _)| *name == argument) {
+                Some((name, value)) => {
+                    // All digits of the f64: the compiler of WGSL rounds it as it would a number that stands there.
+                    out.source.push_str(&format!("const {name}: f32 = {value:?};\n"));
+                    out.origin.push((file, number));
+                }
+                None => return fail(file, number, format!("unknown number `{argument}` in #const")),
+            },
+            "const" => {}
             other => return fail(file, number, format!("unknown directive #{other}")),
         }
     }
@@ -301,36 +320,51 @@ mod tests {
     use super::*;
 
     const FILES: &[(&str, &str)] = &[
-        ("a", "#import b\n#import b\nlet a = 1;\n#ifdef PUNCTURE\nlet p = 1;\n#else\nlet q = 1;\n#endif\n"),
-        ("b", "let b = 1;\n"),
+        ("x/a", "#import x/b\n#import x/b\nlet a = 1;\n#ifdef PUNCTURE\nlet p = 1;\n#else\nlet q = 1;\n#endif\n"),
+        ("x/b", "let b = 1;\n"),
         ("stray", "#endif\n"),
         ("open", "#ifdef PUNCTURE\n"),
         ("name", "#ifdef PUNCTUER\n#endif\n"),
         ("word", "#include b\n"),
         ("missing", "\n#import nowhere\n"),
-        ("laws", "#for law\nlet $law = $number;\n#end\n#for stretch law\n#import b\n#end\n"),
+        ("x/laws", "#for law\nlet $law = $number;\n#end\n#for stretch law\n#import x/b\n#end\n"),
         ("list", "#for effect\n#end\n"),
         ("endless", "\n#for law\n"),
         ("end", "#end\n"),
+        ("constant", "#const SLACK\n#ifdef PUNCTURE\n#const TURNING\n#endif\n"),
+        ("number", "#const SLAK\n"),
     ];
 
     #[test]
     fn imports_once_and_maps_lines() {
-        let composed = compose_from(FILES, "a", &Defines::default()).unwrap();
+        let composed = compose_from(FILES, "x/a", &Defines::default()).unwrap();
         assert_eq!(composed.source, "let b = 1;\nlet a = 1;\nlet q = 1;\n");
-        assert_eq!(composed.place(1), "shaders/b.wgsl:1");
-        assert_eq!(composed.place(3), "shaders/a.wgsl:7");
-        let composed = compose_from(FILES, "a", &Defines::from(["PUNCTURE"])).unwrap();
+        assert_eq!(composed.place(1), "shaders/x/b.wgsl:1");
+        assert_eq!(composed.place(3), "shaders/x/a.wgsl:7");
+        let composed = compose_from(FILES, "x/a", &Defines::from(["PUNCTURE"])).unwrap();
         assert!(composed.source.contains("let p") && !composed.source.contains("let q"));
     }
 
     #[test]
     fn lines_are_repeated_for_the_laws_of_the_scene() {
-        let composed = compose_from(FILES, "laws", &Defines::from(["yeoh", "mooney_rivlin"])).unwrap();
+        let composed = compose_from(FILES, "x/laws", &Defines::from(["yeoh", "mooney_rivlin"])).unwrap();
         assert_eq!(composed.source, "let mooney_rivlin = 1u;\nlet yeoh = 2u;\n");
-        assert_eq!([composed.place(1), composed.place(2)], ["shaders/laws.wgsl:2", "shaders/laws.wgsl:2"]);
-        let composed = compose_from(FILES, "laws", &Defines::from(["ogden"])).unwrap();
+        assert_eq!([composed.place(1), composed.place(2)], ["shaders/x/laws.wgsl:2", "shaders/x/laws.wgsl:2"]);
+        let composed = compose_from(FILES, "x/laws", &Defines::from(["ogden"])).unwrap();
         assert_eq!(composed.source, "let ogden = 3u;\nlet b = 1;\n");
+    }
+
+    #[test]
+    fn numbers_come_from_the_rust_sources() {
+        let composed = compose_from(FILES, "constant", &Defines::default()).unwrap();
+        assert_eq!(composed.source, "const SLACK: f32 = 0.0002;\n");
+        assert_eq!(composed.place(1), "shaders/constant.wgsl:1");
+        let names: Vec<&str> = CONSTANTS.iter().copied().flatten().map(|(name, _)| *name).collect();
+        assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len(), "one name, one number: {names:?}");
+        for name in names {
+            let asked = SOURCES.iter().any(|(_, text)| text.lines().any(|l| l.trim() == format!("#const {name}")));
+            assert!(asked, "no shader asks for {name}");
+        }
     }
 
     #[test]
@@ -344,6 +378,7 @@ mod tests {
             ("list", "list.wgsl:1: unknown list `effect` in #for"),
             ("endless", "endless.wgsl:2: #for without #end"),
             ("end", "unknown directive #end"),
+            ("number", "unknown number `SLAK` in #const"),
         ] {
             let error = compose_from(FILES, root, &Defines::default()).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");

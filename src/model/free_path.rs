@@ -79,11 +79,9 @@ impl Model {
         let count = std::array::from_fn(|a| high[a].saturating_sub(low[a]));
         let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
         let cutting = |m: &TissueMaterial| {
-            let mut cutting = m.cutting.unwrap_or(own);
-            if let Some(energy) = m.membrane_energy {
-                cutting.puncture_force = cutting.cutting_force + 2.0 * energy / params.transition_length;
-            }
-            cutting
+            let cutting = m.cutting.unwrap_or(own);
+            // How thick a layer is along the path is not known.
+            m.membrane_energy.map_or(cutting, |energy| cutting.of_membrane(energy, params.transition_length))
         };
         let cuttings = std::iter::once(&self.scene.material).chain(self.scene.regions.iter().map(|r| &r.material));
         let path = PlannedPath { entry: motion.entry, direction: motion.direction };

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{ContactNode, ContactSurface, FreePlan, Model};
 use crate::effects::puncture;
-use crate::effects::puncture::Cutting;
+use crate::effects::puncture::{Cutting, left_before_exit};
 use crate::mesh::{BlockMesh, Bore};
 use crate::needle::gap::Profile;
 use crate::needle::slit::REFERENCE_EDGE;
@@ -92,14 +92,12 @@ impl PuncturePlan {
         self.ring_stiffness_per_volume * contact.share * weight
     }
 
-    /// Tip force at which the tip advances at the coordinate a [N]: from F_pun of the material that it enters down to
-    /// F_cut over the transition length; over the last transition length before the bottom it fades to nothing, since a spring
-    /// that ended at once would throw the tissue back.
+    /// Tip force at which a slow tip advances at the coordinate a [N]: the law of the material that it is in, faded before the
+    /// bottom.
     pub fn threshold(&self, a: f64) -> f64 {
         let PathSegment { start, cutting, transition_length, .. } = self.segment(a);
-        let entry = (1.0 - (a - start) / transition_length).max(0.0);
-        let left = ((self.exit - a) / self.params.transition_length).clamp(0.0, 1.0);
-        (cutting.cutting_force + (cutting.puncture_force - cutting.cutting_force) * entry) * left
+        let left = left_before_exit(self.exit - a, self.params.transition_length);
+        cutting.threshold(a - start, transition_length) * left
     }
 
     /// The stretch of the path at the coordinate a [m].
@@ -232,7 +230,7 @@ fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, e
             let mut transition_length = params.transition_length;
             if let Some(energy) = material.membrane_energy {
                 transition_length = transition_length.min(end - start);
-                cutting.puncture_force = cutting.cutting_force + 2.0 * energy / transition_length;
+                cutting = cutting.of_membrane(energy, transition_length);
             }
             PathSegment { start, cutting, transition_length, membrane: material.membrane_energy.is_some() }
         })

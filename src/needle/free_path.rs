@@ -69,6 +69,20 @@ pub const SOFTENING_RATE: f64 = 1.5;
 /// Length over which the overlap fades at the front end of what a node touches, in tip lengths.
 pub const END_FADE: f64 = 0.25;
 
+/// What the shaders have of this file.
+pub const SHADER_CONSTANTS: [(&str, f64); 10] = [
+    ("SAMPLES", SAMPLES as f64),
+    ("SLACK", SLACK),
+    ("TURNING", TURNING),
+    ("MARKED_BEHIND", MARKED_BEHIND),
+    ("LOOK_AHEAD", LOOK_AHEAD),
+    ("PASSED_MARGIN", PASSED_MARGIN),
+    ("WATCHED", WATCHED),
+    ("SLIP_CAP", SLIP_CAP),
+    ("SOFTENING_RATE", SOFTENING_RATE),
+    ("END_FADE", END_FADE),
+];
+
 /// The overlap of a node at `s` behind the tip, faded over `length` [m] behind `end` [m]; `d` is the gradient of s.
 pub fn faded_at_end(overlap: Overlap, d: DVec3, s: f64, end: f64, length: f64) -> Overlap {
     let part = ((s - end) / length).min(1.0);

@@ -519,7 +519,11 @@ fn a_broken_stage_names_file_and_line() {
         let place = composed.place(index + 1);
         let (file, number) = place.strip_prefix("shaders/").unwrap().split_once(".wgsl:").unwrap();
         let text = SOURCES.iter().find(|s| s.0 == file).unwrap().1;
-        assert_eq!(text.lines().nth(number.parse::<usize>().unwrap() - 1).unwrap(), line, "{place}");
+        let written = text.lines().nth(number.parse::<usize>().unwrap() - 1).unwrap();
+        match written.strip_prefix("#const ") {
+            Some(name) => assert!(line.starts_with(&format!("const {name}: f32 = ")), "{place}: {line}"),
+            None => assert_eq!(written, line, "{place}"),
+        }
     }
     // A define without the others that belong to it: `driven_faces` then names a step input that nobody imported.
     let error = reflect(Stage::IntegrateNodes, &Defines::from(["DRIVEN_FACES"]), false).err().unwrap().to_string();
