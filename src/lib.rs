@@ -47,7 +47,6 @@ pub mod stability;
 pub mod study;
 pub mod training;
 pub mod units;
-#[cfg(feature = "cli")]
 pub mod untrusted;
 pub mod verdict;
 pub mod whole_file;

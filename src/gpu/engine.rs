@@ -14,11 +14,10 @@ use super::arrays::{
 use super::device::Gpu;
 use super::kernel::{BindingKind, Compiled, Kernel};
 use super::layout::Layout;
-use super::memory::Memory;
+use super::memory::{Memory, allocate};
 use super::pace::Pace;
 use super::plan::{Features, defines, measure_threads, mesh_numbers, stages, threads};
 use super::structs::StepInput;
-use super::texels::{Texels, texel_numbers};
 use crate::engine::{Engine, EngineImage, EngineInfo, FramePlan, FrameSums, Health, Stage, State, foreign_image};
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
@@ -458,45 +457,6 @@ fn await_mapping(gpu: &Gpu, mapped: &AtomicU8) -> Result<()> {
 fn moment(nodes: impl Iterator<Item = (DVec3, DVec3)>, model: &Model, dt: f64) -> DVec3 {
     let sum: DVec3 = nodes.zip(&model.node_mass).map(|((u, v), m)| (u - v * (0.5 * dt)) * *m).sum();
     sum / model.mass_scaling()
-}
-
-fn allocate(gpu: &Gpu, name: &str, contents: &Contents, kinds: &[BindingKind]) -> Result<Memory> {
-    let size = match contents {
-        Contents::Bytes(bytes) => bytes.len() as u64,
-        Contents::Zeros(size) => *size,
-    }
-    .next_multiple_of(4)
-    .max(4);
-    let limit = gpu.device.limits().max_storage_buffer_binding_size.min(Texels::LARGEST);
-    if size > limit {
-        return Err(Error::input(
-            format!(
-                "the mesh is too fine: buffer `{name}` would need {:.0} MiB, a portable device binds {:.0} MiB",
-                size as f64 / 1048576.0,
-                limit as f64 / 1048576.0
-            ),
-            "choose a larger cell_size_mm or a smaller block, or --engine cpu",
-        ));
-    }
-    let memory = if kinds.iter().any(|kind| matches!(kind, BindingKind::Texels | BindingKind::Sampled)) {
-        Memory::Texels(Texels::new(&gpu.device, name, size, texel_numbers(name)))
-    } else {
-        let usage = |kind: &BindingKind| match kind {
-            BindingKind::Uniform => wgpu::BufferUsages::UNIFORM,
-            _ => wgpu::BufferUsages::STORAGE,
-        };
-        let copied = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
-        Memory::Buffer(gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(name),
-            size,
-            usage: kinds.iter().map(usage).fold(copied, |all, usage| all | usage),
-            mapped_at_creation: false,
-        }))
-    };
-    if let Contents::Bytes(bytes) = contents {
-        memory.write(&gpu.queue, bytes);
-    }
-    Ok(memory)
 }
 
 impl Engine for GpuEngine {

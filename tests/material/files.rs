@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use stylet::commands::fit::{FitOptions, Volumetric, fit, read_curves};
+use stylet::commands::fit::{FitOptions, Volumetric, fit};
 use stylet::material::Mode;
+use stylet::material::curves::read_curves;
 use stylet::material::fit::Point;
 
 use super::*;

@@ -1,7 +1,8 @@
 //! Fits of exact, noisy and mixed curves, and of the curve of Lv et al. 2022.
 
-use stylet::commands::fit::{FitOptions, fit, read_curves};
+use stylet::commands::fit::{FitOptions, fit};
 use stylet::material::Mode;
+use stylet::material::curves::read_curves;
 use stylet::material::fit::{Fit, LawFit, Point, best_stable, fit_all, nominal_stress};
 use stylet::material::{Isochoric, LAWS, Verdict};
 
