@@ -331,7 +331,7 @@ mod tests {
         ("list", "#for effect\n#end\n"),
         ("endless", "\n#for law\n"),
         ("end", "#end\n"),
-        ("constant", "#const SLACK\n#ifdef PUNCTURE\n#const TURNING\n#endif\n"),
+        ("x/constant", "#const SLACK\n#ifdef PUNCTURE\n#const TURNING\n#endif\n"),
         ("number", "#const SLAK\n"),
     ];
 
@@ -356,9 +356,9 @@ mod tests {
 
     #[test]
     fn numbers_come_from_the_rust_sources() {
-        let composed = compose_from(FILES, "constant", &Defines::default()).unwrap();
+        let composed = compose_from(FILES, "x/constant", &Defines::default()).unwrap();
         assert_eq!(composed.source, "const SLACK: f32 = 0.0002;\n");
-        assert_eq!(composed.place(1), "shaders/constant.wgsl:1");
+        assert_eq!(composed.place(1), "shaders/x/constant.wgsl:1");
         let names: Vec<&str> = CONSTANTS.iter().copied().flatten().map(|(name, _)| *name).collect();
         assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len(), "one name, one number: {names:?}");
         for name in names {
