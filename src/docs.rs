@@ -1,7 +1,7 @@
 //! Parts of the pages in `docs/` that follow from the program's own tables: effects, scene keys, bounds, stages, columns.
 //!
 //! A part stands between two comments of its page, `<!-- generated: NAME -->` and `<!-- end: NAME -->`; what is written by hand stands
-//! beside it. `tests/docs.rs` compares the pages with [`parts`]; `UPDATE_DOCS=1 cargo test --test docs` writes them anew.
+//! beside it. `tests/docs.rs` compares the pages with [`parts`]; `UPDATE_DOCS=1 cargo test --test files docs` writes them anew.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -15,6 +15,7 @@
 #[macro_use]
 pub mod terminal;
 
+#[cfg(feature = "cli")]
 pub mod commands;
 pub mod cpu;
 pub mod docs;
@@ -51,6 +52,7 @@ pub mod verdict;
 pub mod whole_file;
 #[cfg(feature = "window")]
 pub mod window;
+pub mod within;
 
 // What a program that embeds the library needs first.
 pub use effects::TissueMaterial;

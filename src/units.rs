@@ -23,6 +23,8 @@ const fn si(name: &'static str) -> Unit {
 
 /// A pure number.
 pub const ONE: Unit = si("");
+/// A part of critical damping.
+pub const OF_CRITICAL: Unit = si("of critical");
 pub const PERCENT: Unit = unit("%", 0.01, 100.0);
 
 pub const SECOND: Unit = si("s");
@@ -38,9 +40,14 @@ pub const JOULE: Unit = si("J");
 pub const KILOGRAM: Unit = si("kg");
 pub const PASCAL: Unit = si("Pa");
 
+pub const JOULE_PER_SQUARE_METRE: Unit = si("J/m^2");
+pub const PASCAL_PER_METRE: Unit = si("Pa/m");
+
 pub const KILOPASCAL: Unit = unit("kPa", 1e3, 1e-3);
 pub const MEGAPASCAL: Unit = unit("MPa", 1e6, 1e-6);
 pub const MILLIMETRE: Unit = unit("mm", 1e-3, 1e3);
+pub const MILLIMETRE_PER_SECOND: Unit = unit("mm/s", 1e-3, 1e3);
+pub const NEWTON_PER_MILLIMETRE: Unit = unit("N/mm", 1e3, 1e-3);
 pub const SQUARE_MILLIMETRE: Unit = unit("mm2", 1e-6, 1e6);
 pub const CUBIC_MILLIMETRE: Unit = unit("mm3", 1e-9, 1e9);
 pub const MILLIJOULE: Unit = unit("mJ", 1e-3, 1e3);

@@ -5,8 +5,8 @@
 
 use std::path::Path;
 
-use crate::commands::fit;
 use crate::error::{Error, Result};
+use crate::material::curves;
 use crate::mesh::import::{self, ImportOptions, LengthUnit};
 use crate::output::checkpoint::RunCheckpoint;
 use crate::output::report::Columns;
@@ -156,7 +156,7 @@ fn checkpoint_message(bytes: &[u8]) -> Result<()> {
 }
 
 fn curves(bytes: &[u8]) -> Result<()> {
-    fit::parse_curves(&place("curve.csv"), bytes.to_vec()).map(drop)
+    curves::parse_curves(&place("curve.csv"), bytes.to_vec()).map(drop)
 }
 
 fn run_table(bytes: &[u8]) -> Result<()> {

@@ -1,6 +1,6 @@
 //! The same scene on every adapter of this machine and on the CPU engine.
 
-mod common;
+use crate::common;
 
 use std::path::Path;
 use std::process::Command;

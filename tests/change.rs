@@ -11,8 +11,7 @@ use stylet::scene::Scene;
 use stylet::simulation::change::Reach;
 use stylet::simulation::{Purpose, Simulation};
 
-#[path = "common/mod.rs"]
-mod common;
+use crate::common;
 
 fn scene(overrides: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/training/hit_target.toml");

@@ -85,7 +85,7 @@ fn texts() -> Vec<String> {
 #[test]
 fn generated_parts_are_those_of_the_program() {
     let wrong = out_of_date();
-    let way_out = "write them anew with: UPDATE_DOCS=1 cargo test --test docs";
+    let way_out = "write them anew with: UPDATE_DOCS=1 cargo test --test files docs";
     assert!(wrong.is_empty(), "{}\n{way_out}", wrong.join("\n"));
 }
 

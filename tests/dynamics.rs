@@ -1,6 +1,6 @@
 //! Motion in time: waves, periods, energy, driven faces, stable step, and the compression of a cube.
 
-mod common;
+use crate::common;
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;

@@ -1,6 +1,6 @@
 //! What a window draws comes from the device: the fields of the cells and nodes against the f64 snapshot of the same state.
 
-mod common;
+use crate::common;
 
 use common::*;
 use stylet::gpu::Memory;

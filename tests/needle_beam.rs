@@ -1,6 +1,6 @@
 //! The flexible needle alone: cantilever, weight, buckling, frequency, elastica, elastic foundation, energy account.
 
-mod common;
+use crate::common;
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

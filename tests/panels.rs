@@ -14,8 +14,7 @@ use stylet::window::practice::Timing;
 use stylet::window::source::Source;
 use stylet::window::tuning::{Taken, Tuning};
 
-#[path = "common/mod.rs"]
-mod common;
+use crate::common;
 
 struct Panel {
     scene: Scene,

@@ -8,8 +8,7 @@ use stylet::window::hand::{Desk, InputDevice, Key, Recording};
 use stylet::window::practice::{Leader, Practice, State};
 use stylet::window::source::Source;
 
-#[path = "common/mod.rs"]
-mod common;
+use crate::common;
 
 fn script() -> Option<Practice> {
     led_by(Leader::Script)

@@ -1,6 +1,6 @@
 //! Recorded sessions: what a hand did is enough to compute the same forces again, bit for bit.
 
-mod common;
+use crate::common;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

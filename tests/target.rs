@@ -1,6 +1,6 @@
 //! Targets: material points that move with the tissue, on both engines, and what a run tells about them.
 
-mod common;
+use crate::common;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -953,7 +953,7 @@ fn no_name_leads_out_of_the_history() {
 
 /// Runs all five scenes as they are; minutes on a software adapter.
 #[test]
-#[ignore = "minutes on a software adapter: cargo test --release --test training -- --ignored --nocapture"]
+#[ignore = "minutes on a software adapter: cargo test --release --test runs training -- --ignored --nocapture"]
 fn every_reference_attempt_passes() {
     for name in
         ["hit_target.toml", "avoid_vessel.toml", "thin_layer_stop.toml", "lumbar_oblique.toml", "core_biopsy.toml"]

@@ -1,7 +1,7 @@
 //! The ultrasound slice on a device: where it is black and bright, how its speckle is distributed, and that it moves with the tissue.
 #![cfg(feature = "window")]
 
-mod common;
+use crate::common;
 
 use common::*;
 use glam::DVec3;

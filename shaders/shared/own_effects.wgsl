@@ -81,6 +81,14 @@ fn own_energy(material: Material, cell: u32, H: mat3x3<f32>, dj: f32) -> f32 {
     return energy;
 }
 
+// Keeps what a measuring thread found [J], behind the entries of the cells. All lines of the list say the same.
+fn tell_own_supply(thread: u32, sum: vec4<f32>) {
+#for own
+    let behind_$number = CELL_COUNT * $count + thread;
+#end
+    own_states[behind_0].memory = sum;
+}
+
 // What all effects supplied to the cells in this frame per rest volume [J/m^3]; clears it.
 fn take_own_supply(cell: u32) -> vec4<f32> {
     var supplied = vec4<f32>(0.0);

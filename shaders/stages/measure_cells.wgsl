@@ -12,11 +12,6 @@
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
-#ifdef OWN
-// What own effects supplied in this frame [J], one sum per thread.
-@group(2) @binding(12) var<storage, read_write> own_sums: array<vec4<f32>>;
-#endif
-
 #ifdef HISTORY
 // Adds what the cell reported in this frame and clears it. The work of relaxation is kept: it belongs to the state.
 fn book_history(sums: ptr<function, CellSums>, cell: u32, volume: f32, held: f32) {
@@ -70,6 +65,6 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     }
     cell_sums[thread] = sums;
 #ifdef OWN
-    own_sums[thread] = own_sum;
+    tell_own_supply(thread, own_sum);
 #endif
 }

@@ -6,7 +6,8 @@ use std::time::Instant;
 use clap::Args;
 
 use super::SceneArgs;
-use crate::effects::{EffectSet, TissueMaterial, damage, fibres, plasticity, viscoelastic};
+use crate::effects::parameter::COUNT;
+use crate::effects::{Effect, EffectSet, Numbers, TissueMaterial, damage, fibres, plasticity, viscoelastic};
 use crate::ending;
 use crate::engine::stable_dt::power_iteration;
 use crate::error::{Result, brief};
@@ -142,7 +143,7 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     line(format!("effects      {}", if scene.effects.keys().is_empty() { "none" } else { "only these run:" }));
     for effect in scene.effects.active() {
         line(format!("  {:<13}{}; cost: {}", effect.key, effect.summary, effect.cost));
-        line(format!("  {:<13}{}", "", describe_parameters(effect.key, &scene.effects)));
+        line(format!("  {:<13}{}", "", describe_parameters(effect, &scene.numbers())));
     }
     line(format!("mass scaling {}", model.mass_scaling()));
     line(format!(
@@ -265,9 +266,10 @@ fn describe_damage(p: &damage::Params) -> String {
     )
 }
 
-/// The scene's parameters of one effect.
-fn describe_parameters(key: &str, effects: &EffectSet) -> String {
-    let text = match key {
+/// The scene's parameters of one effect, in words of its own or as its table names them.
+fn describe_parameters(effect: &Effect, numbers: &Numbers) -> String {
+    let effects = numbers.effects;
+    let text = match effect.key {
         "mass_scaling" => effects.mass_scaling.map(|p| format!("factor {}", four_digits(p.factor))),
         "gravity" => effects.gravity.map(|p| format!("acceleration {} m/s^2", p.acceleration)),
         "plasticity" => effects.plasticity.map(|p| describe_plasticity(&p)),
@@ -306,7 +308,26 @@ fn describe_parameters(key: &str, effects: &EffectSet) -> String {
         }),
         _ => None,
     };
-    text.unwrap_or_default()
+    text.unwrap_or_else(|| describe_table(effect, numbers))
+}
+
+/// Name, value and unit of every number of an effect.
+fn describe_table(effect: &Effect, numbers: &Numbers) -> String {
+    let named = effect.parameters.iter().filter_map(|parameter| {
+        let values: Vec<String> = parameter.values(numbers).into_iter().map(|v| four_digits(v).to_string()).collect();
+        let value = match &values[..] {
+            [] => return None,
+            [value] => value.clone(),
+            several => format!("({})", several.join(", ")),
+        };
+        let unit = if matches!(parameter.unit, "-" | COUNT) { "" } else { parameter.unit };
+        Some(format!("{} {value} {unit}", parameter.name).trim_end().to_string())
+    });
+    let own = numbers.effects.own.iter().filter(|chosen| chosen.effect.effect.key == effect.key).flat_map(|chosen| {
+        let pairs = chosen.effect.numbers.iter().zip(&chosen.numbers);
+        pairs.map(|(number, value)| format!("{} {}", number.key, four_digits(value / number.unit)))
+    });
+    named.chain(own).collect::<Vec<_>>().join(", ")
 }
 
 fn describe_tool(tool: &Tool) -> String {

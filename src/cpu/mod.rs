@@ -17,7 +17,8 @@ use rayon::prelude::*;
 use crate::effects::adhesion::Bond;
 use crate::engine::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use crate::engine::{
-    ContactState, Engine, EngineImage, EngineInfo, FrameEnergies, FramePlan, FrameSums, State, StepInput, foreign_image,
+    ContactState, Engine, EngineImage, EngineInfo, FrameEnergies, FramePlan, FrameSums, LARGEST_DISPLACEMENT, State,
+    StepInput, foreign_image,
 };
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
@@ -282,7 +283,9 @@ impl CpuEngine {
         sums.energy.kinetic =
             state.velocity.iter().zip(&model.node_mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
         sums.health.max_speed = state.velocity.iter().map(|v| v.length()).fold(0.0, f64::max);
-        sums.health.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite());
+        let far = |u: &DVec3| u.abs().max_element() > LARGEST_DISPLACEMENT;
+        sums.health.not_finite = !state.displacement.iter().chain(&state.velocity).all(|v| v.is_finite())
+            || state.displacement.iter().any(far);
         sums.targets = model.targets.iter().map(|target| target.value(&state.displacement)).collect();
     }
 }

@@ -19,8 +19,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parameter::Parameter;
+use super::parameters::parameters;
 use super::{Effect, Kind};
+use crate::units::{MILLIMETRE, NEWTON, NEWTON_PER_MILLIMETRE};
+use crate::within::Within::{NotNegative, Positive};
 
 pub const EFFECT: Effect = Effect {
     key: "adhesion",
@@ -30,63 +32,36 @@ pub const EFFECT: Effect = Effect {
     summary: "tissue sticks to the tip and lets go: drops at a fixed spacing; a model of the built-up-edge hypothesis",
     source: "hypothesis of Lv2022; law: this project",
     cost: "no buffer; 20 operations per step",
-    parameters: &PARAMETERS,
+    parameters: PARAMETERS,
 };
 
-/// What may be changed while a run goes on.
-const PARAMETERS: [Parameter; 4] = [
-    Parameter::new(
-        "adhesion.static_force_n",
-        "force at which it lets go",
-        "N",
-        [0.0, 2.0],
-        "hypothesis, see the effect",
-        |s| s.effects.adhesion.as_ref().map(|p| p.static_force),
-    ),
-    Parameter::new(
-        "adhesion.kinetic_force_n",
-        "force after a slip",
-        "N",
-        [0.0, 2.0],
-        "hypothesis, see the effect",
-        |s| s.effects.adhesion.as_ref().map(|p| p.kinetic_force),
-    ),
-    Parameter::new(
-        "adhesion.stiffness_n_mm",
-        "stiffness of the bond",
-        "N/mm",
-        [0.05, 20.0],
-        "hypothesis, see the effect",
-        |s| s.effects.adhesion.as_ref().map(|p| p.stiffness / 1e3),
-    )
-    .logarithmic(),
-    Parameter::new(
-        "adhesion.sliding_distance_mm",
-        "distance until it sticks anew",
-        "mm",
-        [0.1, 5.0],
-        "hypothesis, see the effect",
-        |s| s.effects.adhesion.as_ref().map(|p| p.sliding_distance / 1e-3),
-    ),
-];
+parameters! {
+    /// Parameters of the effect `adhesion`, which needs `puncture`: a model of the hypothesis that tissue sticks to the tip.
+    pub struct AdhesionTable;
+    /// Parameters in SI units.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Params;
+    "adhesion": numbers => numbers.effects.adhesion.as_ref();
 
-/// Parameters in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
+    /// Force at which the tissue lets go [N]; default 0.25.
+    static_force_n: NEWTON, Positive(100.0) =>
     /// Force at which the tissue lets go, F_s [N].
-    pub static_force: f64,
-    /// Force at the end of a slip, F_k [N].
-    pub kinetic_force: f64,
-    /// Stiffness of the bond, k [N/m].
-    pub stiffness: f64,
-    /// Distance slid until it sticks anew, D [m]; larger than (F_s - F_k)/k.
-    pub sliding_distance: f64,
-}
+    static_force = 0.25, slider("force at which it lets go", [0.0, 2.0], "hypothesis, see the effect");
 
-impl Default for Params {
-    fn default() -> Self {
-        Params { static_force: 0.25, kinetic_force: 0.05, stiffness: 1.0e3, sliding_distance: 1.0e-3 }
-    }
+    /// Force at the end of a slip [N]; default 0.05.
+    kinetic_force_n: NEWTON, NotNegative(100.0) =>
+    /// Force at the end of a slip, F_k [N].
+    kinetic_force = 0.05, slider("force after a slip", [0.0, 2.0], "hypothesis, see the effect");
+
+    /// Stiffness of the bond [N/mm]; default 1.
+    stiffness_n_mm: NEWTON_PER_MILLIMETRE, Positive(1e4) =>
+    /// Stiffness of the bond, k [N/m].
+    stiffness = 1.0e3, slider("stiffness of the bond", [0.05, 20.0], "hypothesis, see the effect").logarithmic();
+
+    /// Distance slid until it sticks anew [mm]: the spacing of the drops; default 1.
+    sliding_distance_mm: MILLIMETRE, Positive(100.0) =>
+    /// Distance slid until it sticks anew, D [m]; larger than (F_s - F_k)/k.
+    sliding_distance = 1.0e-3, slider("distance until it sticks anew", [0.1, 5.0], "hypothesis, see the effect");
 }
 
 /// What the bond remembers.

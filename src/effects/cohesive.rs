@@ -21,8 +21,14 @@
 //! the leapfrog work. Range of validity: the process zone `E G_c/strength^2` spans a few faces; penalty K = factor E/h, and
 //! `lambda_f >= 1.1 lambda_0`: a scene with less is refused.
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::Deserialize;
+
 use super::parameter::Parameter;
+use super::parameters::parameters;
 use super::{Effect, Kind};
+use crate::units::{JOULE_PER_SQUARE_METRE, KILOPASCAL, ONE};
+use crate::within::Within::{Between, Positive};
 
 pub const EFFECT: Effect = Effect {
     key: "cohesive",
@@ -32,85 +38,92 @@ pub const EFFECT: Effect = Effect {
     summary: "faces that separate: bilinear cohesion on the slit or bore of a needle and on chosen planes",
     source: "Turon2006, Camanho2002, Benzeggagh1996",
     cost: "one dispatch per step; doubled nodes on the surface; 80 B per pair; shorter time step by the penalty",
-    parameters: &PARAMETERS,
+    parameters: PARAMETERS,
 };
 
-/// What may be changed while a run goes on.
-const PARAMETERS: [Parameter; 7] = [
-    Parameter::new(
-        "cohesive.strength_kpa",
-        "strength in opening",
-        "kPa",
-        [0.1, 1000.0],
-        "default of this project",
-        |s| s.effects.cohesive.as_ref().map(|p| p.strength / 1e3),
-    )
-    .logarithmic(),
-    Parameter::new(
-        "cohesive.shear_strength_kpa",
-        "strength in shear",
-        "kPa",
-        [0.1, 1000.0],
-        "default of this project",
-        |s| s.effects.cohesive.as_ref().map(|p| p.shear_strength / 1e3),
-    )
-    .logarithmic(),
-    Parameter::new(
-        "cohesive.energy_j_m2",
-        "fracture energy in opening",
-        "J/m^2",
-        [1.0, 10000.0],
-        "default of this project",
-        |s| s.effects.cohesive.as_ref().map(|p| p.energy),
-    )
-    .logarithmic(),
-    Parameter::new(
-        "cohesive.shear_energy_j_m2",
-        "fracture energy in shear",
-        "J/m^2",
-        [1.0, 10000.0],
-        "default of this project",
-        |s| s.effects.cohesive.as_ref().map(|p| p.shear_energy),
-    )
-    .logarithmic(),
-    Parameter::new("cohesive.exponent", "exponent of the mode mixity", "-", [0.5, 5.0], "Benzeggagh1996", |s| {
-        s.effects.cohesive.as_ref().map(|p| p.exponent)
-    }),
-    Parameter::new("cohesive.penalty_factor", "penalty stiffness over E/h", "-", [1.0, 1000.0], "numerical", |s| {
-        s.effects.cohesive.as_ref().filter(|p| p.penalty.is_none()).map(|p| p.penalty_factor)
+parameters! {
+    /// Parameters of the effect `cohesive`: faces that separate. With a needle that cuts, its path opens on them: on a slit
+    /// before a solid needle, on the ring of its cutting edge before a hollow one.
+    pub struct CohesiveTable;
+    /// Parameters in SI units.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct Params;
+    "cohesive": numbers => numbers.effects.cohesive.as_ref();
+
+    /// Strength in opening [kPa].
+    strength_kpa: KILOPASCAL, Positive(1e6) =>
+    /// Strength in opening [Pa].
+    strength = 200e3, slider("strength in opening", [0.1, 1000.0], "default of this project").logarithmic();
+
+    /// Strength in shear [kPa]; default: that in opening.
+    shear_strength_kpa: KILOPASCAL, Positive(1e6) =>
+    /// Strength in shear [Pa].
+    shear_strength = 200e3, slider("strength in shear", [0.1, 1000.0], "default of this project").logarithmic();
+
+    /// Fracture energy in opening [J/m^2].
+    energy_j_m2: JOULE_PER_SQUARE_METRE, Positive(1e6) =>
+    /// Fracture energy in opening, G_I [J/m^2].
+    energy = 20.0, slider("fracture energy in opening", [1.0, 10000.0], "default of this project").logarithmic();
+
+    /// Fracture energy in shear [J/m^2]; default: that in opening.
+    shear_energy_j_m2: JOULE_PER_SQUARE_METRE, Positive(1e6) =>
+    /// Fracture energy in shear, G_II [J/m^2].
+    shear_energy = 20.0, slider("fracture energy in shear", [1.0, 10000.0], "default of this project").logarithmic();
+
+    /// Exponent of the mode mixity (Benzeggagh and Kenane).
+    exponent: ONE, Between(0.1, 10.0) =>
+    /// Exponent eta of the mode mixity.
+    exponent = 1.45, slider("exponent of the mode mixity", [0.5, 5.0], "Benzeggagh1996");
+
+    /// Penalty stiffness over E/h; or give `penalty_pa_m`.
+    penalty_factor: ONE, Positive(1e6) =>
+    /// Penalty stiffness over E/h, with the Young's modulus and cell edge of the tissue.
+    penalty_factor = 20.0;
+    // Only where it counts.
+    slider Parameter::new("cohesive.penalty_factor", "penalty stiffness over E/h", "-", [1.0, 1000.0], "numerical", |numbers| {
+        present(numbers).filter(|p| p.penalty.is_none()).map(|p| p.penalty_factor)
     })
-    .logarithmic(),
-    Parameter::new(
-        "cohesive.penalty_pa_m",
-        "penalty stiffness",
-        "Pa/m",
-        [1000000.0, 1000000000000.0],
-        "numerical",
-        |s| s.effects.cohesive.as_ref().and_then(|p| p.penalty),
-    )
-    .logarithmic(),
-];
+    .logarithmic();
+
+    /// Penalty stiffness [Pa/m].
+    key penalty_pa_m: Option<f64>;
+    /// Penalty stiffness K [Pa/m]; `None`: `penalty_factor` E/h.
+    field penalty: Option<f64> = None;
+    slider Parameter::new("cohesive.penalty_pa_m", "penalty stiffness", "Pa/m", [1e6, 1e12], "numerical", |numbers| {
+        present(numbers).and_then(|p| p.penalty)
+    })
+    .logarithmic();
+
+    /// Planes across the whole block that may separate.
+    #[serde(default)]
+    key plane: Vec<CohesivePlaneTable>;
+    /// Planes across the whole block that may separate, beside the path of the needle.
+    field planes: Vec<Plane> = Vec::new();
+}
+
+/// A plane that may separate; the nearest grid line is moved there.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CohesivePlaneTable {
+    /// Axis of its normal: "x", "y" or "z".
+    #[schemars(schema_with = "axes")]
+    pub axis: String,
+    /// Coordinate [mm]; z is negative below the top face.
+    pub at_mm: f64,
+    /// True: where the needle passes the plane, its tip opens it; default false (tissue stress alone does).
+    #[serde(default)]
+    pub tip_driven: bool,
+}
+
+/// Words for the axis of a plane.
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+
+fn axes(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": "string", "enum": AXES })
+}
 
 /// Overlap and slip of torn faces, in cells, beyond which they do not touch any more.
 pub const TORN_REACH: f64 = 0.3;
-
-/// Parameters in SI units.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Params {
-    /// Strength in opening and in shear [Pa].
-    pub strength: f64,
-    pub shear_strength: f64,
-    /// Fracture energies G_I and G_II [J/m^2].
-    pub energy: f64,
-    pub shear_energy: f64,
-    /// Exponent eta of the mode mixity.
-    pub exponent: f64,
-    /// Penalty stiffness K [Pa/m]; `None`: `penalty_factor` E/h with the Young's modulus and cell edge of the tissue.
-    pub penalty: Option<f64>,
-    pub penalty_factor: f64,
-    /// Planes across the whole block that may separate, beside the path of the needle.
-    pub planes: Vec<Plane>,
-}
 
 /// A plane of the block that may separate: all points with coordinate `at` [m] on the axis 0, 1 or 2.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,21 +132,6 @@ pub struct Plane {
     pub at: f64,
     /// Where the needle passes it, the tip opens it: pairs within the radius of the needle lose their bond with it.
     pub tip_driven: bool,
-}
-
-impl Default for Params {
-    fn default() -> Self {
-        Params {
-            strength: 200e3,
-            shear_strength: 200e3,
-            energy: 20.0,
-            shear_energy: 20.0,
-            exponent: 1.45,
-            penalty: None,
-            penalty_factor: 20.0,
-            planes: Vec::new(),
-        }
-    }
 }
 
 /// Least opening at failure over that at onset, `lambda_f/lambda_0 = 2 K G_c/(K lambda_0)^2`, in every mixture of modes. Below 1 a

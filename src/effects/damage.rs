@@ -12,8 +12,10 @@
 //! the failing one softens more steeply than the others unload, without hardening for `(n - 1) L_e > E u_f/sigma`.
 //! Source: Hillerborg 1976, Lubliner et al. 1989; [Lv2022] Eq. 12-14 with the kinematics of Eq. 8.
 
-use super::parameter::Parameter;
+use super::parameters::parameters;
 use super::{Effect, Kind};
+use crate::units::{MILLIMETRE, ONE};
+use crate::within::Within::{Between, NotNegative, Positive};
 
 pub const EFFECT: Effect = Effect {
     key: "damage",
@@ -23,53 +25,47 @@ pub const EFFECT: Effect = Effect {
     summary: "failure by plastic displacement, regularised by the cell size; needs plasticity",
     source: "Lubliner1989; Lv2022 Eq. 12-14",
     cost: "no state of its own",
-    parameters: &PARAMETERS,
+    parameters: PARAMETERS,
 };
 
-/// What may be changed while a run goes on.
-const PARAMETERS: [Parameter; 3] = [
-    Parameter::new("damage.onset", "plastic strain at onset", "-", [0.0, 1.0], "Lv2022, tension tests", |s| {
-        s.effects.damage?;
-        s.material.damage.or(s.effects.damage).map(|p| p.onset)
-    }),
-    Parameter::new(
-        "damage.failure_displacement_mm",
-        "failure displacement",
-        "mm",
-        [0.005, 2.0],
-        "Lv2022, tension tests",
-        |s| {
-            s.effects.damage?;
-            s.material.damage.or(s.effects.damage).map(|p| p.failure_displacement / 1e-3)
-        },
-    )
-    .logarithmic(),
-    Parameter::new("damage.d_max", "largest damage", "-", [0.05, 0.999], "keeps a cell in shape", |s| {
-        s.effects.damage?;
-        s.material.damage.or(s.effects.damage).map(|p| p.largest)
-    }),
-];
+parameters! {
+    /// Parameters of the effect `damage`, which needs `plasticity`.
+    pub struct DamageTable;
+    /// Parameters in SI units. The default is muscle, with the law `across-fibre` and the default of plasticity: damage begins where a
+    /// sample pulled across the fibres carries 26.0 kPa (nominal, at a stretch of 1.68), and from there on the stress falls along the
+    /// fibres too, if the cell is 1 mm or larger: the fibres stiffen, and u_f has to outrun them.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Params;
+    "damage": numbers => {
+        numbers.effects.damage.as_ref().map(|common| numbers.material.damage.as_ref().unwrap_or(common))
+    };
 
-/// Parameters in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
+    /// Equivalent plastic strain at which damage begins; default 0.0652.
+    onset: ONE, NotNegative(10.0) =>
     /// Equivalent plastic strain at which damage begins, alpha_0.
-    pub onset: f64,
-    /// Plastic displacement at which d would be 1, u_f [m].
-    pub failure_displacement: f64,
-    /// Largest degradation d_max, 0..1.
-    pub largest: f64,
-    /// Delete a cell that has reached d_max.
-    pub deletion: bool,
-}
+    onset = 0.0652, slider("plastic strain at onset", [0.0, 1.0], "Lv2022, tension tests");
 
-impl Default for Params {
-    /// Muscle, with the law `across-fibre` and the default of plasticity: damage begins where a sample pulled across
-    /// the fibres carries 26.0 kPa (nominal, at a stretch of 1.68), and from there on the stress falls along the fibres
-    /// too, if the cell is 1 mm or larger: the fibres stiffen, and u_f has to outrun them.
-    fn default() -> Self {
-        Params { onset: 0.0652, failure_displacement: 7.0e-5, largest: 0.95, deletion: false }
-    }
+    /// Plastic displacement at which nothing would be left [mm]; default 0.07, for cells of 1 mm.
+    failure_displacement_mm: MILLIMETRE, Positive(1e3) =>
+    /// Plastic displacement at which d would be 1, u_f [m].
+    failure_displacement = 7.0e-5, slider("failure displacement", [0.005, 2.0], "Lv2022, tension tests").logarithmic();
+
+    /// Energy per area from onset to failure, instead of the displacement [J/m^2].
+    key fracture_energy_j_m2: Option<f64>;
+
+    /// Largest damage, below 1; default 0.95.
+    d_max: ONE, Between(0.0, 1.0) =>
+    /// Largest degradation d_max, 0..1.
+    largest = 0.95, slider("largest damage", [0.05, 0.999], "keeps a cell in shape");
+
+    /// Delete a cell that has reached d_max; default false.
+    key deletion: Option<bool>;
+    /// Delete a cell that has reached d_max.
+    field deletion: bool = false;
+
+    /// Accept cells that are too large for the failure displacement: their softening branch snaps back, the break is
+    /// dynamic. Default false: such a scene is refused. Read from the scene and from regions, not from presets.
+    key allow_brittle: Option<bool>;
 }
 
 impl Params {

@@ -11,9 +11,12 @@
 use glam::{DMat3, DVec3};
 
 use super::parameter::{Parameter, Value};
+use super::parameters::parameters;
 use super::{Effect, Kind};
 use crate::material::demiray::{LARGEST_EXPONENT, capped_exponential};
 use crate::material::kinematics::{cofactor, isochoric_factor, jacobian_minus_one};
+use crate::units::{KILOPASCAL, ONE};
+use crate::within::Within::{NotNegative, Positive};
 
 pub const EFFECT: Effect = Effect {
     key: "fibres",
@@ -23,48 +26,36 @@ pub const EFFECT: Effect = Effect {
     summary: "one family of fibres that stiffen exponentially in tension",
     source: "Holzapfel2000",
     cost: "no state; about 40 operations per cell",
-    parameters: &PARAMETERS,
+    parameters: PARAMETERS,
 };
 
-/// What may be changed while a run goes on.
-const PARAMETERS: [Parameter; 3] = [
-    Parameter::new("fibres.direction", "direction x, y, z", "-", [-1.0, 1.0], "anatomy", |_| None).holding(
-        Value::List(
-            |s| {
-                s.effects.fibres?;
-                s.material.fibres.or(s.effects.fibres).map(|p| p.direction.to_array().to_vec())
-            },
-            None,
-        ),
-    ),
-    Parameter::new("fibres.k1_kpa", "stiffness k1", "kPa", [0.0, 200.0], "Lv2022, tension tests", |s| {
-        s.effects.fibres?;
-        s.material.fibres.or(s.effects.fibres).map(|p| p.k1 / 1e3)
-    }),
-    Parameter::new("fibres.k2", "exponent k2", "-", [0.001, 10.0], "Lv2022, tension tests", |s| {
-        s.effects.fibres?;
-        s.material.fibres.or(s.effects.fibres).map(|p| p.k2)
-    })
-    .logarithmic(),
-];
+parameters! {
+    /// Parameters of the effect `fibres`.
+    pub struct FibresTable;
+    /// Parameters in SI units. With the default, the law `across-fibre` and the defaults of plasticity and damage, a cell of 1 mm that
+    /// is pulled along the fibres carries at most 85.0 kPa (nominal, at a stretch of 1.72), across them 26.0 kPa (at 1.68).
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Params;
+    "fibres": numbers => {
+        numbers.effects.fibres.as_ref().map(|common| numbers.material.fibres.as_ref().unwrap_or(common))
+    };
 
-/// Parameters in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
+    /// Direction of the fibres at rest, any length; default [1, 0, 0].
+    key direction: Option<[f64; 3]>;
     /// Unit vector along the fibres at rest, n.
-    pub direction: DVec3,
-    /// Stiffness k1 [Pa].
-    pub k1: f64,
-    /// Exponent k2 (dimensionless), greater than 0.
-    pub k2: f64,
-}
+    field direction: DVec3 = DVec3::X;
+    slider Parameter::new("fibres.direction", "direction x, y, z", "-", [-1.0, 1.0], "anatomy", |_| None)
+        .holding(Value::List(|numbers| present(numbers).map(|p| p.direction.to_array().to_vec()), None));
 
-impl Default for Params {
-    /// With the law `across-fibre` and the defaults of plasticity and damage: a cell of 1 mm that is pulled along the
-    /// fibres carries at most 85.0 kPa (nominal, at a stretch of 1.72), across them 26.0 kPa (at 1.68).
-    fn default() -> Self {
-        Params { direction: DVec3::X, k1: 8.78e3, k2: 0.05 }
-    }
+    /// Stiffness k1 [kPa]; default 8.78; 0: no fibres in this material.
+    k1_kpa: KILOPASCAL, NotNegative(1e5) =>
+    /// Stiffness k1 [Pa].
+    k1 = 8.78e3, slider("stiffness k1", [0.0, 200.0], "Lv2022, tension tests");
+
+    /// Exponent k2; default 0.05.
+    k2: ONE, Positive(1e3) =>
+    /// Exponent k2 (dimensionless), greater than 0.
+    k2 = 0.05, slider("exponent k2", [0.001, 10.0], "Lv2022, tension tests").logarithmic();
 }
 
 impl Params {

@@ -27,9 +27,12 @@
 
 use glam::DVec3;
 
-use super::parameter::{Parameter, Value};
+use super::parameter::{COUNT, Parameter, Value};
+use super::parameters::parameters;
 use super::{Effect, Kind};
 use crate::needle::beam::{BeamParams, Section};
+use crate::units::MILLIMETRE;
+use crate::within::Within::{Between, NotNegative};
 
 pub const EFFECT: Effect = Effect {
     key: "flexible_needle",
@@ -39,31 +42,50 @@ pub const EFFECT: Effect = Effect {
     summary: "the needle is a beam clamped in its hub: it bends, and buckles where it is too thin",
     source: "Crisfield1991; Berger1977; coupling: this project",
     cost: "1.5 KiB; one beam solution per display frame, which waits for the frame before",
-    parameters: &PARAMETERS,
+    parameters: PARAMETERS,
 };
 
-/// What may be changed while a run goes on.
-const PARAMETERS: [Parameter; 4] = [
-    Parameter::new("flexible_needle.free_length_mm", "length from hub to tip", "mm", [20.0, 300.0], "needle", |s| {
-        s.effects.flexible_needle.as_ref().map(|p| p.beam.length / 1e-3)
-    }),
-    Parameter::new(
+parameters! {
+    /// Parameters of the effect `flexible_needle`.
+    pub struct FlexibleNeedleTable;
+    /// Parameters in SI units. The default is an 18G tube of steel with 100 mm of free length.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Params;
+    "flexible_needle": numbers => numbers.effects.flexible_needle.as_ref();
+
+    /// Free length, elements, section and material.
+    field beam: BeamParams = BeamParams {
+        length: 100e-3,
+        elements: 40,
+        section: Section { outer_diameter: 1.27e-3, inner_diameter: 0.838e-3 },
+        youngs_modulus: 193e9,
+        density: 7900.0,
+    };
+
+    /// Length from hub to tip [mm]; default 100.
+    free_length_mm: MILLIMETRE, Between(5.0, 500.0) =>
+    in params: params.beam.length, slider("length from hub to tip", [20.0, 300.0], "needle");
+
+    /// Number of elements, 4 to 200; default 40.
+    key elements: Option<u32>;
+    slider Parameter::new(
         "flexible_needle.elements",
         "elements of the beam",
-        "count",
+        COUNT,
         [4.0, 200.0],
         "converged from 40 on",
-        |s| s.effects.flexible_needle.as_ref().map(|p| p.beam.elements as f64),
-    ),
-    Parameter::new(
-        "flexible_needle.inner_diameter_mm",
-        "bore of the tube",
-        "mm",
-        [0.0, 2.0],
-        "the gauge of the needle",
-        |s| s.effects.flexible_needle.as_ref().map(|p| p.beam.section.inner_diameter / 1e-3),
-    ),
-    Parameter::new(
+        |numbers| present(numbers).map(|p| p.beam.elements as f64),
+    );
+
+    /// Diameter of the bore [mm], 0: solid; default: the gauge's, solid for a needle without gauge.
+    inner_diameter_mm: MILLIMETRE, NotNegative(20.0) =>
+    in params: params.beam.section.inner_diameter, slider("bore of the tube", [0.0, 2.0], "the gauge of the needle");
+
+    /// Acceleration of free fall on the needle [m/s^2]; default: that of the effect `gravity` if it is on, else none.
+    key gravity_m_s2: Option<[f64; 3]>;
+    /// Acceleration of free fall on the needle [m/s^2]; zero: weightless.
+    field gravity: DVec3 = DVec3::ZERO;
+    slider Parameter::new(
         "flexible_needle.gravity_m_s2",
         "free fall x, y, z",
         "m/s^2",
@@ -71,30 +93,5 @@ const PARAMETERS: [Parameter; 4] = [
         "9.81 m/s^2 on earth",
         |_| None,
     )
-    .holding(Value::List(|s| s.effects.flexible_needle.map(|p| p.gravity.to_array().to_vec()), None)),
-];
-
-/// Parameters in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
-    /// Free length, elements, section and material.
-    pub beam: BeamParams,
-    /// Acceleration of free fall on the needle [m/s^2]; zero: weightless.
-    pub gravity: DVec3,
-}
-
-impl Default for Params {
-    /// An 18G tube of steel with 100 mm of free length.
-    fn default() -> Self {
-        Params {
-            beam: BeamParams {
-                length: 100e-3,
-                elements: 40,
-                section: Section { outer_diameter: 1.27e-3, inner_diameter: 0.838e-3 },
-                youngs_modulus: 193e9,
-                density: 7900.0,
-            },
-            gravity: DVec3::ZERO,
-        }
-    }
+    .holding(Value::List(|numbers| present(numbers).map(|p| p.gravity.to_array().to_vec()), None));
 }

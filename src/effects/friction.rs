@@ -9,8 +9,10 @@
 
 use glam::DVec3;
 
-use super::parameter::Parameter;
+use super::parameters::parameters;
 use super::{Effect, Kind};
+use crate::units::{MILLIMETRE, ONE};
+use crate::within::Within::{NotNegative, Positive};
 
 /// What the stick spring of a contact does in one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,45 +57,29 @@ pub const EFFECT: Effect = Effect {
     summary: "Coulomb friction with stick memory on the shaft, none on the cone",
     source: "Wriggers2006, Lv2022",
     cost: "no buffer: stick memory is a lane of the contact memory; about 40 operations per touching node",
-    parameters: &PARAMETERS,
+    parameters: PARAMETERS,
 };
 
-/// What may be changed while a run goes on.
-const PARAMETERS: [Parameter; 3] = [
-    Parameter::new("friction.coefficient", "friction coefficient", "-", [0.0, 1.0], "Lv2022, section 3.2", |s| {
-        s.effects.friction.as_ref().map(|p| p.coefficient)
-    }),
-    Parameter::new(
-        "friction.stiffness_ratio",
-        "tangential over normal stiffness",
-        "-",
-        [0.05, 1.0],
-        "calibration",
-        |s| s.effects.friction.as_ref().map(|p| p.stiffness_ratio),
-    ),
-    Parameter::new(
-        "friction.fade_length_mm",
-        "fade behind the cone",
-        "mm",
-        [0.1, 5.0],
-        "one cell of the default mesh",
-        |s| s.effects.friction.as_ref().map(|p| p.fade_length / 1e-3),
-    ),
-];
+parameters! {
+    /// Parameters of the effect `friction`.
+    pub struct FrictionTable;
+    /// Parameters in SI units.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Params;
+    "friction": numbers => numbers.effects.friction.as_ref();
 
-/// Parameters in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
+    /// Friction coefficient mu.
+    coefficient: ONE, NotNegative(2.0) =>
     /// Friction coefficient mu (dimensionless).
-    pub coefficient: f64,
-    /// Tangential over normal contact stiffness (dimensionless).
-    pub stiffness_ratio: f64,
-    /// Length over which mu grows along the shaft behind the cone [m].
-    pub fade_length: f64,
-}
+    coefficient = 0.3, slider("friction coefficient", [0.0, 1.0], "Lv2022, section 3.2");
 
-impl Default for Params {
-    fn default() -> Self {
-        Params { coefficient: 0.3, stiffness_ratio: 0.5, fade_length: 0.8e-3 }
-    }
+    /// Tangential over normal contact stiffness.
+    stiffness_ratio: ONE, Positive(1.0) =>
+    /// Tangential over normal contact stiffness (dimensionless).
+    stiffness_ratio = 0.5, slider("tangential over normal stiffness", [0.05, 1.0], "calibration");
+
+    /// Length over which mu grows along the shaft behind the cone [mm].
+    fade_length_mm: MILLIMETRE, NotNegative(100.0) =>
+    /// Length over which mu grows along the shaft behind the cone [m].
+    fade_length = 0.8e-3, slider("fade behind the cone", [0.1, 5.0], "one cell of the default mesh");
 }

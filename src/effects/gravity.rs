@@ -4,6 +4,8 @@
 //! engine takes it as the change of `g . sum of m (u - v dt/2)`, the same sum without a term per step.
 
 use glam::DVec3;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use super::parameter::{Parameter, Value};
 use super::{Effect, Kind};
@@ -29,6 +31,21 @@ const PARAMETERS: [Parameter; 1] = [Parameter::new(
     |_| None,
 )
 .holding(Value::List(|s| s.effects.gravity.map(|p| p.acceleration.to_array().to_vec()), None))];
+
+/// Parameters of the effect `gravity`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GravityTable {
+    /// Acceleration of free fall [m/s^2]; default [0, 0, -9.81].
+    pub acceleration_m_s2: Option<[f64; 3]>,
+}
+
+impl GravityTable {
+    /// Nothing weighs anything.
+    pub fn none() -> Self {
+        GravityTable { acceleration_m_s2: Some([0.0; 3]) }
+    }
+}
 
 /// Parameters in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,9 +12,11 @@
 
 use glam::DVec3;
 
-use super::parameter::Parameter;
+use super::parameters::parameters;
 use super::{Effect, Kind};
 use crate::needle::Tool;
+use crate::units::{OF_CRITICAL, ONE};
+use crate::within::Within::{NotNegative, Positive};
 
 pub const EFFECT: Effect = Effect {
     key: "indentation",
@@ -24,19 +26,27 @@ pub const EFFECT: Effect = Effect {
     summary: "contact of the top face with a rigid sphere or flat punch",
     source: "Wriggers2006",
     cost: "one dispatch and 160 B per top-face node near the tool; 36 points per node",
-    parameters: &PARAMETERS,
+    parameters: PARAMETERS,
 };
 
-/// What may be changed while a run goes on.
-const PARAMETERS: [Parameter; 2] = [
-    Parameter::new("indentation.contact_stiffness_factor", "contact stiffness", "-", [0.05, 5.0], "numerical", |s| {
-        s.effects.indentation.as_ref().map(|p| p.stiffness_factor)
-    })
-    .logarithmic(),
-    Parameter::new("indentation.contact_damping", "contact damping", "of critical", [0.0, 1.0], "numerical", |s| {
-        s.effects.indentation.as_ref().map(|p| p.contact_damping)
-    }),
-];
+parameters! {
+    /// Parameters of the effect `indentation`.
+    pub struct IndentationTable;
+    /// Parameters in SI units.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Params;
+    "indentation": numbers => numbers.effects.indentation.as_ref();
+
+    /// Contact stiffness over (K + 4/3 mu) h.
+    contact_stiffness_factor: ONE, Positive(100.0) =>
+    /// Penalty stiffness factor (dimensionless).
+    stiffness_factor = 2.35, slider("contact stiffness", [0.05, 5.0], "numerical").logarithmic();
+
+    /// Fraction of critical damping in the contact normal, 0 to 1.
+    contact_damping: OF_CRITICAL, NotNegative(1.0) =>
+    /// Fraction of critical damping in the normal direction (dimensionless).
+    contact_damping = 0.2, slider("contact damping", [0.0, 1.0], "numerical");
+}
 
 /// How deep a point lies in the tool [m], negative outside, and the outward normal of the tool there; `None` for a tool that is no
 /// indenter. `lever`: from the tip of the tool, which moves along `direction`; `rest_radius`: distance of the point from the
@@ -78,20 +88,5 @@ impl Plan {
     /// included. It counts touching or not, so that no mass and no step changes with the contact.
     pub fn stiffness_bound(&self, area: f64) -> f64 {
         2.0 * self.face_stiffness * area
-    }
-}
-
-/// Parameters in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
-    /// Penalty stiffness factor (dimensionless).
-    pub stiffness_factor: f64,
-    /// Fraction of critical damping in the normal direction (dimensionless).
-    pub contact_damping: f64,
-}
-
-impl Default for Params {
-    fn default() -> Self {
-        Params { stiffness_factor: 2.35, contact_damping: 0.2 }
     }
 }

@@ -11,6 +11,7 @@ pub mod indentation;
 pub mod mass_scaling;
 pub mod own;
 pub mod parameter;
+pub mod parameters;
 pub mod plasticity;
 pub mod puncture;
 pub mod viscoelastic;

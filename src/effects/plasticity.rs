@@ -16,10 +16,12 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::parameter::Parameter;
+use super::parameters::parameters;
 use super::{Effect, Kind};
 use crate::material::kinematics::{double_dot, symmetric_eigen};
 use crate::material::{ElasticLaw, deviator, equivalent};
+use crate::units::KILOPASCAL;
+use crate::within::Within::{NotNegative, Positive};
 
 pub const EFFECT: Effect = Effect {
     key: "plasticity",
@@ -29,44 +31,29 @@ pub const EFFECT: Effect = Effect {
     summary: "permanent flow above a yield stress, linear hardening (F = Fe Fp)",
     source: "Lee 1969, Simo & Ortiz 1985; Lv2022 Eq. 8",
     cost: "48 B per cell",
-    parameters: &PARAMETERS,
+    parameters: PARAMETERS,
 };
 
-/// What may be changed while a run goes on.
-const PARAMETERS: [Parameter; 2] = [
-    Parameter::new("plasticity.yield_stress_kpa", "yield stress", "kPa", [1.0, 200.0], "Lv2022, tension tests", |s| {
-        s.effects.plasticity?;
-        s.material.plasticity.or(s.effects.plasticity).map(|p| p.yield_stress / 1e3)
-    })
-    .logarithmic(),
-    Parameter::new(
-        "plasticity.hardening_kpa",
-        "hardening modulus",
-        "kPa",
-        [0.0, 2000.0],
-        "Lv2022, tension tests",
-        |s| {
-            s.effects.plasticity?;
-            s.material.plasticity.or(s.effects.plasticity).map(|p| p.hardening / 1e3)
-        },
-    ),
-];
+parameters! {
+    /// Parameters of the effect `plasticity`.
+    pub struct PlasticityTable;
+    /// Parameters in SI units. The default is across-fibre muscle, with the law `across-fibre`: nominal yield stress 17.9 kPa at a
+    /// stretch of 1.31, 25.5 kPa at 1.65; the effect damage ends it at 26.0 kPa.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Params;
+    "plasticity": numbers => {
+        numbers.effects.plasticity.as_ref().map(|common| numbers.material.plasticity.as_ref().unwrap_or(common))
+    };
 
-/// Parameters in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
+    /// Yield stress, a Kirchhoff stress [kPa]; default 23.4.
+    yield_stress_kpa: KILOPASCAL, Positive(1e5) =>
     /// Yield stress sigma_y, a Kirchhoff stress [Pa]; greater than 0.
-    pub yield_stress: f64,
-    /// Hardening modulus H [Pa]; not negative.
-    pub hardening: f64,
-}
+    yield_stress = 23.4e3, slider("yield stress", [1.0, 200.0], "Lv2022, tension tests").logarithmic();
 
-impl Default for Params {
-    /// Across-fibre muscle, with the law `across-fibre`: nominal yield stress 17.9 kPa at a stretch of 1.31, 25.5 kPa at
-    /// 1.65; the effect damage ends it at 26.0 kPa.
-    fn default() -> Self {
-        Params { yield_stress: 23.4e3, hardening: 314.0e3 }
-    }
+    /// Hardening modulus: slope of the Kirchhoff stress over the plastic strain [kPa]; default 314.
+    hardening_kpa: KILOPASCAL, NotNegative(1e6) =>
+    /// Hardening modulus H [Pa]; not negative.
+    hardening = 314.0e3, slider("hardening modulus", [0.0, 2000.0], "Lv2022, tension tests");
 }
 
 /// State of one material point.

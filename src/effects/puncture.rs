@@ -35,10 +35,15 @@
 //! 164 J/m^2 [Gokgol2012].
 
 use glam::DVec3;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use super::parameter::Parameter;
-use super::{Effect, Kind};
+use super::parameters::parameters;
+use super::{Effect, Kind, Numbers};
 use crate::needle::free_path::{SLACK, SLIP_CAP};
+use crate::units::{MILLIMETRE, MILLIMETRE_PER_SECOND, NEWTON, NEWTON_PER_MILLIMETRE, OF_CRITICAL, ONE};
+use crate::within::Within::{Between, NotNegative, Positive};
 
 /// Advance of the tip in its first step, and the largest one of a step beside what the needle travels [m]. The second is
 /// as fast as the needle's speed times four with steps of 2.7 ms at 2 mm/s: with 13 um steps beyond 1.6 ms held the
@@ -144,125 +149,139 @@ pub const EFFECT: Effect = Effect {
     summary: "tip law (puncture, cutting) and contact with the opened path of the needle",
     source: "this project (docs/effects/puncture.md); toughness: Gokgol2012, Azar2008",
     cost: "three dispatches per step; 4 B per cell; 160 B per node near the path",
-    parameters: &PARAMETERS,
+    parameters: PARAMETERS,
 };
 
-/// What may be changed while a run goes on.
-const PARAMETERS: [Parameter; 14] = [
-    Parameter::new(
+parameters! {
+    /// Parameters of the effect `puncture`.
+    pub struct PunctureTable;
+    /// Parameters in SI units. Those marked [calibration] set the force as much as the tissue does; they are the
+    /// same in every scene that compares materials.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Params;
+    "puncture": numbers => numbers.effects.puncture.as_ref();
+
+    /// Tip force at which the surface gives way [N] (calibration).
+    puncture_force_n: NEWTON, Positive(100.0) =>
+    /// Tip force at which the surface gives way, F_pun [N] [calibration].
+    puncture_force = 0.6;
+    slider Parameter::new(
         "puncture.puncture_force_n",
         "force at which a surface gives way",
         "N",
         [0.01, 5.0],
         "calibration with Lv2022",
-        |s| {
-            s.material.cutting.is_none().then_some(())?;
-            s.effects.puncture.map(|p| p.puncture_force)
-        },
+        |numbers| of_the_scene(numbers).map(|p| p.puncture_force),
     )
-    .logarithmic(),
-    Parameter::new(
+    .logarithmic();
+
+    /// Tip force of steady cutting [N] (calibration).
+    cutting_force_n: NEWTON, Positive(100.0) =>
+    /// Tip force of steady cutting, F_cut = G_c w [N] [calibration].
+    cutting_force = 0.3;
+    slider Parameter::new(
         "puncture.cutting_force_n",
         "force of steady cutting",
         "N",
         [0.01, 5.0],
         "calibration with Lv2022",
-        |s| {
-            s.material.cutting.is_none().then_some(())?;
-            s.effects.puncture.map(|p| p.cutting_force)
-        },
+        |numbers| of_the_scene(numbers).map(|p| p.cutting_force),
     )
-    .logarithmic(),
-    Parameter::new(
+    .logarithmic();
+    slider Parameter::new(
         "material.puncture_force_n",
         "force at which this material gives way",
         "N",
         [0.01, 5.0],
         "preset of the material",
-        |s| s.effects.puncture.and(s.material.cutting).map(|c| c.puncture_force),
+        |numbers| present(numbers).and(numbers.material.cutting).map(|c| c.puncture_force),
     )
-    .logarithmic(),
-    Parameter::new(
+    .logarithmic();
+    slider Parameter::new(
         "material.cutting_force_n",
         "force of steady cutting in this material",
         "N",
         [0.01, 5.0],
         "preset of the material",
-        |s| s.effects.puncture.and(s.material.cutting).map(|c| c.cutting_force),
+        |numbers| present(numbers).and(numbers.material.cutting).map(|c| c.cutting_force),
     )
-    .logarithmic(),
-    Parameter::new(
-        "puncture.transition_length_mm",
-        "travel from puncture to cutting",
-        "mm",
-        [0.05, 5.0],
-        "calibration with Lv2022",
-        |s| s.effects.puncture.as_ref().map(|p| p.transition_length / 1e-3),
-    )
-    .logarithmic(),
-    Parameter::new(
-        "puncture.tip_stiffness_n_mm",
-        "stiffness of the tip springs",
-        "N/mm",
-        [0.2, 20.0],
-        "as stiff as the tissue around the tip",
-        |s| s.effects.puncture.as_ref().map(|p| p.tip_stiffness / 1e3),
-    )
-    .logarithmic(),
-    Parameter::new(
-        "puncture.softened_radius_mm",
-        "radius of the softened path",
-        "mm",
-        [0.1, 1.5],
-        "calibration with Lv2022",
-        |s| s.effects.puncture.as_ref().map(|p| p.softened_radius / 1e-3),
-    ),
-    Parameter::new(
-        "puncture.residual_stiffness",
-        "stiffness left on the path",
-        "-",
-        [0.001, 1.0],
-        "keeps the cells of the path in shape",
-        |s| s.effects.puncture.as_ref().map(|p| p.residual_stiffness),
-    )
-    .logarithmic(),
-    Parameter::new(
-        "puncture.ring_radius_mm",
-        "radius of the ring that is pushed",
-        "mm",
-        [1.0, 4.0],
-        "calibration with Lv2022",
-        |s| s.effects.puncture.as_ref().map(|p| p.ring_radius / 1e-3),
-    ),
-    Parameter::new(
-        "puncture.contact_stiffness_factor",
-        "contact stiffness",
-        "-",
-        [0.05, 5.0],
-        "calibration with Lv2022",
-        |s| s.effects.puncture.as_ref().map(|p| p.contact_stiffness_factor),
-    )
-    .logarithmic(),
-    Parameter::new("puncture.contact_damping", "contact damping", "of critical", [0.0, 1.0], "numerical", |s| {
-        s.effects.puncture.as_ref().map(|p| p.contact_damping)
-    }),
-    Parameter::new("puncture.entry_fade_mm", "fade of an overlap", "mm", [0.05, 5.0], "numerical", |s| {
-        s.effects.puncture.as_ref().map(|p| p.entry_fade / 1e-3)
-    })
-    .logarithmic(),
-    Parameter::new("puncture.rate_exponent", "exponent of the speed", "-", [0.0, 1.0], "Terzano2021", |s| {
-        s.effects.puncture.as_ref().map(|p| p.rate_exponent)
-    }),
-    Parameter::new(
-        "puncture.reference_speed_mm_s",
-        "speed of the written forces",
-        "mm/s",
-        [0.1, 100.0],
-        "Terzano2021",
-        |s| s.effects.puncture.as_ref().map(|p| p.reference_speed / 1e-3),
-    )
-    .logarithmic(),
-];
+    .logarithmic();
+
+    /// Length over which the threshold falls from the puncture to the cutting force [mm].
+    transition_length_mm: MILLIMETRE, Positive(100.0) =>
+    /// Length over which the threshold falls from F_pun to F_cut, l_p [m].
+    transition_length = 0.5e-3,
+    slider("travel from puncture to cutting", [0.05, 5.0], "calibration with Lv2022").logarithmic();
+
+    /// Stiffness of all tip springs together [N/mm].
+    tip_stiffness_n_mm: NEWTON_PER_MILLIMETRE, Positive(1e4) =>
+    /// Stiffness of all tip springs together, k_tip [N/m].
+    tip_stiffness = 2.0e3,
+    slider("stiffness of the tip springs", [0.2, 20.0], "as stiff as the tissue around the tip").logarithmic();
+
+    /// Radius of the softened path [mm] (calibration).
+    softened_radius_mm: MILLIMETRE, Positive(100.0) =>
+    /// Radius of the softened path, a0 [m] [calibration].
+    softened_radius = 0.55e-3, slider("radius of the softened path", [0.1, 1.5], "calibration with Lv2022");
+
+    /// Elastic stiffness left in a fully softened cell, 0 to 1.
+    residual_stiffness: ONE, Between(1e-4, 1.0) =>
+    /// Elastic stiffness left in a fully softened cell (fraction).
+    residual_stiffness = 0.02,
+    slider("stiffness left on the path", [0.001, 1.0], "keeps the cells of the path in shape").logarithmic();
+
+    /// Outer radius of the ring of nodes that the shaft pushes [mm] (calibration); larger than `softened_radius_mm`.
+    ring_radius_mm: MILLIMETRE, Positive(100.0) =>
+    /// Outer radius r_r of the ring of nodes that the shaft pushes [m] [calibration].
+    ring_radius = 2.0e-3, slider("radius of the ring that is pushed", [1.0, 4.0], "calibration with Lv2022");
+
+    /// Factor of the contact stiffness (calibration): of (K + 4/3 mu)/l^2 per volume of the ring around the path, of
+    /// (K + 4/3 mu) l^2/h per node of a separated face, l = 0.6 mm.
+    contact_stiffness_factor: ONE, Positive(100.0) =>
+    /// Contact stiffness factor: factor (K + 4/3 mu)/l^2 per volume of the ring, factor (K + 4/3 mu) l^2/h per node of a
+    /// separated face, factor (K + 4/3 mu)/h per area of a slit, l = 0.6 mm [calibration].
+    contact_stiffness_factor = 2.35, slider("contact stiffness", [0.05, 5.0], "calibration with Lv2022").logarithmic();
+
+    /// Fraction of critical damping in the contact normal, 0 to 1.
+    contact_damping: OF_CRITICAL, NotNegative(1.0) =>
+    /// Fraction of critical damping in the contact normal.
+    contact_damping = 0.2, slider("contact damping", [0.0, 1.0], "numerical");
+
+    /// Travel over which an overlap found at activation fades out [mm].
+    entry_fade_mm: MILLIMETRE, Positive(100.0) =>
+    /// Travel over which an overlap found at activation fades out [m].
+    entry_fade = 2.0e-3, slider("fade of an overlap", [0.05, 5.0], "numerical").logarithmic();
+
+    /// "auto" (default): planned before the run for a straight motion, else free; "free": always found while the tip moves.
+    key path: Option<PathWord>;
+    /// Find the path while the tip moves even where it could be planned.
+    field always_free: bool = false;
+    /// The free path may lead anywhere in the block: a hand holds the needle.
+    field anywhere: bool = false;
+
+    /// Exponent of the speed of the needle in the tip forces, 0 to 1; default 0: no rate.
+    rate_exponent: ONE, NotNegative(1.0) =>
+    /// Exponent n of the rate of cutting in the tip forces; 0: no rate.
+    rate_exponent = 0.0, slider("exponent of the speed", [0.0, 1.0], "Terzano2021");
+
+    /// Speed up to which the tip forces are the written ones [mm/s]; default 1.
+    reference_speed_mm_s: MILLIMETRE_PER_SECOND, Between(1e-3, 1e3) =>
+    /// Speed v_0 up to which the tip forces are those above [m/s].
+    reference_speed = 1.0e-3, slider("speed of the written forces", [0.1, 100.0], "Terzano2021").logarithmic();
+}
+
+/// The scene's parameters where its tip forces are those of the tissue's own material.
+fn of_the_scene<'a>(numbers: &Numbers<'a>) -> Option<&'a Params> {
+    present(numbers).filter(|_| numbers.material.cutting.is_none())
+}
+
+/// How the path of the needle is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PathWord {
+    Auto,
+    Free,
+}
 
 /// Tip forces of one material [N].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -271,41 +290,6 @@ pub struct Cutting {
     pub puncture_force: f64,
     /// Force of steady cutting, F_cut = G_c w.
     pub cutting_force: f64,
-}
-
-/// Parameters in SI units. Those marked [calibration] set the force as much as the tissue does; they are the
-/// same in every scene that compares materials.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
-    /// Tip force at which the surface gives way, F_pun [N] [calibration].
-    pub puncture_force: f64,
-    /// Tip force of steady cutting, F_cut = G_c w [N] [calibration].
-    pub cutting_force: f64,
-    /// Length over which the threshold falls from F_pun to F_cut, l_p [m].
-    pub transition_length: f64,
-    /// Stiffness of all tip springs together, k_tip [N/m].
-    pub tip_stiffness: f64,
-    /// Radius of the softened path, a0 [m] [calibration].
-    pub softened_radius: f64,
-    /// Elastic stiffness left in a fully softened cell (fraction).
-    pub residual_stiffness: f64,
-    /// Outer radius r_r of the ring of nodes that the shaft pushes [m] [calibration].
-    pub ring_radius: f64,
-    /// Contact stiffness factor: factor (K + 4/3 mu)/l^2 per volume of the ring, factor (K + 4/3 mu) l^2/h per node of a
-    /// separated face, factor (K + 4/3 mu)/h per area of a slit, l = 0.6 mm [calibration].
-    pub contact_stiffness_factor: f64,
-    /// Fraction of critical damping in the contact normal.
-    pub contact_damping: f64,
-    /// Travel over which an overlap found at activation fades out [m].
-    pub entry_fade: f64,
-    /// Find the path while the tip moves even where it could be planned.
-    pub always_free: bool,
-    /// The free path may lead anywhere in the block: a hand holds the needle.
-    pub anywhere: bool,
-    /// Exponent n of the rate of cutting in the tip forces; 0: no rate.
-    pub rate_exponent: f64,
-    /// Speed v_0 up to which the tip forces are those above [m/s].
-    pub reference_speed: f64,
 }
 
 /// Smooth step from 0 at x <= 0 to 1 at x >= 1.
@@ -329,26 +313,5 @@ impl Params {
     /// Factor on the tip forces at a speed of the needle [m/s].
     pub fn rate_factor(&self, speed: f64) -> f64 {
         (speed.max(self.reference_speed) / self.reference_speed).powf(self.rate_exponent)
-    }
-}
-
-impl Default for Params {
-    fn default() -> Self {
-        Params {
-            puncture_force: 0.6,
-            cutting_force: 0.3,
-            transition_length: 0.5e-3,
-            tip_stiffness: 2.0e3,
-            softened_radius: 0.55e-3,
-            residual_stiffness: 0.02,
-            ring_radius: 2.0e-3,
-            contact_stiffness_factor: 2.35,
-            contact_damping: 0.2,
-            entry_fade: 2.0e-3,
-            always_free: false,
-            anywhere: false,
-            rate_exponent: 0.0,
-            reference_speed: 1.0e-3,
-        }
     }
 }

@@ -14,6 +14,9 @@
 //! Energy. With `E` the Green-Lagrange strain the viscous part of the work is `-q:E + sum E:dq` per volume; of this
 //! `Xi = sum q_i:q_i/(4 mu0 g_i)` is stored and the rest, `sum E:dq - Xi`, dissipated.
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::parameter::{Parameter, Value};
 use super::{Effect, Kind, Numbers};
 
@@ -70,6 +73,16 @@ pub const LARGEST_TERM_COUNT: usize = 8;
 
 /// Steps over which an update of a term may stretch, as a part of its relaxation time.
 const UPDATE_PART: f64 = 1.0 / 500.0;
+
+/// Parameters of the effect `viscoelastic`: a Prony series of 1 to 8 terms.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ViscoelasticTable {
+    /// Shares of the isochoric stress that relax, each above 0, sum below 1; default [0.25, 0.15, 0.10].
+    pub g: Option<Vec<f64>>,
+    /// Relaxation times, one per share [s]; default [0.5, 5, 60].
+    pub tau_s: Option<Vec<f64>>,
+}
 
 /// One term of the series.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,6 +12,10 @@ use crate::scene::Face;
 /// Ratio `k dt^2 / (4 m)` from which on an engine tells it: raised masses have 0.81.
 pub const WATCHED_STEP_RATIO: f64 = 0.85;
 
+/// Largest component of a displacement that a run goes on with [m]: of the 31 mm that the fixed point of the GPU engine holds. The CPU
+/// engine could go on, but then the engines would end apart; what moves so far is tissue that tore off and that nothing holds.
+pub const LARGEST_DISPLACEMENT: f64 = 0.03;
+
 /// What is given to one step from outside: the only place where user input enters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepInput {

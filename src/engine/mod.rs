@@ -18,7 +18,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 pub use energy::{EnergyAccount, EnergyPart, FrameEnergies};
-pub use frame::{DriveStep, FramePlan, FrameSums, Health, StepInput, WATCHED_STEP_RATIO};
+pub use frame::{DriveStep, FramePlan, FrameSums, Health, LARGEST_DISPLACEMENT, StepInput, WATCHED_STEP_RATIO};
 pub use image::{EngineImage, foreign_image};
 pub use stage::Stage;
 pub use state::{ContactState, State};

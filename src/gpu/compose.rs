@@ -320,45 +320,45 @@ mod tests {
     use super::*;
 
     const FILES: &[(&str, &str)] = &[
-        ("a", "#import b\n#import b\nlet a = 1;\n#ifdef PUNCTURE\nlet p = 1;\n#else\nlet q = 1;\n#endif\n"),
-        ("b", "let b = 1;\n"),
+        ("x/a", "#import x/b\n#import x/b\nlet a = 1;\n#ifdef PUNCTURE\nlet p = 1;\n#else\nlet q = 1;\n#endif\n"),
+        ("x/b", "let b = 1;\n"),
         ("stray", "#endif\n"),
         ("open", "#ifdef PUNCTURE\n"),
         ("name", "#ifdef PUNCTUER\n#endif\n"),
         ("word", "#include b\n"),
         ("missing", "\n#import nowhere\n"),
-        ("laws", "#for law\nlet $law = $number;\n#end\n#for stretch law\n#import b\n#end\n"),
+        ("x/laws", "#for law\nlet $law = $number;\n#end\n#for stretch law\n#import x/b\n#end\n"),
         ("list", "#for effect\n#end\n"),
         ("endless", "\n#for law\n"),
         ("end", "#end\n"),
-        ("constant", "#const SLACK\n#ifdef PUNCTURE\n#const TURNING\n#endif\n"),
+        ("x/constant", "#const SLACK\n#ifdef PUNCTURE\n#const TURNING\n#endif\n"),
         ("number", "#const SLAK\n"),
     ];
 
     #[test]
     fn imports_once_and_maps_lines() {
-        let composed = compose_from(FILES, "a", &Defines::default()).unwrap();
+        let composed = compose_from(FILES, "x/a", &Defines::default()).unwrap();
         assert_eq!(composed.source, "let b = 1;\nlet a = 1;\nlet q = 1;\n");
-        assert_eq!(composed.place(1), "shaders/b.wgsl:1");
-        assert_eq!(composed.place(3), "shaders/a.wgsl:7");
-        let composed = compose_from(FILES, "a", &Defines::from(["PUNCTURE"])).unwrap();
+        assert_eq!(composed.place(1), "shaders/x/b.wgsl:1");
+        assert_eq!(composed.place(3), "shaders/x/a.wgsl:7");
+        let composed = compose_from(FILES, "x/a", &Defines::from(["PUNCTURE"])).unwrap();
         assert!(composed.source.contains("let p") && !composed.source.contains("let q"));
     }
 
     #[test]
     fn lines_are_repeated_for_the_laws_of_the_scene() {
-        let composed = compose_from(FILES, "laws", &Defines::from(["yeoh", "mooney_rivlin"])).unwrap();
+        let composed = compose_from(FILES, "x/laws", &Defines::from(["yeoh", "mooney_rivlin"])).unwrap();
         assert_eq!(composed.source, "let mooney_rivlin = 1u;\nlet yeoh = 2u;\n");
-        assert_eq!([composed.place(1), composed.place(2)], ["shaders/laws.wgsl:2", "shaders/laws.wgsl:2"]);
-        let composed = compose_from(FILES, "laws", &Defines::from(["ogden"])).unwrap();
+        assert_eq!([composed.place(1), composed.place(2)], ["shaders/x/laws.wgsl:2", "shaders/x/laws.wgsl:2"]);
+        let composed = compose_from(FILES, "x/laws", &Defines::from(["ogden"])).unwrap();
         assert_eq!(composed.source, "let ogden = 3u;\nlet b = 1;\n");
     }
 
     #[test]
     fn numbers_come_from_the_rust_sources() {
-        let composed = compose_from(FILES, "constant", &Defines::default()).unwrap();
+        let composed = compose_from(FILES, "x/constant", &Defines::default()).unwrap();
         assert_eq!(composed.source, "const SLACK: f32 = 0.0002;\n");
-        assert_eq!(composed.place(1), "shaders/constant.wgsl:1");
+        assert_eq!(composed.place(1), "shaders/x/constant.wgsl:1");
         let names: Vec<&str> = CONSTANTS.iter().copied().flatten().map(|(name, _)| *name).collect();
         assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len(), "one name, one number: {names:?}");
         for name in names {

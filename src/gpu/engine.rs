@@ -14,11 +14,10 @@ use super::arrays::{
 use super::device::Gpu;
 use super::kernel::{BindingKind, Compiled, Kernel};
 use super::layout::Layout;
-use super::memory::Memory;
+use super::memory::{Memory, allocate};
 use super::pace::Pace;
 use super::plan::{Features, defines, measure_threads, mesh_numbers, stages, threads};
 use super::structs::StepInput;
-use super::texels::{Texels, texel_numbers};
 use crate::engine::{Engine, EngineImage, EngineInfo, FramePlan, FrameSums, Health, Stage, State, foreign_image};
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
@@ -103,6 +102,7 @@ impl GpuEngine {
             .map(|stage| gpu.kernels.compiled(&gpu.device, stage, &defines, &numbers, gpu.texels))
             .collect::<Result<Vec<Arc<Compiled>>>>()?;
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        compiled.iter().try_for_each(|kernel| binds_few(kernel))?;
         let mut buffers = BTreeMap::new();
         let mut bytes = 0;
         for binding in compiled.iter().flat_map(|r| &r.bindings) {
@@ -139,8 +139,10 @@ impl GpuEngine {
             .collect::<Result<Vec<Kernel>>>()?;
         let mut offset = 0;
         let sums = arrays::all()
-            .filter(|array| array.life == Life::Result)
-            .filter_map(|array| buffers.get(array.name).map(|b| (array.name, 0, b.size())));
+            .filter(|array| array.add.is_some())
+            .filter_map(|array| Some((array, buffers.get(array.name)?.size())))
+            .map(|(array, size)| (array.name, (array.told_from)(&source), size))
+            .map(|(name, from, size)| (name, from, size - from));
         // Of the displacements only those around the targets.
         let corners = model.targets.iter().flat_map(|target| target.nodes).map(|node| {
             let size = size_of::<[i32; 4]>() as u64;
@@ -416,6 +418,19 @@ impl GpuEngine {
     }
 }
 
+/// Refuses a stage that binds more arrays than a portable device does: with many effects and one of the program's own.
+fn binds_few(kernel: &Compiled) -> Result<()> {
+    let most = wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize;
+    let count = kernel.bindings.iter().filter(|b| b.kind == BindingKind::Storage).count();
+    if count <= most {
+        return Ok(());
+    }
+    Err(Error::input(
+        format!("the stage {} would bind {count} arrays, a portable device binds {most}", kernel.stage.name()),
+        "remove one of the effects that remember something in a cell, or the regions, or use --engine cpu",
+    ))
+}
+
 /// Asks for a mapping; the flag becomes 1 when it is there, 2 when it failed.
 fn map_for_reading(buffer: &wgpu::Buffer) -> Arc<AtomicU8> {
     let mapped = Arc::new(AtomicU8::new(0));
@@ -442,45 +457,6 @@ fn await_mapping(gpu: &Gpu, mapped: &AtomicU8) -> Result<()> {
 fn moment(nodes: impl Iterator<Item = (DVec3, DVec3)>, model: &Model, dt: f64) -> DVec3 {
     let sum: DVec3 = nodes.zip(&model.node_mass).map(|((u, v), m)| (u - v * (0.5 * dt)) * *m).sum();
     sum / model.mass_scaling()
-}
-
-fn allocate(gpu: &Gpu, name: &str, contents: &Contents, kinds: &[BindingKind]) -> Result<Memory> {
-    let size = match contents {
-        Contents::Bytes(bytes) => bytes.len() as u64,
-        Contents::Zeros(size) => *size,
-    }
-    .next_multiple_of(4)
-    .max(4);
-    let limit = gpu.device.limits().max_storage_buffer_binding_size.min(Texels::LARGEST);
-    if size > limit {
-        return Err(Error::input(
-            format!(
-                "the mesh is too fine: buffer `{name}` would need {:.0} MiB, a portable device binds {:.0} MiB",
-                size as f64 / 1048576.0,
-                limit as f64 / 1048576.0
-            ),
-            "choose a larger cell_size_mm or a smaller block, or --engine cpu",
-        ));
-    }
-    let memory = if kinds.iter().any(|kind| matches!(kind, BindingKind::Texels | BindingKind::Sampled)) {
-        Memory::Texels(Texels::new(&gpu.device, name, size, texel_numbers(name)))
-    } else {
-        let usage = |kind: &BindingKind| match kind {
-            BindingKind::Uniform => wgpu::BufferUsages::UNIFORM,
-            _ => wgpu::BufferUsages::STORAGE,
-        };
-        let copied = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
-        Memory::Buffer(gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(name),
-            size,
-            usage: kinds.iter().map(usage).fold(copied, |all, usage| all | usage),
-            mapped_at_creation: false,
-        }))
-    };
-    if let Contents::Bytes(bytes) = contents {
-        memory.write(&gpu.queue, bytes);
-    }
-    Ok(memory)
 }
 
 impl Engine for GpuEngine {

@@ -1,6 +1,10 @@
 //! An array on the device, in a buffer or in a texture.
 
-use super::texels::Texels;
+use super::arrays::Contents;
+use super::device::Gpu;
+use super::kernel::BindingKind;
+use super::texels::{Texels, texel_numbers};
+use crate::error::{Error, Result};
 
 /// An array on the device.
 #[derive(Debug, Clone)]
@@ -79,4 +83,47 @@ impl Memory {
             Memory::Texels(texels) => texels.encode_copy(encoder, (from, size), (target, offset)),
         }
     }
+}
+
+/// An array on the device with what it holds at the start, for all the ways in which stages bind it.
+///
+/// # Errors
+/// `Error::Input` where a portable device binds no array of this size.
+pub fn allocate(gpu: &Gpu, name: &str, contents: &Contents, kinds: &[BindingKind]) -> Result<Memory> {
+    let size = match contents {
+        Contents::Bytes(bytes) => bytes.len() as u64,
+        Contents::Zeros(size) => *size,
+    }
+    .next_multiple_of(4)
+    .max(4);
+    let limit = gpu.device.limits().max_storage_buffer_binding_size.min(Texels::LARGEST);
+    if size > limit {
+        return Err(Error::input(
+            format!(
+                "the mesh is too fine: buffer `{name}` would need {:.0} MiB, a portable device binds {:.0} MiB",
+                size as f64 / 1048576.0,
+                limit as f64 / 1048576.0
+            ),
+            "choose a larger cell_size_mm or a smaller block, or --engine cpu",
+        ));
+    }
+    let memory = if kinds.iter().any(|kind| matches!(kind, BindingKind::Texels | BindingKind::Sampled)) {
+        Memory::Texels(Texels::new(&gpu.device, name, size, texel_numbers(name)))
+    } else {
+        let usage = |kind: &BindingKind| match kind {
+            BindingKind::Uniform => wgpu::BufferUsages::UNIFORM,
+            _ => wgpu::BufferUsages::STORAGE,
+        };
+        let copied = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+        Memory::Buffer(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(name),
+            size,
+            usage: kinds.iter().map(usage).fold(copied, |all, usage| all | usage),
+            mapped_at_creation: false,
+        }))
+    };
+    if let Contents::Bytes(bytes) = contents {
+        memory.write(&gpu.queue, bytes);
+    }
+    Ok(memory)
 }

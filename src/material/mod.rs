@@ -19,6 +19,7 @@
 #[macro_use]
 pub mod law;
 
+pub mod curves;
 pub mod demiray;
 pub mod fit;
 pub mod invariants;

@@ -15,6 +15,7 @@ pub mod material_chart;
 pub mod page;
 pub mod parts_chart;
 pub(crate) mod plot;
+#[cfg(feature = "cli")]
 pub mod progress;
 pub mod report;
 pub mod sample;
@@ -28,6 +29,7 @@ pub use chart::write_force_chart;
 pub use curve::{CurveFigures, MajorDrop, major_drops};
 pub use folder::{OutputFolder, PictureMoment};
 pub use parts_chart::write_parts_chart;
+#[cfg(feature = "cli")]
 pub use progress::Progress;
 pub use sample::DrivenFace;
 pub use sample_chart::write_sample_chart;

@@ -7,6 +7,7 @@ use super::convert::{library, parameters};
 use super::tissue_preset::TissuePreset;
 use crate::effects;
 use crate::effects::TissueMaterial;
+use crate::effects::parameters::Table;
 use crate::material::ElasticLaw;
 use crate::material_point::Material;
 
@@ -14,7 +15,7 @@ impl TissuePreset {
     /// The preset as a material point of its own: what it states for effects, the rest by default; no effect that it
     /// does not mention.
     pub fn material(&self) -> Material {
-        let plasticity = self.plasticity.as_ref().map(|t| parameters::plasticity_over(t, Default::default()));
+        let plasticity = self.plasticity.as_ref().map(|t| t.over(Default::default()));
         let flow: effects::plasticity::Params = plasticity.unwrap_or_default();
         Material {
             plasticity,

@@ -37,11 +37,6 @@ pub fn units(_: &mut SchemaGenerator) -> Schema {
     one_of(LengthUnit::ALL.into_iter().map(LengthUnit::symbol))
 }
 
-/// Axes of a plane.
-pub fn axes(_: &mut SchemaGenerator) -> Schema {
-    one_of(["x", "y", "z"].into_iter())
-}
-
 /// Names of the built-in materials, read off their file: the presets themselves are made of the tables that this schema describes.
 fn preset_names() -> Vec<String> {
     #[derive(Deserialize)]

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::Simulation;
+use crate::engine::LARGEST_DISPLACEMENT;
 use crate::error::Error;
 use crate::observables::{FrameRecord, Trouble};
 use crate::verdict::Quantity;
@@ -101,15 +102,23 @@ impl Simulation {
     fn broken(&mut self, record: &FrameRecord) -> Error {
         let place = match self.engine.read_state() {
             Ok(state) => {
-                let broken = |v: &DVec3| !v.is_finite() || v.abs().max_element() > 0.03;
+                let broken = |v: &DVec3| !v.is_finite() || v.abs().max_element() > LARGEST_DISPLACEMENT;
                 let velocity = state.velocity.iter().position(|v| !v.is_finite());
                 match state.displacement.iter().position(broken).or(velocity) {
                     Some(n) => {
                         let x = self.model.mesh.rest_position(n) * 1e3;
                         format!(
                             "stage integrate_nodes: displacement or velocity of node {n} (rest position {:.2}, {:.2}, \
-                             {:.2} mm) is out of range (u = {:?} m)",
-                            x.x, x.y, x.z, state.displacement[n]
+                             {:.2} mm) is out of range (u = {:?} m){}",
+                            x.x,
+                            x.y,
+                            x.z,
+                            state.displacement[n],
+                            if state.displacement[n].is_finite() {
+                                ": it has moved by more than 30 mm, as tissue that tore off and that nothing holds does"
+                            } else {
+                                ""
+                            }
                         )
                     }
                     None => "a displacement, a velocity or the stretch of a cell (corners moved apart by more than 7.8 mm, in \

@@ -1,8 +1,5 @@
 //! Every law against its reference, every kernel against the f64 engine and against known answers.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod adhesion;
 mod cohesive;
 mod damage;

@@ -1,6 +1,6 @@
 //! The curves in `assets/curves`: how they were made, and that the files are what these functions give.
 //!
-//! `cargo test --test material write_the_curves -- --ignored` writes them anew.
+//! `cargo test --test physics write_the_curves -- --ignored` writes them anew.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use stylet::material::Isochoric;
 use stylet::material::Mode;
 use stylet::material::fit::nominal_stress;
 
-use crate::*;
+use super::*;
 
 /// The laws behind the two noisy curves [Pa].
 pub fn tension_law() -> Isochoric {

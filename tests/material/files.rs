@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use stylet::commands::fit::{FitOptions, Volumetric, fit, read_curves};
+use stylet::commands::fit::{FitOptions, Volumetric, fit};
 use stylet::material::Mode;
+use stylet::material::curves::read_curves;
 use stylet::material::fit::Point;
 
-use crate::*;
+use super::*;
 
 fn file(folder: &tempfile::TempDir, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
     let path = folder.path().join(name);
@@ -81,7 +82,7 @@ fn files_that_are_no_text_or_not_there_are_refused() {
 
 #[test]
 fn wrong_options_are_refused() {
-    let files = vec![crate::curves::path("synthetic_tension.csv")];
+    let files = vec![super::curves::path("synthetic_tension.csv")];
     let with = |change: &dyn Fn(&mut FitOptions)| {
         let mut options = FitOptions { files: files.clone(), ..FitOptions::default() };
         change(&mut options);

@@ -1,12 +1,13 @@
 //! Fits of exact, noisy and mixed curves, and of the curve of Lv et al. 2022.
 
-use stylet::commands::fit::{FitOptions, fit, read_curves};
+use stylet::commands::fit::{FitOptions, fit};
 use stylet::material::Mode;
+use stylet::material::curves::read_curves;
 use stylet::material::fit::{Fit, LawFit, Point, best_stable, fit_all, nominal_stress};
 use stylet::material::{Isochoric, LAWS, Verdict};
 
-use crate::curves::{modes_law, path, tension_law};
-use crate::*;
+use super::curves::{modes_law, path, tension_law};
+use super::*;
 
 fn curve(law: &Isochoric, mode: Mode, xs: impl IntoIterator<Item = f64>) -> Vec<Point> {
     xs.into_iter().map(|x| Point { mode, x, stress: nominal_stress(law, mode, x), weight: 1.0 }).collect()

@@ -6,7 +6,7 @@ use stylet::material::fit::nominal_stress;
 use stylet::material::kinematics::J_CONTINUATION;
 use stylet::material::{Continuation, ElasticLaw, Isochoric, Verdict};
 
-use crate::*;
+use super::*;
 
 /// P by central differences of the energy density.
 fn stress_from_energy(law: &ElasticLaw, h: DMat3) -> DMat3 {

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use stylet::material::kinematics::{cofactor, symmetric_eigen};
 use stylet::material::{ElasticLaw, Isochoric, Verdict};
 
-use crate::*;
+use super::*;
 
 /// dP/dF by central differences: `[component of F, column-major]` gives dP.
 fn tangent(stress: &dyn Fn(DMat3) -> DMat3, h: DMat3) -> [DMat3; 9] {

@@ -4,7 +4,7 @@ use stylet::effects::{damage, fibres, plasticity, viscoelastic};
 use stylet::material::{Demiray, Isochoric, Ogden, Yeoh};
 use stylet::material_test::Sample;
 
-use crate::*;
+use super::*;
 
 fn everything(law: ElasticLaw, deletion: bool) -> Material {
     // Short enough that the path deletes the cell.

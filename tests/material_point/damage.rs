@@ -3,7 +3,7 @@
 use stylet::effects::{damage, plasticity};
 use stylet::material_test::Sample;
 
-use crate::*;
+use super::*;
 
 /// The bar of the reference: flow stress 5 kPa, no hardening, u_f 4 mm.
 fn softening(onset: f64, deletion: bool) -> Material {

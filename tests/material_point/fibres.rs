@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use stylet::effects::fibres::Params;
 use stylet::material::kinematics::{cofactor, double_dot, norm_squared};
 
-use crate::*;
+use super::*;
 
 fn params(random: &mut Random) -> Params {
     Params { direction: random.vector().normalize(), k1: 5.0e3, k2: 0.8 }

@@ -4,7 +4,7 @@ use stylet::effects::plasticity::{Params, State, elastic_gradient, return_mappin
 use stylet::material::{deviator, equivalent};
 use stylet::material_test::Sample;
 
-use crate::*;
+use super::*;
 
 fn plastic(law: ElasticLaw, yield_stress: f64, hardening: f64) -> Material {
     Material { plasticity: Some(Params { yield_stress, hardening }), ..elastic(law) }

@@ -4,7 +4,7 @@ use stylet::effects::{damage, fibres, plasticity, viscoelastic};
 use stylet::material::Mode;
 use stylet::material_test::{Leg, Protocol, Row, Sample, peak, run};
 
-use crate::*;
+use super::*;
 
 const PROTOCOL: Protocol =
     Protocol { from: 1.0, to: 1.5, points: 11, rate: 0.01, hold: 0.0, cycles: 1, unload: true, cell_length: 1e-3 };

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use stylet::effects::viscoelastic::{Params, Term};
 use stylet::material_test::Sample;
 
-use crate::*;
+use super::*;
 
 /// Shear small enough for the linear answers.
 const SMALL: f64 = 1e-5;

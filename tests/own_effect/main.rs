@@ -1,7 +1,6 @@
 //! An effect that no file of the program knows runs on both engines: its key, table, law, memory and energy stand in this folder.
 
-#[path = "../common/mod.rs"]
-mod common;
+use crate::common;
 mod swelling;
 
 use std::path::Path;

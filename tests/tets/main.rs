@@ -20,8 +20,7 @@ use stylet::output::Summary;
 use stylet::scene::{Face, FaceDrive, Region, RegionShape, Scene, Support};
 use stylet::simulation::{EngineChoice, Simulation};
 
-#[path = "../common/mod.rs"]
-mod common;
+use crate::common;
 use common::*;
 
 /// A grid of `cells` hexahedra of edge `edge` [m], each cut into six tetrahedra along its diagonal.
@@ -586,7 +585,7 @@ fn the_forearm_stays_stable_under_gravity() {
     }
 }
 
-/// Prints what the stages cost: `cargo test --release --test tets -- --ignored --nocapture cost`.
+/// Prints what the stages cost: `cargo test --release --test physics -- --ignored --nocapture cost`.
 #[test]
 #[ignore = "a measurement, not a test"]
 fn cost_of_the_stages() {

@@ -112,11 +112,13 @@ pub struct Array {
     pub state: Option<Exchange>,
     /// Adds what it tells of a frame.
     pub add: Option<fn(&[u8], &mut Sums)>,
+    /// Where that begins in it [bytes].
+    pub told_from: fn(&Source) -> u64,
 }
 
 impl Array {
     const fn new(name: &'static str, life: Life, fill: fn(&Source) -> Contents) -> Self {
-        Array { name, life, place: Place::Buffer, fill, state: None, add: None }
+        Array { name, life, place: Place::Buffer, fill, state: None, add: None, told_from: |_| 0 }
     }
 
     const fn constant(name: &'static str, fill: fn(&Source) -> Contents) -> Self {
@@ -140,7 +142,7 @@ impl Array {
     }
 }
 
-/// All arrays; those of [`Life::Result`] are summed up in this order.
+/// All arrays; what they tell of a frame is summed up in this order.
 pub fn all() -> impl Iterator<Item = &'static Array> {
     let owners: [&[Array]; 8] = [
         mesh::ARRAYS,

@@ -436,7 +436,7 @@ mod tests {
     fn a_scene_has_the_constants_of_the_table_of_laws() {
         let keys: Vec<&str> = constants().iter().map(|constant| constant.key).collect();
         let written: Vec<&str> = MaterialTable::default().constants().iter().map(|(key, _)| *key).collect();
-        assert_eq!(written, keys, "src/scene/file.rs against the entries `LAW` in src/material");
+        assert_eq!(written, keys, "src/scene/file/material.rs against the entries `LAW` in src/material");
         let all: Vec<(&str, Option<f64>)> = keys.iter().zip(1..).map(|(key, i)| (*key, Some(f64::from(i)))).collect();
         assert_eq!(MaterialTable::default().with_constants(&all).constants(), all);
     }

@@ -3,7 +3,9 @@
 //! A check reports and goes on, so that one call shows all problems; the geometry is looked at only when every single
 //! number is in range.
 
+mod effect_tables;
 mod effects;
+mod faces;
 mod frames;
 pub(super) mod library;
 mod material;
@@ -30,11 +32,13 @@ use super::document::{Document, Problems, closest};
 use super::file::*;
 use super::*;
 use crate::effects::own::OwnEffect;
+use crate::effects::parameters::Table;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::needle::Phase;
 use crate::reading::{self, Unread};
 use crate::units;
 use crate::units::four_digits;
+use crate::within::Within;
 
 const MM: f64 = units::MILLIMETRE.si;
 const KPA: f64 = units::KILOPASCAL.si;
@@ -82,17 +86,6 @@ pub fn parse(
     let mut check = Check { own_numbers, ..Check::new(&document, path) };
     let file: SceneFile = document.deserialize()?;
     check.scene(path, &file, own)
-}
-
-/// Range of a number, in the unit of its key.
-#[derive(Clone, Copy)]
-enum Within {
-    /// 0 < x <= limit.
-    Positive(f64),
-    /// 0 <= x <= limit.
-    NotNegative(f64),
-    /// low <= x <= high.
-    Between(f64, f64),
 }
 
 /// The running check: problems stop the load, notices travel with the scene.
@@ -274,12 +267,8 @@ impl Check<'_> {
 
     /// Reports a number outside its range and returns it unchanged.
     fn number(&mut self, path: &str, value: f64, within: Within) -> f64 {
-        let (good, range) = match within {
-            Within::Positive(limit) => (value > 0.0 && value <= limit, format!("greater than 0 and at most {limit}")),
-            Within::NotNegative(limit) => (value >= 0.0 && value <= limit, format!("from 0 to {limit}")),
-            Within::Between(low, high) => (value >= low && value <= high, format!("from {low} to {high}")),
-        };
-        if !good {
+        if !within.holds(value) {
+            let range = within.words();
             self.problems.report(
                 path,
                 format!("`{path}` is {value}"),
@@ -293,6 +282,21 @@ impl Check<'_> {
     /// An optional number in SI: `value * unit` where it is written, else `default` (already SI).
     fn optional(&mut self, path: &str, value: Option<f64>, unit: f64, default: f64, within: Within) -> f64 {
         value.map_or(default, |value| self.number(path, value, within) * unit)
+    }
+
+    /// Ranges of the plain numbers of a table at `at`, in its order.
+    fn ranges<T: Table>(&mut self, at: &str, table: &T) {
+        for key in T::KEYS {
+            if let Some(value) = (key.written)(table) {
+                self.number(&format!("{at}.{}", key.key), value, key.within);
+            }
+        }
+    }
+
+    /// The plain numbers of a table at `at` over the defaults of its effect.
+    fn table<T: Table<Params: Default>>(&mut self, at: &str, table: &T) -> T::Params {
+        self.ranges(at, table);
+        table.over(T::Params::default())
     }
 
     /// A vector of which every component lies within +-limit.
@@ -372,145 +376,6 @@ impl Check<'_> {
             None => format!("use one of: {list}"),
         };
         self.problems.report(path, format!("there is no {what} called \"{name}\""), "unknown name", way_out);
-    }
-
-    /// Conditions of the six faces; those of a mesh are the sides of its bounding box and free unless written.
-    fn faces(&mut self, table: &BoundariesTable, of_mesh: bool) -> [FaceCondition; 6] {
-        let entries = [&table.x_min, &table.x_max, &table.y_min, &table.y_max, &table.z_min, &table.z_max];
-        Face::ALL.map(|face| {
-            let default = if of_mesh || face == Face::ZMax { FaceKind::Free } else { FaceKind::Fixed };
-            match entries[face as usize] {
-                None => face_of_kind(face, default),
-                Some(FaceEntry::Kind(kind)) => face_of_kind(face, *kind),
-                Some(FaceEntry::Table(table)) => {
-                    if of_mesh && table.traction_kpa.is_some() {
-                        self.needs_block(&format!("boundaries.{}.traction_kpa", face.key()), "a traction on a face");
-                    }
-                    self.face(face, table)
-                }
-            }
-        })
-    }
-
-    fn face(&mut self, face: Face, table: &FaceTable) -> FaceCondition {
-        let at = |key: &str| format!("boundaries.{}.{key}", face.key());
-        let mut condition = FaceCondition::default();
-        for axis in &table.fixed {
-            condition.fixed[*axis as usize] = true;
-        }
-        let displacement = table.displacement_mm.map(|value| self.vector(&at("displacement_mm"), value, 1000.0) * MM);
-        let rotation = table
-            .rotation_deg
-            .map(|value| self.number(&at("rotation_deg"), value, Within::Between(-3600.0, 3600.0)).to_radians());
-        condition.drive = self.drive(face, table, displacement, rotation);
-        let names = ["x", "y", "z"];
-        for axis in 0..3 {
-            if displacement.is_some_and(|d| d[axis] != 0.0) && !condition.fixed[axis] {
-                self.problems.report(
-                    &at("displacement_mm"),
-                    format!("face {} moves along {} but is not fixed along it", face.key(), names[axis]),
-                    "a free component cannot be prescribed",
-                    format!("add \"{}\" to `fixed`, or write 0 for this component", names[axis]),
-                );
-            }
-            if rotation.is_some_and(|r| r != 0.0) && axis != face.axis() && !condition.fixed[axis] {
-                self.problems.report(
-                    &at("rotation_deg"),
-                    format!("face {} turns but is not fixed along {}", face.key(), names[axis]),
-                    "both tangential components must be fixed",
-                    format!("add \"{}\" to `fixed`", names[axis]),
-                );
-            }
-            if table.traction_kpa.is_some_and(|t| t[axis] != 0.0) && condition.fixed[axis] {
-                self.problems.report(
-                    &at("traction_kpa"),
-                    format!("face {} is loaded along {} and fixed along it", face.key(), names[axis]),
-                    "a fixed component carries no load",
-                    format!("remove \"{}\" from `fixed`, or write 0 for this component", names[axis]),
-                );
-            }
-        }
-        condition.traction = table.traction_kpa.map(|value| self.vector(&at("traction_kpa"), value, 1e4) * KPA);
-        condition.traction_ramp =
-            self.optional(&at("traction_ramp_s"), table.traction_ramp_s, 1.0, 0.0, Within::NotNegative(3600.0));
-        condition
-    }
-
-    /// The prescribed motion of a face: `displacement` [m], `rotation` [rad], and the time they take.
-    fn drive(
-        &mut self,
-        face: Face,
-        table: &FaceTable,
-        displacement: Option<DVec3>,
-        rotation: Option<f64>,
-    ) -> Option<FaceDrive> {
-        let at = |key: &str| format!("boundaries.{}.{key}", face.key());
-        if displacement.is_none() && rotation.is_none() {
-            for (key, written) in [
-                ("duration_s", table.duration_s.is_some()),
-                ("speed_mm_min", table.speed_mm_min.is_some()),
-                ("cycles", table.cycles.is_some()),
-            ] {
-                if written {
-                    self.notices.push(format!("`{}` has no effect without displacement_mm or rotation_deg.", at(key)));
-                }
-            }
-            return None;
-        }
-        let cycles = table.cycles.unwrap_or(0);
-        if table.cycles.is_some() {
-            self.number(&at("cycles"), f64::from(cycles), Within::Between(1.0, 1e6));
-        }
-        let duration = match (table.duration_s, table.speed_mm_min) {
-            (Some(_), Some(_)) => {
-                self.problems.report(
-                    &at("speed_mm_min"),
-                    "`duration_s` and `speed_mm_min` both say how long the motion takes",
-                    "second of two",
-                    "keep one of them",
-                );
-                return None;
-            }
-            (Some(duration), None) => self.number(&at("duration_s"), duration, Within::Positive(3600.0)),
-            (None, Some(speed)) => {
-                let speed = self.number(&at("speed_mm_min"), speed, Within::Positive(1e5)) * MM / 60.0;
-                let length = displacement.unwrap_or_default().length();
-                if length == 0.0 || speed <= 0.0 {
-                    self.problems.report(
-                        &at("speed_mm_min"),
-                        "a speed needs a displacement that is not zero",
-                        "no length to divide by",
-                        "write displacement_mm, or duration_s instead of the speed",
-                    );
-                    return None;
-                }
-                let duration = length / speed;
-                if duration > 3600.0 {
-                    self.problems.report(
-                        &at("speed_mm_min"),
-                        format!("the motion takes {} s, more than an hour", four_digits(duration)),
-                        "too slow",
-                        format!("write at least {}", four_digits(length / MM / 60.0)),
-                    );
-                }
-                duration
-            }
-            (None, None) => {
-                self.problems.report(
-                    &at(if displacement.is_some() { "displacement_mm" } else { "rotation_deg" }),
-                    format!("the motion of face {} has no duration", face.key()),
-                    "no duration_s beside it",
-                    "add duration_s, the time over which the motion grows, e.g. duration_s = 0.5, or speed_mm_min",
-                );
-                return None;
-            }
-        };
-        Some(FaceDrive {
-            displacement: displacement.unwrap_or_default(),
-            rotation: rotation.unwrap_or(0.0),
-            duration,
-            cycles,
-        })
     }
 
     /// `cell_size`: edge of the cells in the fine zone [m].
@@ -789,18 +654,6 @@ fn product(counts: [usize; 3]) -> f64 {
 
 fn gib(bytes: f64) -> f64 {
     four_digits(bytes / (1024.0 * 1024.0 * 1024.0))
-}
-
-/// A face held as a whole, along its normal, or not at all.
-fn face_of_kind(face: Face, kind: FaceKind) -> FaceCondition {
-    FaceCondition {
-        fixed: match kind {
-            FaceKind::Free => [false; 3],
-            FaceKind::Fixed => [true; 3],
-            FaceKind::Roller => std::array::from_fn(|axis| axis == face.axis()),
-        },
-        ..FaceCondition::default()
-    }
 }
 
 /// Memory that the system can give now [B]; `None` where /proc/meminfo does not exist.

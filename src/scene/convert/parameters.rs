@@ -7,6 +7,7 @@ use super::super::Region;
 use super::super::file::*;
 use super::super::tissue_preset::TissuePreset;
 use super::{Check, KPA, MM, Within};
+use crate::effects::parameters::Table;
 use crate::effects::puncture::Cutting;
 use crate::effects::{self, EffectSet, TissueMaterial, damage, fibres, plasticity, viscoelastic};
 use crate::units::four_digits;
@@ -14,20 +15,9 @@ use crate::units::four_digits;
 /// The plastic displacement that Lv et al. 2022 print without a unit, read as mm [m].
 const PRINTED_FAILURE_DISPLACEMENT: f64 = 4e-9;
 
-pub fn plasticity_over(table: &PlasticityTable, base: plasticity::Params) -> plasticity::Params {
-    plasticity::Params {
-        yield_stress: table.yield_stress_kpa.map_or(base.yield_stress, |value| value * KPA),
-        hardening: table.hardening_kpa.map_or(base.hardening, |value| value * KPA),
-    }
-}
-
 pub fn fibres_over(table: &FibresTable, base: fibres::Params) -> fibres::Params {
     let written = table.direction.map(|d| DVec3::from(d).normalize_or_zero());
-    fibres::Params {
-        direction: written.unwrap_or(base.direction),
-        k1: table.k1_kpa.map_or(base.k1, |value| value * KPA),
-        k2: table.k2.unwrap_or(base.k2),
-    }
+    fibres::Params { direction: written.unwrap_or(base.direction), ..table.over(base) }
 }
 
 pub fn viscoelastic_over(table: &ViscoelasticTable, base: viscoelastic::Params) -> viscoelastic::Params {
@@ -38,18 +28,12 @@ pub fn viscoelastic_over(table: &ViscoelasticTable, base: viscoelastic::Params) 
 
 /// A fracture energy becomes a displacement with the flow stress at onset: `u_f = 2 G_f/sigma`.
 pub fn damage_over(table: &DamageTable, base: damage::Params, flow: plasticity::Params) -> damage::Params {
-    let onset = table.onset.unwrap_or(base.onset);
-    let from_energy = table.fracture_energy_j_m2.map(|energy| 2.0 * energy / flow_stress(flow, onset));
-    damage::Params {
-        onset,
-        failure_displacement: table
-            .failure_displacement_mm
-            .map(|value| value * MM)
-            .or(from_energy)
-            .unwrap_or(base.failure_displacement),
-        largest: table.d_max.unwrap_or(base.largest),
-        deletion: table.deletion.unwrap_or(base.deletion),
+    let mut params = table.over(base);
+    if let (None, Some(energy)) = (table.failure_displacement_mm, table.fracture_energy_j_m2) {
+        params.failure_displacement = 2.0 * energy / flow_stress(flow, params.onset);
     }
+    params.deletion = table.deletion.unwrap_or(base.deletion);
+    params
 }
 
 /// Flow stress at the plastic strain `alpha` [Pa].
@@ -93,7 +77,7 @@ pub fn of_preset(preset: Option<&TissuePreset>) -> OwnTables<'_> {
 pub fn settle(material: &mut TissueMaterial, layers: &[OwnTables], base: &EffectSet, scene: &EffectSet) {
     let mut flow = base.plasticity.unwrap_or_default();
     for table in layers.iter().filter_map(|t| t.plasticity) {
-        flow = plasticity_over(table, flow);
+        flow = table.over(flow);
     }
     let mut fibres = base.fibres.unwrap_or_default();
     for table in layers.iter().filter_map(|t| t.fibres) {
@@ -139,12 +123,10 @@ impl Check<'_> {
                 "write the end of the second stage, the stress at which the curve bends: 23.4 across the fibres, \
                  75 along them",
             );
-        } else if let Some(value) = table.yield_stress_kpa {
-            self.number(&format!("{at}.yield_stress_kpa"), value, Within::Positive(1e5));
+            // Zero has words of its own.
+            return self.ranges(at, &PlasticityTable { yield_stress_kpa: None, ..table.clone() });
         }
-        if let Some(value) = table.hardening_kpa {
-            self.number(&format!("{at}.hardening_kpa"), value, Within::NotNegative(1e6));
-        }
+        self.ranges(at, table);
     }
 
     pub(super) fn fibres_table(&mut self, at: &str, table: &FibresTable) {
@@ -159,12 +141,7 @@ impl Check<'_> {
                 );
             }
         }
-        if let Some(value) = table.k1_kpa {
-            self.number(&format!("{at}.k1_kpa"), value, Within::NotNegative(1e5));
-        }
-        if let Some(value) = table.k2 {
-            self.number(&format!("{at}.k2"), value, Within::Positive(1e3));
-        }
+        self.ranges(at, table);
     }
 
     pub(super) fn viscoelastic_table(&mut self, at: &str, table: &ViscoelasticTable) {
@@ -209,12 +186,8 @@ impl Check<'_> {
     }
 
     pub(super) fn damage_table(&mut self, at: &str, table: &DamageTable) {
-        if let Some(value) = table.onset {
-            self.number(&format!("{at}.onset"), value, Within::NotNegative(10.0));
-        }
-        if let Some(value) = table.failure_displacement_mm {
-            self.number(&format!("{at}.failure_displacement_mm"), value, Within::Positive(1e3));
-        }
+        // The largest damage lies inside its range, not at its ends.
+        self.ranges(at, &DamageTable { d_max: None, ..table.clone() });
         if let Some(value) = table.fracture_energy_j_m2 {
             self.number(&format!("{at}.fracture_energy_j_m2"), value, Within::Positive(1e6));
         }

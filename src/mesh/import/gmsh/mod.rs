@@ -4,6 +4,9 @@
 //! records of the text as `int` (4 bytes), `double` and, in version 4.1, `size_t` (its width stands in the header).
 //! Regions are physical volumes; physical surfaces, curves and points become node sets.
 
+mod records;
+mod shape;
+
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::DVec3;
@@ -11,6 +14,8 @@ use glam::DVec3;
 use super::raw::{ElementClass, MOST_SETS, RawMesh, RawNode, RawTet, Words};
 use super::source::{Source, WRITE_AGAIN, excerpt};
 use crate::{Error, Result};
+use records::{Binary, Records};
+use shape::Shape;
 
 const WORDS: Words = Words {
     node: "node",
@@ -74,71 +79,6 @@ struct GmshFile<'a> {
     /// Volumes that belong to several physical groups.
     shared_entities: BTreeSet<i64>,
     found_elements: bool,
-}
-
-/// Reader of numbers that hides whether they stand as text or binary.
-struct Records<'a> {
-    source: Source<'a>,
-    /// `None` for text.
-    width: Option<Binary>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Binary {
-    big_endian: bool,
-    /// Bytes of `size_t`: 4 or 8.
-    size: u64,
-}
-
-impl Records<'_> {
-    fn binary(&mut self, size: u64, big_endian: bool, what: &str) -> Result<u64> {
-        let bytes = self.source.take(size, what)?;
-        let join = |word: u64, byte: &u8| word << 8 | u64::from(*byte);
-        Ok(if big_endian { bytes.iter().fold(0, join) } else { bytes.iter().rev().fold(0, join) })
-    }
-
-    fn int(&mut self, what: &str) -> Result<i64> {
-        match self.width {
-            None => self.source.number_in_line::<i64>(what),
-            Some(b) => Ok(i64::from(self.binary(4, b.big_endian, what)? as u32 as i32)),
-        }
-    }
-
-    fn size(&mut self, what: &str) -> Result<u64> {
-        match self.width {
-            None => self.source.number_in_line::<u64>(what),
-            Some(b) => self.binary(b.size, b.big_endian, what),
-        }
-    }
-
-    fn float(&mut self, what: &str) -> Result<f64> {
-        match self.width {
-            None => self.source.number_in_line::<f64>(what),
-            Some(b) => Ok(f64::from_bits(self.binary(8, b.big_endian, what)?)),
-        }
-    }
-
-    /// A number that is an `int` in binary files but cannot be negative.
-    fn id(&mut self, what: &str) -> Result<u64> {
-        let at = self.source.at();
-        let id = self.int(what)?;
-        u64::try_from(id).map_err(|_| self.source.broken(at, format!("{what}: {id} is negative")))
-    }
-
-    /// Ends a line of text; a binary record has no end mark.
-    fn end(&mut self) -> Result<()> {
-        if self.width.is_none() { self.source.end_line() } else { Ok(()) }
-    }
-
-    fn position(&mut self, id: u64) -> Result<DVec3> {
-        let at = self.source.at();
-        let [x, y, z] = [self.float("coordinate x")?, self.float("coordinate y")?, self.float("coordinate z")?];
-        let position = DVec3::new(x, y, z);
-        if !position.is_finite() {
-            return Err(self.source.broken(at, format!("node {id} stands at ({x}, {y}, {z}), which is not finite")));
-        }
-        Ok(position)
-    }
 }
 
 impl GmshFile<'_> {
@@ -656,67 +596,4 @@ impl GmshFile<'_> {
 
 fn too_many(source: &Source, at: usize) -> Error {
     source.fail(at, "more than 2^32 nodes or groups", WRITE_AGAIN)
-}
-
-/// What a type number of Gmsh stands for.
-#[derive(Debug, Clone, Copy)]
-struct Shape {
-    nodes: u32,
-    dimension: i64,
-    /// `None` for the four-node tetrahedron.
-    class: Option<ElementClass>,
-    kind: &'static str,
-}
-
-impl Shape {
-    /// Whether the nodes are needed: tetrahedra, and the simplices that mark node sets.
-    fn kept(&self) -> bool {
-        self.class.is_none() || self.class == Some(ElementClass::Lower) && self.nodes as i64 == self.dimension + 1
-    }
-
-    /// Table of element types of the Gmsh reference manual.
-    fn of_number(number: i64) -> Option<Shape> {
-        let (nodes, dimension, kind) = match number {
-            1 => (2, 1, "lines"),
-            2 => (3, 2, "triangles"),
-            3 => (4, 2, "quadrangles"),
-            4 => (4, 3, "tetrahedra"),
-            5 => (8, 3, "hexahedra"),
-            6 => (6, 3, "prisms"),
-            7 => (5, 3, "pyramids"),
-            8 => (3, 1, "lines of second order"),
-            9 => (6, 2, "triangles of second order"),
-            10 => (9, 2, "quadrangles of second order"),
-            11 => (10, 3, "ten-node tetrahedra (type 11)"),
-            12 => (27, 3, "hexahedra of second order"),
-            13 => (18, 3, "prisms of second order"),
-            14 => (14, 3, "pyramids of second order"),
-            15 => (1, 0, "points"),
-            16 => (8, 2, "quadrangles of second order"),
-            17 => (20, 3, "hexahedra of second order"),
-            18 => (15, 3, "prisms of second order"),
-            19 => (13, 3, "pyramids of second order"),
-            20 => (9, 2, "triangles of higher order"),
-            21 => (10, 2, "triangles of higher order"),
-            22 => (12, 2, "triangles of higher order"),
-            23 | 24 => (15, 2, "triangles of higher order"),
-            25 => (21, 2, "triangles of higher order"),
-            26 => (4, 1, "lines of higher order"),
-            27 => (5, 1, "lines of higher order"),
-            28 => (6, 1, "lines of higher order"),
-            29 => (20, 3, "tetrahedra of higher order"),
-            30 => (35, 3, "tetrahedra of higher order"),
-            31 => (56, 3, "tetrahedra of higher order"),
-            92 => (64, 3, "hexahedra of higher order"),
-            93 => (125, 3, "hexahedra of higher order"),
-            _ => return None,
-        };
-        let class = match number {
-            4 => None,
-            11 | 29..=31 => Some(ElementClass::HighOrderTet),
-            _ if dimension == 3 => Some(ElementClass::Volume),
-            _ => Some(ElementClass::Lower),
-        };
-        Some(Shape { nodes, dimension, class, kind })
-    }
 }

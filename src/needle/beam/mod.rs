@@ -22,11 +22,16 @@
 //! ```
 //! Range of validity: small strain (slopes within an element below 0.3 rad), large rotation.
 
+mod element;
+mod parts;
+
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::banded::{BandFactor, SymmetricBand};
 use super::lateral_axes;
+use element::{Element, cubic_shape};
+pub use parts::*;
 
 /// Unknowns per node: three of the position, two of the tangent.
 const NODE: usize = 5;
@@ -36,159 +41,6 @@ const ITERATIONS: usize = 400;
 
 /// Largest turn of a tangent or a chord in one Newton iteration [rad].
 const LARGEST_TURN: f64 = 0.3;
-
-/// Cross section of a round needle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Section {
-    /// Outer diameter [m].
-    pub outer_diameter: f64,
-    /// Inner diameter [m]; zero: solid.
-    pub inner_diameter: f64,
-}
-
-impl Section {
-    /// Area of the material A [m^2].
-    pub fn area(&self) -> f64 {
-        0.25 * std::f64::consts::PI * (self.outer_diameter.powi(2) - self.inner_diameter.powi(2))
-    }
-
-    /// Second moment of area I [m^4].
-    pub fn second_moment(&self) -> f64 {
-        std::f64::consts::PI / 64.0 * (self.outer_diameter.powi(4) - self.inner_diameter.powi(4))
-    }
-}
-
-/// What a needle is made of and how finely it is divided.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BeamParams {
-    /// Free length from hub to tip [m].
-    pub length: f64,
-    /// Number of elements.
-    pub elements: usize,
-    pub section: Section,
-    /// Young's modulus E [Pa].
-    pub youngs_modulus: f64,
-    /// Density [kg/m^3].
-    pub density: f64,
-}
-
-impl BeamParams {
-    /// Bending stiffness EI [N m^2].
-    pub fn bending_stiffness(&self) -> f64 {
-        self.youngs_modulus * self.section.second_moment()
-    }
-
-    /// Axial stiffness EA [N].
-    pub fn axial_stiffness(&self) -> f64 {
-        self.youngs_modulus * self.section.area()
-    }
-
-    /// Mass per length [kg/m].
-    pub fn line_mass(&self) -> f64 {
-        self.density * self.section.area()
-    }
-}
-
-/// Where the clamped end is held.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct HubPose {
-    /// Position of the clamped end [m].
-    pub position: DVec3,
-    /// Unit vector from hub to tip at the clamp.
-    pub direction: DVec3,
-    /// Velocity of the clamped end [m/s]; counts in the kinetic energy and the reaction.
-    pub velocity: DVec3,
-}
-
-/// A spring between a node and a fixed point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NodeSpring {
-    /// Stiffness, symmetric [N/m].
-    pub stiffness: DMat3,
-    /// Where the spring is at rest [m].
-    pub anchor: DVec3,
-}
-
-impl NodeSpring {
-    /// The same stiffness `k` [N/m] in all directions.
-    pub fn isotropic(k: f64, anchor: DVec3) -> Self {
-        NodeSpring { stiffness: DMat3::from_diagonal(DVec3::splat(k)), anchor }
-    }
-
-    /// Stiffness `k` [N/m] across the unit vector `axis`, free along it.
-    pub fn lateral(k: f64, axis: DVec3, anchor: DVec3) -> Self {
-        let along = DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
-        NodeSpring { stiffness: (DMat3::IDENTITY - along) * k, anchor }
-    }
-
-    /// Force on a node at `x` [N].
-    pub fn force(&self, x: DVec3) -> DVec3 {
-        self.stiffness * (self.anchor - x)
-    }
-
-    fn energy(&self, x: DVec3) -> f64 {
-        -0.5 * self.force(x).dot(x - self.anchor)
-    }
-}
-
-/// Dead loads and springs on a needle.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Loads {
-    /// Force on each node [N].
-    pub force: Vec<DVec3>,
-    /// Conjugate to each tangent [N m]: does the work `slope_force . dt`.
-    pub slope_force: Vec<DVec3>,
-    pub springs: Vec<Option<NodeSpring>>,
-    /// Acceleration of free fall on the needle's own mass [m/s^2].
-    pub gravity: DVec3,
-}
-
-/// Energy held by a needle.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct BeamEnergy {
-    /// Bending [J].
-    pub bending: f64,
-    /// Stretching along the axis [J].
-    pub stretching: f64,
-    /// Motion [J].
-    pub kinetic: f64,
-}
-
-impl BeamEnergy {
-    pub fn total(&self) -> f64 {
-        self.bending + self.stretching + self.kinetic
-    }
-}
-
-/// How the motion is continued in time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TimeRule {
-    /// First order, damps what the step does not resolve.
-    BackwardEuler,
-    /// Second order, keeps the energy of small motion.
-    Trapezoidal,
-}
-
-/// What one solution did.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct BeamStep {
-    pub iterations: usize,
-    /// Whether the forces balance to 1e-9 of the largest.
-    pub converged: bool,
-    /// The straight way was unstable: the needle was pushed out of it along its softest mode.
-    pub buckled: bool,
-    /// Force and moment about the clamp by which the hub holds the needle at the end [N], [N m].
-    pub hub_force: DVec3,
-    pub hub_moment: DVec3,
-    /// Work of the hub, of forces and moments, of gravity on the needle [J].
-    pub hub_work: f64,
-    pub load_work: f64,
-    pub gravity_work: f64,
-    /// What the springs took up [J].
-    pub spring_energy: f64,
-    /// Work that is neither stored nor moved on: the damping of the time rule, and what a sudden load or a snap sets free [J].
-    pub dissipated: f64,
-}
 
 /// State of a flexible needle.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -754,103 +606,6 @@ fn definite(band: &SymmetricBand, factor: BandFactor) -> (BandFactor, bool) {
             return (factor, false);
         }
         shift *= 4.0;
-    }
-}
-
-/// Weights of position, tangent, position, tangent at the local coordinate 0..1 of an element of length `h` [m].
-fn cubic_shape(at: f64, h: f64) -> [f64; 4] {
-    let (a, b) = (at * at, at * at * at);
-    [1.0 - 3.0 * a + 2.0 * b, h * (at - 2.0 * a + b), 3.0 * a - 2.0 * b, h * (b - a)]
-}
-
-/// One element in the state that it has.
-struct Element {
-    /// Rest length [m], length of the chord [m] and its direction.
-    h: f64,
-    l: f64,
-    e: DVec3,
-    t: [DVec3; 2],
-    /// EA/h [N/m] and 2 EI/h [N m].
-    axial: f64,
-    bending: f64,
-}
-
-impl Element {
-    /// Squares of the end slopes and their product: q11, q12, q22.
-    fn slopes(&self) -> [f64; 3] {
-        let [w1, w2] = self.t.map(|t| self.e.cross(t));
-        // 1 - c^2 = |w|^2 and 1 - c = |w|^2/(1 + c) keep the digits that a small slope would lose.
-        let square = |w: DVec3, t: DVec3| w.length_squared() * (1.0 + 4.0 / (1.0 + self.e.dot(t))) / 3.0;
-        [square(w1, self.t[0]), w1.dot(w2), square(w2, self.t[1])]
-    }
-
-    /// Lengthening of the centre-line, with what the deflection takes up [m].
-    fn lengthening(&self) -> f64 {
-        let [q11, q12, q22] = self.slopes();
-        self.l - self.h + self.h / 30.0 * (2.0 * q11 - q12 + 2.0 * q22)
-    }
-
-    fn axial_force(&self) -> f64 {
-        self.axial * self.lengthening()
-    }
-
-    /// Energy of bending and of stretching [J].
-    fn energy(&self) -> (f64, f64) {
-        let [q11, q12, q22] = self.slopes();
-        (self.bending * (q11 + q12 + q22), 0.5 * self.axial * self.lengthening().powi(2))
-    }
-
-    /// First and second derivatives of the energy by (d, t1, t2), with `q_12 = t1.t2 - c1 c2`.
-    fn derivatives(&self) -> ([f64; 9], [[f64; 9]; 9]) {
-        let c = self.t.map(|t| self.e.dot(t));
-        // Part of t_i across the chord.
-        let p = [self.t[0] - self.e * c[0], self.t[1] - self.e * c[1]];
-        let fill = |parts: [DVec3; 3]| {
-            let mut out = [0.0; 9];
-            for (k, part) in parts.iter().enumerate() {
-                out[3 * k..3 * k + 3].copy_from_slice(&part.to_array());
-            }
-            out
-        };
-        let length = fill([self.e, DVec3::ZERO, DVec3::ZERO]);
-        let cosines = [fill([p[0] / self.l, self.e, DVec3::ZERO]), fill([p[1] / self.l, DVec3::ZERO, self.e])];
-        let product = fill([DVec3::ZERO, self.t[1], self.t[0]]);
-        // d q_ii/d c_i; the second one is -2/3.
-        let rate = c.map(|c| -(2.0 * c + 4.0) / 3.0);
-        let squares: [f64; 9] = std::array::from_fn(|a| rate[0] * cosines[0][a] + rate[1] * cosines[1][a]);
-        let mixed: [f64; 9] = std::array::from_fn(|a| product[a] - c[1] * cosines[0][a] - c[0] * cosines[1][a]);
-        let force = self.axial_force();
-        let arch = self.h / 30.0;
-        let lengthening: [f64; 9] = std::array::from_fn(|a| length[a] + arch * (2.0 * squares[a] - mixed[a]));
-        let alpha = self.bending + 2.0 * force * arch;
-        let beta = self.bending - force * arch;
-        let gradient = std::array::from_fn(|a| force * length[a] + alpha * squares[a] + beta * mixed[a]);
-        let mut hessian = [[0.0; 9]; 9];
-        for r in 0..9 {
-            for s in 0..9 {
-                let own = cosines[0][r] * cosines[0][s] + cosines[1][r] * cosines[1][s];
-                let cross = cosines[0][r] * cosines[1][s] + cosines[1][r] * cosines[0][s];
-                hessian[r][s] = self.axial * lengthening[r] * lengthening[s] - alpha * own * (2.0 / 3.0) - beta * cross;
-            }
-        }
-        // Second derivatives of length, cosines and product.
-        let weight = [alpha * rate[0] - beta * c[1], alpha * rate[1] - beta * c[0]];
-        for r in 0..3 {
-            for s in 0..3 {
-                let across = f64::from(u8::from(r == s)) - self.e[r] * self.e[s];
-                hessian[r][s] += force * across / self.l;
-                for i in 0..2 {
-                    let bend = p[i][r] * self.e[s] + self.e[r] * p[i][s] + c[i] * across;
-                    hessian[r][s] -= weight[i] * bend / (self.l * self.l);
-                    let column = 3 * (i + 1) + s;
-                    hessian[r][column] += weight[i] * across / self.l;
-                    hessian[column][r] += weight[i] * across / self.l;
-                }
-            }
-            hessian[3 + r][6 + r] += beta;
-            hessian[6 + r][3 + r] += beta;
-        }
-        (gradient, hessian)
     }
 }
 

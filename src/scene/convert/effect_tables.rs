@@ -1,0 +1,227 @@
+//! Tables of effects that are more than plain numbers: relations between their keys, and keys that need the tool, the motion or the
+//! tissue.
+
+use super::super::file::*;
+use super::{Check, MM, Within};
+use crate::effects::cohesive::AXES;
+use crate::effects::parameters::Table;
+use crate::effects::puncture::PathWord;
+use crate::effects::{self, EffectSet, TissueMaterial};
+use crate::needle::beam::Section;
+use crate::needle::{Motion, Tool};
+use crate::units::four_digits;
+
+impl Check<'_> {
+    pub(super) fn flexible_needle(
+        &mut self,
+        table: &FlexibleNeedleTable,
+        tool: &Option<Tool>,
+        motion: &Motion,
+        weight: &GravityTable,
+    ) -> effects::flexible_needle::Params {
+        let mut default = effects::flexible_needle::Params::default();
+        // Reported above where there is none.
+        let Some(Tool::Needle(needle)) = tool else { return default };
+        let at = |key: &str| format!("flexible_needle.{key}");
+        let outer_diameter = 2.0 * needle.radius;
+        default.beam.section = Section { outer_diameter, inner_diameter: needle.inner_diameter };
+        self.ranges("flexible_needle", table);
+        let mut params = table.over(default);
+        let (length, inner_diameter) = (params.beam.length, params.beam.section.inner_diameter);
+        if length <= motion.deepest() {
+            self.problems.report(
+                &if table.free_length_mm.is_some() { at("free_length_mm") } else { "flexible_needle".into() },
+                format!(
+                    "the needle is {} mm long and goes {} mm deep: its hub would enter the tissue",
+                    length / MM,
+                    motion.deepest() / MM
+                ),
+                "longer than the deepest insertion",
+                format!("write free_length_mm above {}", motion.deepest() / MM),
+            );
+        }
+        if inner_diameter > 0.98 * outer_diameter {
+            self.problems.report(
+                &at("inner_diameter_mm"),
+                format!("the bore of {} mm leaves no wall of {} mm", inner_diameter / MM, outer_diameter / MM),
+                "at most 0.98 of the outer diameter",
+                "write the inner diameter of the tube, or 0 for a solid needle",
+            );
+        }
+        let elements = table.elements.map_or(params.beam.elements as f64, f64::from);
+        params.beam.elements = self.number(&at("elements"), elements, Within::Between(4.0, 200.0)) as usize;
+        (params.beam.youngs_modulus, params.beam.density) = (needle.youngs_modulus, needle.density);
+        let acceleration = table.gravity_m_s2.or(weight.acceleration_m_s2).unwrap_or([0.0, 0.0, -9.81]);
+        params.gravity = self.vector(&at("gravity_m_s2"), acceleration, 1000.0);
+        params
+    }
+
+    pub(super) fn puncture(&mut self, t: &PunctureTable) -> effects::puncture::Params {
+        let mut params = self.table("puncture", t);
+        params.always_free = t.path == Some(PathWord::Free);
+        if params.softened_radius >= params.ring_radius {
+            let key = if t.softened_radius_mm.is_some() { "softened_radius_mm" } else { "ring_radius_mm" };
+            self.problems.report(
+                &format!("puncture.{key}"),
+                format!(
+                    "the softened path ({} mm) reaches the ring of pushed nodes ({} mm)",
+                    params.softened_radius / MM,
+                    params.ring_radius / MM
+                ),
+                "softened_radius_mm must be smaller than ring_radius_mm",
+                "write e.g. softened_radius_mm = 0.6 and ring_radius_mm = 2.0",
+            );
+        }
+        if params.cutting_force > params.puncture_force {
+            self.notices.push(format!(
+                "The cutting force {} N is larger than the puncture force {} N: the force will not drop at the puncture.",
+                params.cutting_force, params.puncture_force
+            ));
+        }
+        params
+    }
+
+    pub(super) fn cohesive(&mut self, t: &CohesiveTable, tissue: &TissueTable) -> effects::cohesive::Params {
+        let at = |key: &str| format!("cohesive.{key}");
+        if t.penalty_factor.is_some() && t.penalty_pa_m.is_some() {
+            self.problems.report(
+                &at("penalty_factor"),
+                "the faces have two penalty stiffnesses",
+                "`penalty_factor` and `penalty_pa_m`",
+                "keep one of them",
+            );
+        }
+        let mut params = self.table("cohesive", t);
+        // Shear is as strong and as tough as opening unless written.
+        if t.shear_strength_kpa.is_none() {
+            params.shear_strength = params.strength;
+        }
+        if t.shear_energy_j_m2.is_none() {
+            params.shear_energy = params.energy;
+        }
+        params.penalty = t.penalty_pa_m.map(|value| self.number(&at("penalty_pa_m"), value, Within::Positive(1e15)));
+        let size = tissue.size_mm.unwrap_or([1000.0; 3]);
+        params.planes = t
+            .plane
+            .iter()
+            .enumerate()
+            .filter_map(|(index, plane)| {
+                let path = at(&format!("plane.{index}"));
+                let Some(axis) = AXES.iter().position(|a| *a == plane.axis) else {
+                    self.unknown_name(&format!("{path}.axis"), "axis", &plane.axis, &AXES);
+                    return None;
+                };
+                let half = 0.5 * size[axis];
+                let (low, high) = if axis == 2 { (-size[2], 0.0) } else { (-half, half) };
+                let margin = 1e-3 * (high - low);
+                let value =
+                    self.number(&format!("{path}.at_mm"), plane.at_mm, Within::Between(low + margin, high - margin));
+                Some(effects::cohesive::Plane { axis, at: value * MM, tip_driven: plane.tip_driven })
+            })
+            .collect();
+        params
+    }
+
+    /// The faces carry more before they fail than at the moment at which they fail: `cohesive::LEAST_OPENING_RATIO`. Their penalty
+    /// stiffness comes from the material of the scene and the edge of its cells [m].
+    pub(super) fn cohesive_openings(
+        &mut self,
+        file: &SceneFile,
+        material: &TissueMaterial,
+        cell: f64,
+        effects: &EffectSet,
+    ) {
+        const LEAST: f64 = effects::cohesive::LEAST_OPENING_RATIO;
+        let Some(params) = &effects.cohesive else { return };
+        let law = effects::cohesive::Law::new(params, material.law.youngs_modulus(), cell);
+        let (ratio, share) = law.least_opening_ratio();
+        if ratio >= LEAST {
+            return;
+        }
+        let table = file.cohesive.clone().unwrap_or_default();
+        let keys = [
+            ("strength_kpa", table.strength_kpa.is_some()),
+            ("energy_j_m2", table.energy_j_m2.is_some()),
+            ("shear_strength_kpa", table.shear_strength_kpa.is_some()),
+            ("shear_energy_j_m2", table.shear_energy_j_m2.is_some()),
+        ];
+        let place = match keys.iter().find(|(_, written)| *written) {
+            Some((key, _)) => format!("cohesive.{key}"),
+            None if file.cohesive.is_some() => "cohesive".into(),
+            None => format!("effects.{}", file.effects.iter().position(|key| key == "cohesive").unwrap_or(0)),
+        };
+        let (onset, end) = law.openings(share);
+        let mode = match share {
+            0.0 => "opening".to_string(),
+            1.0 => "shear".to_string(),
+            _ => format!("openings with {:.0} % of shear", 100.0 * share),
+        };
+        // A little more than needed: the numbers are rounded, and a way out must lead out.
+        let more = 1.01 * LEAST / ratio;
+        let shear = |differs: bool, key: &str, value: f64| {
+            if differs { format!(" and {key} {}", four_digits(value)) } else { String::new() }
+        };
+        let (energy, strength) = (params.energy * more, params.strength / more.sqrt());
+        let shear_energy = shear(params.shear_energy != params.energy, "shear_energy_j_m2", params.shear_energy * more);
+        let shear_strength = shear(
+            params.shear_strength != params.strength,
+            "shear_strength_kpa",
+            params.shear_strength / more.sqrt() / 1e3,
+        );
+        let penalty = match params.penalty {
+            Some(penalty) => format!("penalty_pa_m of at least {:.3e}", penalty * more),
+            None => format!("penalty_factor of at least {}", four_digits(params.penalty_factor * more)),
+        };
+        self.problems.report(
+            &place,
+            format!(
+                "REFUSED cohesion: in {mode} the faces begin to fail at {} mm (strength {} kPa over the penalty stiffness {:.3e} \
+                 Pa/m) and have failed at {} mm (twice the energy {} J/m^2 over the strength): the second must be at \
+                 least {LEAST} times the first",
+                four_digits(onset / MM),
+                four_digits(law.penalty * onset / 1e3),
+                law.penalty,
+                four_digits(end / MM),
+                four_digits(law.fracture_energy(share)),
+            ),
+            format!("they would fail at {} times the opening at which they begin to", four_digits(ratio)),
+            format!(
+                "write under [cohesive] energy_j_m2 of at least {}{shear_energy}, or strength_kpa of at most {}{shear_strength}, or \
+                 {penalty} (a shorter time step)",
+                four_digits(energy),
+                four_digits(strength / 1e3),
+            ),
+        );
+    }
+
+    pub(super) fn adhesion(&mut self, t: &AdhesionTable) -> effects::adhesion::Params {
+        let params = self.table("adhesion", t);
+        let (fall, key) = (params.static_force - params.kinetic_force, |written: bool, key| {
+            if written { format!("adhesion.{key}") } else { "adhesion".to_string() }
+        });
+        if fall < 0.0 {
+            self.problems.report(
+                &key(t.kinetic_force_n.is_some(), "kinetic_force_n"),
+                format!(
+                    "the kinetic force {} N is above the static one, {} N",
+                    params.kinetic_force, params.static_force
+                ),
+                "nothing lets go",
+                "write a kinetic_force_n below static_force_n, e.g. 0.05 and 0.25",
+            );
+        } else if params.stiffness * params.sliding_distance <= fall {
+            self.problems.report(
+                &key(t.sliding_distance_mm.is_some(), "sliding_distance_mm"),
+                format!(
+                    "the bond of {} N/mm snaps back: its force falls by {} N within {} mm",
+                    params.stiffness * 1e-3,
+                    four_digits(fall),
+                    params.sliding_distance / MM
+                ),
+                "must be above (static_force_n - kinetic_force_n)/stiffness_n_mm",
+                format!("write a sliding_distance_mm above {}", four_digits(fall / params.stiffness / MM)),
+            );
+        }
+        params
+    }
+}

@@ -1,0 +1,14 @@
+//! Whole scenes, changes while they run, checkpoints, sessions and scores.
+
+#[path = "../change.rs"]
+mod change;
+#[path = "../checkpoint.rs"]
+mod checkpoint;
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../scenes/main.rs"]
+mod scenes;
+#[path = "../session.rs"]
+mod session;
+#[path = "../training.rs"]
+mod training;
