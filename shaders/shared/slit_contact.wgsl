@@ -18,9 +18,9 @@ struct SlitForce {
     rubbing: f32,
     // Force of the contact damping in it [N].
     damping: vec3<f32>,
-    // Stored [J]; power of the bending needle [W].
+    // Stored [J]; power beside that of the motion of the needle as a whole [W].
     stored: f32,
-    bend_power: f32,
+    axis_power: f32,
     // Bound of the stiffness at the node [N/m].
     bound: f32,
 }
@@ -88,7 +88,7 @@ fn slit_force(index: u32) -> SlitForce {
             sum.stored += w.x * 0.5 * k * depth * depth;
             sum.damping += select(vec3<f32>(0.0), n * (w.x * (normal - elastic)), touches);
 #ifdef FLEXIBLE_NEEDLE
-            sum.bend_power += dot(force, bend.rate);
+            sum.axis_power += dot(force, bend.rate);
 #endif
             sum.bound += select(0.0, 2.0 * w.x * k * steep * steep, touches);
         }

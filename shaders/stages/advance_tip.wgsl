@@ -87,9 +87,6 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         stretches[lane] = place.stretch;
         distances[lane] = place.distance;
     }
-#ifdef ADHESION
-    let law = adhesion;
-#endif
     workgroupBarrier();
     var capped = false;
     if (lane == 0u) {
@@ -113,6 +110,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         bond_force = 0.0;
         bond_energy = 0.0;
 #ifdef ADHESION
+        let law = adhesion;
         // A tip outside the material, or drawn back by more than D, has no bond.
         let mean = distance / f32(ANCHOR_COUNT);
         let old = tip_state.bond_stretch;

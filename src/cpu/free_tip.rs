@@ -10,8 +10,8 @@ use crate::engine::elements::CORNERS;
 use crate::material::kinematics::cofactor;
 use crate::mesh::BlockMesh;
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
-use crate::needle::ToolPose;
 use crate::needle::free_path::{FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SOFTENING_RATE, TURNING, anchor_offset};
+use crate::needle::{ToolPose, lateral_axes};
 
 /// A material point in the deformed mesh.
 struct MaterialPlace {
@@ -95,6 +95,26 @@ fn tip_springs(mesh: &BlockMesh, u: &[DVec3], radius: f64, tip: &FreeTip, pose: 
     springs
 }
 
+/// Outside: one step of Newton's iteration for the point of the block that the tip is at, for the needle moves little from step to
+/// step; through the top face a track begins.
+fn look_for_surface(mesh: &BlockMesh, u: &[DVec3], tip: &mut FreeTip, pose: &ToolPose) {
+    let near = within_block(mesh, tip.place);
+    let at = material_place(mesh, u, near);
+    let away = pose.tip - at.position - (tip.place - near);
+    tip.place += pulled_back(at.gradient, away);
+    let over = within_block(mesh, tip.place.with_z(0.0)) == tip.place.with_z(0.0);
+    // Nearer than a tenth of a millimetre: far from the solution a step may end anywhere.
+    if over && tip.place.z <= 1e-9 && away.length() < 1e-4 {
+        *tip = FreeTip {
+            place: tip.place.with_z(0.0),
+            along: pose.direction,
+            across: lateral_axes(pose.direction).0,
+            inside: true,
+            ..FreeTip::default()
+        };
+    }
+}
+
 impl CpuEngine {
     /// Stage `advance_free_tip`.
     pub(super) fn advance_free_tip(&mut self, plan: &PuncturePlan, free: &FreePlan, pose: &ToolPose) {
@@ -104,104 +124,23 @@ impl CpuEngine {
         let p = &plan.params;
         let radius = plan.needle.radius;
         let spring = p.tip_stiffness / ANCHOR_COUNT as f64;
-        let t = pose.direction;
-        let mut tip = self.state.tip;
-        tip.advance = 0.0;
+        let mut tip = FreeTip { advance: 0.0, ..self.state.tip };
         if !tip.inside {
-            // One step of Newton's iteration: the needle moves little from step to step.
-            let at = material_place(mesh, u, within_block(mesh, tip.place));
-            let away = pose.tip - at.position - (tip.place - within_block(mesh, tip.place));
-            tip.place += pulled_back(at.gradient, away);
-            let over = within_block(mesh, tip.place.with_z(0.0)) == tip.place.with_z(0.0);
-            // Nearer than a tenth of a millimetre: far from the solution a step may end anywhere.
-            if over && tip.place.z <= 1e-9 && away.length() < 1e-4 {
-                tip = FreeTip {
-                    place: tip.place.with_z(0.0),
-                    along: t,
-                    across: crate::needle::lateral_axes(t).0,
-                    inside: true,
-                    ..FreeTip::default()
-                };
-            }
+            look_for_surface(mesh, u, &mut tip, pose);
         }
         let before = tip_springs(mesh, u, radius, &tip, pose);
-        let force: f64 = before.anchors.iter().map(|a| spring * a.0.max(0.0)).sum();
-        let mut moved = false;
-        // Threshold [N] where the cap on the advance holds the force above it.
-        let mut capped = f64::INFINITY;
-        if tip.inside {
-            let f = before.gradient;
-            let direction = tip.along;
-            let stretch = bounded_stretch((f * direction).dot(t));
-            // What lies just ahead: farther than a sample that the tip's plane has marked.
-            let (cell, _, width) = grid_place(mesh, within_block(mesh, tip.place));
-            let samples = SAMPLES as f64;
-            let look = LOOK_AHEAD * 0.5 * direction.abs().dot(width / samples);
-            let (cell, local, _) = match free.index(cell) {
-                Some(_) => grid_place(mesh, within_block(mesh, tip.place + direction * look)),
-                None => (cell, DVec3::ZERO, width),
-            };
-            let sample: [usize; 3] = std::array::from_fn(|a| ((local[a] * samples) as usize).min(SAMPLES - 1));
-            let bit = sample[0] + SAMPLES * (sample[1] + SAMPLES * sample[2]);
-            let open = free.index(cell).is_some_and(|i| self.state.cut_samples[i] >> bit & 1 == 1);
-            let material = model.material_index(mesh.cell_index(cell[0], cell[1], cell[2]));
-            if material != tip.material {
-                (tip.material, tip.entry) = (material, tip.coordinate);
-            }
-            let cutting = free.cuttings[material];
-            let threshold = match open {
-                true => 0.0,
-                false => {
-                    cutting.threshold(tip.coordinate - tip.entry, p.transition_length)
-                        * p.rate_factor(pose.velocity.length())
-                }
-            };
-            let travel = (pose.velocity.length() + radius * pose.angular_velocity.length()) * self.dt;
-            let cap = advance_limit(tip.coordinate == 0.0, travel);
-            let slip_cap = slip_limit(travel);
-            let advance = tip_advance(force, threshold, p.tip_stiffness, stretch, cap);
-            if advance == cap {
-                capped = threshold;
-            }
-            let retreat = retreat(before.mean_gap, stretch, slip_cap);
-            let mut slip = pulled_back(f, sway_beyond(before.sway, force, threshold, p.tip_stiffness));
-            if slip.length() > slip_cap {
-                slip *= slip_cap / slip.length();
-            }
-            if tip.coordinate == 0.0 {
-                // Not through the surface yet: the tip glides on it.
-                slip.z = 0.0;
-            }
-            moved = advance > 0.0 || retreat > 0.0 || slip != DVec3::ZERO;
-            if moved {
-                tip.place += direction * (advance - retreat) + slip;
-                tip.coordinate = (tip.coordinate + advance - retreat).max(0.0);
-                let wanted = pulled_back(f, t);
-                if wanted.length() > 1e-3 {
-                    let part = ((advance + retreat + slip.length()) / TURNING).min(1.0);
-                    tip.along = direction.lerp(wanted.normalize(), part).normalize();
-                }
-                tip.across = tip.across.reject_from(tip.along).normalize();
-                if retreat == 0.0 && tip.coordinate > 0.0 {
-                    tip.advance = advance + slip.length();
-                }
-                if retreat > 0.0 && tip.place.z > 0.0 {
-                    tip = FreeTip { inside: false, advance: 0.0, coordinate: 0.0, entry: 0.0, ..tip };
-                }
-                tip.place = if tip.inside { within_block(mesh, tip.place) } else { tip.place };
-            }
-        }
-        let after = match (tip.inside, moved) {
-            (true, true) => tip_springs(mesh, u, radius, &tip, pose),
+        let capped = if tip.inside { self.move_tip(plan, free, pose, &mut tip, &before) } else { None };
+        let after = match capped {
+            Some(_) if tip.inside => tip_springs(mesh, u, radius, &tip, pose),
             _ => TipSprings { anchors: before.anchors.clone(), ..before },
         };
         let on = if tip.inside { 1.0 } else { 0.0 };
         let sway = after.sway * on;
-        if moved {
+        if let Some(threshold) = capped {
             let pairs = before.anchors.iter().zip(&after.anchors);
             let lost: f64 = pairs.map(|(b, a)| on * spring * a.0.max(0.0) * (b.0.max(0.0) - a.0.max(0.0))).sum();
             let force = after.anchors.iter().map(|a| on * spring * a.0.max(0.0)).sum();
-            let beyond = lost * share_beyond(force, capped);
+            let beyond = lost * share_beyond(force, threshold);
             self.sums.energy.advance_cap += beyond;
             self.sums.energy.tip += lost - beyond + p.tip_stiffness * sway.dot(before.sway - sway);
         }
@@ -211,6 +150,82 @@ impl CpuEngine {
         self.tip_forces = after.anchors.into_iter().map(|a| (on * spring * a.0.max(0.0), a.1, a.2)).collect();
         self.state.tip_coordinate = tip.coordinate;
         self.state.tip = tip;
+    }
+
+    /// Moves the tip through the material: advance, slip, retreat. `None`: it stays; else the threshold [N] that the cap on the
+    /// advance holds the force above, infinite where it does not.
+    fn move_tip(
+        &self,
+        plan: &PuncturePlan,
+        free: &FreePlan,
+        pose: &ToolPose,
+        tip: &mut FreeTip,
+        springs: &TipSprings,
+    ) -> Option<f64> {
+        let (mesh, p) = (self.model.mesh.block(), &plan.params);
+        let (t, f, direction) = (pose.direction, springs.gradient, tip.along);
+        let spring = p.tip_stiffness / ANCHOR_COUNT as f64;
+        let force: f64 = springs.anchors.iter().map(|a| spring * a.0.max(0.0)).sum();
+        let stretch = bounded_stretch((f * direction).dot(t));
+        let (material, open) = self.material_ahead(free, tip);
+        if material != tip.material {
+            (tip.material, tip.entry) = (material, tip.coordinate);
+        }
+        let threshold = match open {
+            true => 0.0,
+            false => {
+                free.cuttings[material].threshold(tip.coordinate - tip.entry, p.transition_length)
+                    * p.rate_factor(pose.velocity.length())
+            }
+        };
+        let travel = (pose.velocity.length() + plan.needle.radius * pose.angular_velocity.length()) * self.dt;
+        let cap = advance_limit(tip.coordinate == 0.0, travel);
+        let slip_cap = slip_limit(travel);
+        let advance = tip_advance(force, threshold, p.tip_stiffness, stretch, cap);
+        let retreat = retreat(springs.mean_gap, stretch, slip_cap);
+        let mut slip = pulled_back(f, sway_beyond(springs.sway, force, threshold, p.tip_stiffness));
+        if slip.length() > slip_cap {
+            slip *= slip_cap / slip.length();
+        }
+        if tip.coordinate == 0.0 {
+            // Not through the surface yet: the tip glides on it.
+            slip.z = 0.0;
+        }
+        if !(advance > 0.0 || retreat > 0.0 || slip != DVec3::ZERO) {
+            return None;
+        }
+        tip.place += direction * (advance - retreat) + slip;
+        tip.coordinate = (tip.coordinate + advance - retreat).max(0.0);
+        let wanted = pulled_back(f, t);
+        if wanted.length() > 1e-3 {
+            let part = ((advance + retreat + slip.length()) / TURNING).min(1.0);
+            tip.along = direction.lerp(wanted.normalize(), part).normalize();
+        }
+        tip.across = tip.across.reject_from(tip.along).normalize();
+        if retreat == 0.0 && tip.coordinate > 0.0 {
+            tip.advance = advance + slip.length();
+        }
+        if retreat > 0.0 && tip.place.z > 0.0 {
+            *tip = FreeTip { inside: false, advance: 0.0, coordinate: 0.0, entry: 0.0, ..*tip };
+        }
+        tip.place = if tip.inside { within_block(mesh, tip.place) } else { tip.place };
+        Some(if advance == cap { threshold } else { f64::INFINITY })
+    }
+
+    /// The material just ahead of the tip, farther than a sample that the tip's plane has marked, and whether it is cut already.
+    fn material_ahead(&self, free: &FreePlan, tip: &FreeTip) -> (usize, bool) {
+        let mesh = self.model.mesh.block();
+        let (cell, _, width) = grid_place(mesh, within_block(mesh, tip.place));
+        let samples = SAMPLES as f64;
+        let look = LOOK_AHEAD * 0.5 * tip.along.abs().dot(width / samples);
+        let (cell, local, _) = match free.index(cell) {
+            Some(_) => grid_place(mesh, within_block(mesh, tip.place + tip.along * look)),
+            None => (cell, DVec3::ZERO, width),
+        };
+        let sample: [usize; 3] = std::array::from_fn(|a| ((local[a] * samples) as usize).min(SAMPLES - 1));
+        let bit = sample[0] + SAMPLES * (sample[1] + SAMPLES * sample[2]);
+        let open = free.index(cell).is_some_and(|i| self.state.cut_samples[i] >> bit & 1 == 1);
+        (self.model.material_index(mesh.cell_index(cell[0], cell[1], cell[2])), open)
     }
 
     /// Stage `soften_free_path`: factor `residual^(marked/64)`; the energy that a cell loses is dissipated.

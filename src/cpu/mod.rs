@@ -3,7 +3,9 @@
 mod cohesive_forces;
 mod free_tip;
 mod indenter_contact;
+mod integrate_nodes;
 mod needle_contact;
+mod needle_touch;
 mod slit_contact;
 mod tip;
 
@@ -13,11 +15,10 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::effects::adhesion::Bond;
-use crate::effects::mass_scaling::stable_mass;
 use crate::engine::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use crate::engine::{
     ContactState, Engine, EngineImage, EngineInfo, FrameEnergies, FramePlan, FrameSums, LARGEST_DISPLACEMENT, State,
-    StepInput, WATCHED_STEP_RATIO, foreign_image,
+    StepInput, foreign_image,
 };
 use crate::error::{Error, Result};
 use crate::material_point::PointState;
@@ -43,18 +44,6 @@ struct ContactSums {
     stored: f64,
     /// Held by the springs of a contact that has ended [J].
     released: f64,
-}
-
-/// Sums of one node over one step: energies [J], counts and the ratio of [`FrameSums::step_ratio`].
-#[derive(Debug, Clone, Copy, Default)]
-struct NodeSums {
-    damping: f64,
-    work: f64,
-    raised_energy: f64,
-    clamped_energy: f64,
-    clamped: u32,
-    raised: u32,
-    step_ratio: f64,
 }
 
 /// The f64 engine.
@@ -215,101 +204,6 @@ impl CpuEngine {
         self.sums.health.return_failures += failures;
     }
 
-    /// Stage `integrate_nodes`: `v+ = ((1 - alpha dt/2) v + dt f/m) / (1 + alpha dt/2)`, `u+ = u + dt v+`.
-    fn integrate_nodes(&mut self, input: &StepInput) {
-        let model = self.model.clone();
-        let mesh = &model.mesh;
-        let dt = self.dt;
-        let alpha = model.scene.solver.mass_damping;
-        let limit = model.speed_limit(dt);
-        let selective = model.effects.mass_scaling.is_some();
-        let gravity = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling());
-        let (cells, elements) = (&self.cells, &self.elements);
-        let (external, added_bound) = (&self.external, &self.added_bound);
-        let nodes: Vec<NodeSums> = self
-            .state
-            .displacement
-            .par_iter_mut()
-            .zip(self.state.velocity.par_iter_mut())
-            .enumerate()
-            .with_min_len(256)
-            .map(|(node, (u, v))| {
-                let own = [node as u32];
-                // Tied copies move as one node: every copy sums over all of them and books its share of the mass.
-                let copies = model.separation.tied(node).unwrap_or(&own);
-                let (mut force, mut bound, mut scaled, mut load) = (DVec3::ZERO, 0.0, 0.0, DVec3::ZERO);
-                for copy in copies.iter().map(|n| *n as usize) {
-                    let (f, k) = elements.gather(mesh, cells, copy);
-                    force += f + external[copy];
-                    bound += k + added_bound[copy];
-                    scaled += model.node_mass[copy];
-                    load += gravity * model.node_mass[copy];
-                    load += model.node_load.get(copy).map_or(DVec3::ZERO, |f| *f * input.load_factor);
-                }
-                force += load;
-                let share = if copies.len() > 1 { model.node_mass[node] / scaled } else { 1.0 };
-                let mut sums = NodeSums::default();
-                let mass = if selective { stable_mass(scaled, bound, dt) } else { scaled };
-                sums.raised = u32::from(mass > scaled);
-                let ratio = bound * dt * dt / (4.0 * mass);
-                sums.step_ratio = if ratio > WATCHED_STEP_RATIO { ratio } else { 0.0 };
-                let old = *v;
-                let mut new = (old * (1.0 - 0.5 * alpha * dt) + force * (dt / mass)) / (1.0 + 0.5 * alpha * dt);
-                // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
-                let fixed = model.fixed_components(node);
-                for a in 0..3 {
-                    if fixed[a] {
-                        new[a] = 0.0;
-                    }
-                }
-                let speed = new.length();
-                let mut stopped = DVec3::ZERO;
-                if speed > limit {
-                    stopped = new * (1.0 - limit / speed);
-                    new -= stopped;
-                    sums.clamped = 1;
-                }
-                let mut free_mid = 0.5 * (old + new);
-                let mut work = 0.0;
-                if fixed.contains(&true) {
-                    let prescribed = prescribed_velocity(&model, node, input, dt);
-                    for a in 0..3 {
-                        if fixed[a] {
-                            // Reaction: what the support must add to move the node as prescribed.
-                            let mid = 0.5 * (old[a] + prescribed[a]);
-                            let reaction = mass * (prescribed[a] - old[a]) / dt - force[a];
-                            work += reaction * mid * dt;
-                            new[a] = prescribed[a];
-                            free_mid[a] = 0.0;
-                        }
-                    }
-                }
-                let mid = 0.5 * (old + new);
-                work += load.dot(mid) * dt;
-                sums.damping = share * alpha * mass * free_mid.length_squared() * dt;
-                sums.work = share * work;
-                // The kinetic energy is told with the mass at rest: what the rest of the mass gained in this step is gone.
-                sums.raised_energy = share * 0.5 * (mass - scaled) * (new.length_squared() - old.length_squared());
-                // Work of the force that holds the node back, `m (1 + alpha dt/2) / dt` times what it took of the velocity.
-                sums.clamped_energy = share * mass * (1.0 + 0.5 * alpha * dt) * stopped.dot(free_mid);
-                *v = new;
-                *u += new * dt;
-                sums
-            })
-            .collect();
-        // In the order of the nodes: sums of threads that come as they come would differ in their last bits from run to run.
-        let sums = &mut self.sums;
-        for node in &nodes {
-            sums.energy.damping += node.damping;
-            sums.load_work += node.work;
-            sums.energy.raised_mass += node.raised_energy;
-            sums.energy.speed_limit += node.clamped_energy;
-            sums.health.clamped_nodes += node.clamped;
-            sums.health.raised_mass += node.raised;
-            sums.step_ratio = sums.step_ratio.max(node.step_ratio);
-        }
-    }
-
     /// What the points keep as totals since t = 0.
     fn dissipated(&self) -> FrameEnergies {
         let mut total = FrameEnergies::default();
@@ -410,25 +304,6 @@ impl FrameSums {
         self.energy.friction += c.friction_work;
         self.energy.contact_damping += c.damping + c.released;
     }
-}
-
-/// Velocity that the driven faces prescribe at a node (zero where a face only holds) [m/s].
-fn prescribed_velocity(model: &Model, node: usize, input: &StepInput, dt: f64) -> DVec3 {
-    let mut velocity = DVec3::ZERO;
-    for face in Face::ALL {
-        if !model.lies_on(node, face) || model.faces()[face as usize].drive.is_none() {
-            continue;
-        }
-        let axis = face.axis();
-        let drive = input.drives[face as usize];
-        let arm = model.mesh.rest_position(node) - model.face_centre(face);
-        let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
-        let mut du = drive.translation;
-        du[b] += drive.cosine * arm[b] - drive.sine * arm[c];
-        du[c] += drive.sine * arm[b] + drive.cosine * arm[c];
-        velocity += du / dt;
-    }
-    velocity
 }
 
 /// What each face exerts on the tissue to hold or move its nodes, without inertia and loads [N].

@@ -103,27 +103,7 @@ impl GpuEngine {
             .collect::<Result<Vec<Arc<Compiled>>>>()?;
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
         compiled.iter().try_for_each(|kernel| binds_few(kernel))?;
-        let mut buffers = BTreeMap::new();
-        let mut bytes = 0;
-        for binding in compiled.iter().flat_map(|r| &r.bindings) {
-            let Some(array) = arrays::find(&binding.name) else {
-                return Err(Error::Shader {
-                    stage: "bindings".into(),
-                    message: format!("the engine knows no buffer `{}`", binding.name),
-                });
-            };
-            let name = array.name;
-            if buffers.contains_key(name) {
-                continue;
-            }
-            let contents = (array.fill)(&source);
-            // One stage may read what another one writes.
-            let kinds: Vec<BindingKind> =
-                compiled.iter().flat_map(|r| &r.bindings).filter(|b| b.name == name).map(|b| b.kind).collect();
-            let buffer = allocate(&gpu, name, &contents, &kinds)?;
-            bytes += buffer.device_bytes();
-            buffers.insert(name, buffer);
-        }
+        let buffers = allocated(&gpu, &compiled, &source)?;
         // What a shader writes and a later step may read; sums of a frame are written whole.
         let kept: Vec<&'static str> = arrays::all()
             .filter(|array| !matches!(array.life, Life::Result | Life::Drawn))
@@ -137,35 +117,19 @@ impl GpuEngine {
                 Kernel::new(&gpu.device, r, &buffers, size_of::<StepInput>() as u64, threads)
             })
             .collect::<Result<Vec<Kernel>>>()?;
-        let mut offset = 0;
-        let sums = arrays::all()
-            .filter(|array| array.add.is_some())
-            .filter_map(|array| Some((array, buffers.get(array.name)?.size())))
-            .map(|(array, size)| (array.name, (array.told_from)(&source), size))
-            .map(|(name, from, size)| (name, from, size - from));
-        // Of the displacements only those around the targets.
-        let corners = model.targets.iter().flat_map(|target| target.nodes).map(|node| {
-            let size = size_of::<[i32; 4]>() as u64;
-            ("node_displacement", u64::from(node) * size, size)
-        });
-        let results: Vec<ResultRange> = sums
-            .chain(corners)
-            .map(|(name, from, size)| {
-                offset += size;
-                ResultRange { name, from, offset: offset - size, size }
-            })
-            .collect();
+        let results = result_ranges(&buffers, &source);
+        let size = results.iter().map(|range| range.size).sum::<u64>();
         let staging: Vec<wgpu::Buffer> = (0..RING)
             .map(|_| {
                 gpu.device.create_buffer(&wgpu::BufferDescriptor {
                     label: Some("frame results"),
-                    size: offset,
+                    size,
                     usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
                     mapped_at_creation: false,
                 })
             })
             .collect();
-        bytes += offset * RING as u64;
+        let bytes = buffers.values().map(Memory::device_bytes).sum::<u64>() + size * RING as u64;
         // Error scopes belong to a thread; what the compiling threads met is with the device.
         gpu.check()?;
         if let Some(error) = pollster::block_on(scope.pop()) {
@@ -416,6 +380,51 @@ impl GpuEngine {
             kernel.encode(pass, offset);
         }
     }
+}
+
+/// The arrays that the stages bind, with what they begin with.
+fn allocated(gpu: &Gpu, compiled: &[Arc<Compiled>], source: &Source) -> Result<BTreeMap<&'static str, Memory>> {
+    let mut buffers = BTreeMap::new();
+    for binding in compiled.iter().flat_map(|r| &r.bindings) {
+        let Some(array) = arrays::find(&binding.name) else {
+            return Err(Error::Shader {
+                stage: "bindings".into(),
+                message: format!("the engine knows no buffer `{}`", binding.name),
+            });
+        };
+        let name = array.name;
+        if buffers.contains_key(name) {
+            continue;
+        }
+        let contents = (array.fill)(source);
+        // One stage may read what another one writes.
+        let kinds: Vec<BindingKind> =
+            compiled.iter().flat_map(|r| &r.bindings).filter(|b| b.name == name).map(|b| b.kind).collect();
+        let buffer = allocate(gpu, name, &contents, &kinds)?;
+        buffers.insert(name, buffer);
+    }
+    Ok(buffers)
+}
+
+/// What is read back of every frame: sums, and displacements around the targets.
+fn result_ranges(buffers: &BTreeMap<&'static str, Memory>, source: &Source) -> Vec<ResultRange> {
+    let mut offset = 0;
+    let sums = arrays::all()
+        .filter(|array| array.add.is_some())
+        .filter_map(|array| Some((array, buffers.get(array.name)?.size())))
+        .map(|(array, size)| (array.name, (array.told_from)(source), size))
+        .map(|(name, from, size)| (name, from, size - from));
+    // Of the displacements only those around the targets.
+    let corners = source.model.targets.iter().flat_map(|target| target.nodes).map(|node| {
+        let size = size_of::<[i32; 4]>() as u64;
+        ("node_displacement", u64::from(node) * size, size)
+    });
+    sums.chain(corners)
+        .map(|(name, from, size)| {
+            offset += size;
+            ResultRange { name, from, offset: offset - size, size }
+        })
+        .collect()
 }
 
 /// Refuses a stage that binds more arrays than a portable device does: with many effects and one of the program's own.

@@ -329,54 +329,15 @@ pub fn choose(
     size_of: &mut dyn FnMut(f64) -> std::result::Result<MeshSize, String>,
 ) -> Result<Choice> {
     let base = basis.base;
-    let mut meshes = Meshes { base_mm: base.cell_size_mm, size_of, known: BTreeMap::new() };
-    let has = |axis: Axis| axes.contains(&axis);
-    let mut choice = Choice::default();
-    let planned = |role: Role, settings: Settings, size: MeshSize| -> Option<PlannedRun> {
-        let cost = costs.engines.get(&settings.engine)?;
-        let steps = steps(basis, size, &settings);
-        let added = !settings.effects_beside(base).0.iter().all(|key| key == "mass_scaling");
-        let factor = if added { ADDED_EFFECT } else { 1.0 };
-        let predicted_s = SETUP_S + factor * steps as f64 * cost.of_step(size.cells);
-        Some(PlannedRun { id: settings.id(base), role, settings, cells: size.cells, steps, predicted_s })
-    };
-    let base_size = meshes.size(0).map_err(|reason| {
+    let meshes = Meshes { base_mm: base.cell_size_mm, size_of, known: BTreeMap::new() };
+    let mut planner = Planner { basis, axes, costs, meshes };
+    let base_size = planner.meshes.size(0).map_err(|reason| {
         Error::input(format!("the scene does not run as it is: {reason}"), "see `stylet check` on the scene")
     })?;
-    let with_mass = |settings: Settings, factor: f64| {
-        let mut settings =
-            Settings { mass_scaling: rounded((base.mass_scaling * factor).max(1.0), DECIMALS), ..settings };
-        let key = "mass_scaling".to_string();
-        if settings.mass_scaling > 1.0 && !settings.effects.contains(&key) {
-            settings.effects.insert(0, key);
-        }
-        settings
-    };
-
-    let base_run = planned(Role::Base, base.clone(), base_size)
+    let base_run = planner
+        .planned(Role::Base, base.clone(), base_size)
         .ok_or_else(|| Error::input("the cost of the base engine is not known", "measure it, or leave --shard away"))?;
-
-    // The reference: the finest mesh that its share allows; on it f64 before f32, then the lowest mass scaling.
-    let finest = if has(Axis::Mesh) && basis.has_block { -FINER_LEVELS } else { 0 };
-    let mut reference = None;
-    'levels: for level in finest..=0 {
-        let Ok(size) = meshes.size(level) else { continue };
-        for engine in [Engine::Cpu, Engine::Gpu] {
-            // Something has to be better than in the base.
-            let lower = has(Axis::Mass) || !has(Axis::Mesh);
-            let factors: &[f64] = if lower { &REFERENCE_MASS_FACTORS } else { &[1.0] };
-            for factor in factors {
-                let settings = Settings { cell_size_mm: meshes.edge(level), engine, ..base.clone() };
-                let run = planned(Role::Reference, with_mass(settings, *factor), size);
-                let Some(run) = run.filter(|run| run.predicted_s <= REFERENCE_SHARE * budget_s) else { continue };
-                if run.settings != *base {
-                    reference = Some((level, run));
-                    break 'levels;
-                }
-            }
-        }
-    }
-    let Some((reference_level, reference)) = reference else {
+    let Some((reference_level, reference)) = planner.reference(REFERENCE_SHARE * budget_s) else {
         // Four times the mass scaling less takes twice as many steps.
         let least = 2.0 * base_run.predicted_s / REFERENCE_SHARE;
         return Err(Error::input(
@@ -388,71 +349,26 @@ pub fn choose(
             format!("give more time, about --budget {:.1} or more, or more axes", (least / 60.0).max(0.1)),
         ));
     };
-    if let Err(reason) = meshes.size(reference_level - 1)
-        && reference_level > finest
+    let mut choice = Choice::default();
+    if let Err(reason) = planner.meshes.size(reference_level - 1)
+        && reference_level > planner.finest_level()
     {
-        let what = format!("cells of {} mm", trimmed(meshes.edge(reference_level - 1)));
+        let what = format!("cells of {} mm", trimmed(planner.meshes.edge(reference_level - 1)));
         choice.left_out.push(LeftOut { what, reason });
     }
-
-    let mut wanted: Vec<(Role, Settings, i32)> = Vec::new();
-    if has(Axis::Mesh) && basis.has_block {
-        let mut levels: Vec<i32> = (reference_level..=COARSER_LEVELS).filter(|level| *level != 0).collect();
-        levels.sort_by_key(|level| (level.abs(), *level));
-        wanted.extend(
-            levels
-                .into_iter()
-                .map(|level| (Role::Mesh, Settings { cell_size_mm: meshes.edge(level), ..base.clone() }, level)),
-        );
-    }
-    if has(Axis::Mesh) && !basis.has_block {
-        choice.left_out.push(LeftOut {
-            what: "axis mesh".into(),
-            reason: "the mesh of this scene is a file; its edges cannot be chosen".into(),
-        });
-    }
-    // Minutes after the first run of the same, and never for want of time: without it no time means anything.
-    let again = Settings { repetition: 1, ..base.clone() };
-    wanted.push((Role::Again, again, 0));
-    if has(Axis::Mass) {
-        wanted.extend(MASS_FACTORS.map(|factor| (Role::Mass, with_mass(base.clone(), factor), 0)));
-    }
-    if has(Axis::Engine) {
-        match costs.engines.contains_key(&base.engine.other()) {
-            true => wanted.push((Role::Engine, Settings { engine: base.engine.other(), ..base.clone() }, 0)),
-            false => choice.left_out.push(LeftOut {
-                what: format!("engine {}", base.engine.other().key()),
-                reason: "no adapter was found, or --engine cpu looks for none".into(),
-            }),
-        }
-    }
-    if has(Axis::Step) {
-        let safeties = STEP_FACTORS.map(|factor| rounded((base.safety * factor).min(1.0), DECIMALS));
-        wanted.extend(safeties.map(|safety| (Role::Step, Settings { safety, ..base.clone() }, 0)));
-    }
-    if has(Axis::Effects) {
-        let variants = basis.variants.iter().map(|v| Settings { effects: v.effects.clone(), ..base.clone() });
-        wanted.extend(variants.map(|settings| (Role::Effects, settings, 0)));
-    }
-    if has(Axis::Mesh) && has(Axis::Mass) && basis.has_block {
-        wanted.extend(GRID.iter().filter(|(level, _)| *level >= reference_level).map(|(level, factor)| {
-            let settings = Settings { cell_size_mm: meshes.edge(*level), ..base.clone() };
-            (Role::Grid, with_mass(settings, *factor), *level)
-        }));
-    }
-
+    let wanted = planner.wanted(reference_level, &mut choice.left_out);
     let mut left = PLANNED_SHARE * budget_s - 2.0 * base_run.predicted_s - reference.predicted_s;
     choice.runs = vec![base_run, reference];
     for (role, settings, level) in wanted {
         if choice.runs.iter().any(|run| run.settings == settings) {
             continue;
         }
-        match meshes.size(level) {
+        match planner.meshes.size(level) {
             Err(reason) => {
                 let what = format!("{}: {}", role.key(), settings.describe());
                 choice.left_out.push(LeftOut { what, reason });
             }
-            Ok(size) => match planned(role, settings, size) {
+            Ok(size) => match planner.planned(role, settings, size) {
                 Some(run) if role == Role::Again => choice.runs.push(run),
                 Some(run) if run.predicted_s <= left => {
                     left -= run.predicted_s;
@@ -464,6 +380,117 @@ pub fn choose(
         }
     }
     Ok(choice)
+}
+
+/// What [`choose`] knows while it chooses.
+struct Planner<'a> {
+    basis: &'a Basis<'a>,
+    axes: &'a [Axis],
+    costs: &'a Costs,
+    meshes: Meshes<'a>,
+}
+
+impl Planner<'_> {
+    fn has(&self, axis: Axis) -> bool {
+        self.axes.contains(&axis)
+    }
+
+    /// Level of the finest mesh that is looked at.
+    fn finest_level(&self) -> i32 {
+        if self.has(Axis::Mesh) && self.basis.has_block { -FINER_LEVELS } else { 0 }
+    }
+
+    /// A run with its cost; `None` where that of its engine is not known.
+    fn planned(&self, role: Role, settings: Settings, size: MeshSize) -> Option<PlannedRun> {
+        let (basis, base) = (self.basis, self.basis.base);
+        let cost = self.costs.engines.get(&settings.engine)?;
+        let steps = steps(basis, size, &settings);
+        let added = !settings.effects_beside(base).0.iter().all(|key| key == "mass_scaling");
+        let factor = if added { ADDED_EFFECT } else { 1.0 };
+        let predicted_s = SETUP_S + factor * steps as f64 * cost.of_step(size.cells);
+        Some(PlannedRun { id: settings.id(base), role, settings, cells: size.cells, steps, predicted_s })
+    }
+
+    /// The settings with `factor` times the mass scaling of the base.
+    fn with_mass(&self, settings: Settings, factor: f64) -> Settings {
+        let mass_scaling = rounded((self.basis.base.mass_scaling * factor).max(1.0), DECIMALS);
+        let mut settings = Settings { mass_scaling, ..settings };
+        let key = "mass_scaling".to_string();
+        if settings.mass_scaling > 1.0 && !settings.effects.contains(&key) {
+            settings.effects.insert(0, key);
+        }
+        settings
+    }
+
+    /// The reference with the level of its mesh: the finest mesh on which it takes at most `share_s` [s]; on it f64 before f32,
+    /// then the lowest mass scaling.
+    fn reference(&mut self, share_s: f64) -> Option<(i32, PlannedRun)> {
+        let base = self.basis.base;
+        for level in self.finest_level()..=0 {
+            let Ok(size) = self.meshes.size(level) else { continue };
+            for engine in [Engine::Cpu, Engine::Gpu] {
+                // Something has to be better than in the base.
+                let lower = self.has(Axis::Mass) || !self.has(Axis::Mesh);
+                let factors: &[f64] = if lower { &REFERENCE_MASS_FACTORS } else { &[1.0] };
+                for factor in factors {
+                    let settings = Settings { cell_size_mm: self.meshes.edge(level), engine, ..base.clone() };
+                    let run = self.planned(Role::Reference, self.with_mass(settings, *factor), size);
+                    let Some(run) = run.filter(|run| run.predicted_s <= share_s) else { continue };
+                    if run.settings != *base {
+                        return Some((level, run));
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// The runs that are wanted beside base and reference, with the levels of their meshes, by how much is wanted; adds what
+    /// cannot be had.
+    fn wanted(&self, reference_level: i32, left_out: &mut Vec<LeftOut>) -> Vec<(Role, Settings, i32)> {
+        let (basis, base) = (self.basis, self.basis.base);
+        let mut wanted: Vec<(Role, Settings, i32)> = Vec::new();
+        let of_edge = |level: i32| Settings { cell_size_mm: self.meshes.edge(level), ..base.clone() };
+        if self.has(Axis::Mesh) && basis.has_block {
+            let mut levels: Vec<i32> = (reference_level..=COARSER_LEVELS).filter(|level| *level != 0).collect();
+            levels.sort_by_key(|level| (level.abs(), *level));
+            wanted.extend(levels.into_iter().map(|level| (Role::Mesh, of_edge(level), level)));
+        }
+        if self.has(Axis::Mesh) && !basis.has_block {
+            left_out.push(LeftOut {
+                what: "axis mesh".into(),
+                reason: "the mesh of this scene is a file; its edges cannot be chosen".into(),
+            });
+        }
+        // Minutes after the first run of the same, and never for want of time: without it no time means anything.
+        let again = Settings { repetition: 1, ..base.clone() };
+        wanted.push((Role::Again, again, 0));
+        if self.has(Axis::Mass) {
+            wanted.extend(MASS_FACTORS.map(|factor| (Role::Mass, self.with_mass(base.clone(), factor), 0)));
+        }
+        if self.has(Axis::Engine) {
+            match self.costs.engines.contains_key(&base.engine.other()) {
+                true => wanted.push((Role::Engine, Settings { engine: base.engine.other(), ..base.clone() }, 0)),
+                false => left_out.push(LeftOut {
+                    what: format!("engine {}", base.engine.other().key()),
+                    reason: "no adapter was found, or --engine cpu looks for none".into(),
+                }),
+            }
+        }
+        if self.has(Axis::Step) {
+            let safeties = STEP_FACTORS.map(|factor| rounded((base.safety * factor).min(1.0), DECIMALS));
+            wanted.extend(safeties.map(|safety| (Role::Step, Settings { safety, ..base.clone() }, 0)));
+        }
+        if self.has(Axis::Effects) {
+            let variants = basis.variants.iter().map(|v| Settings { effects: v.effects.clone(), ..base.clone() });
+            wanted.extend(variants.map(|settings| (Role::Effects, settings, 0)));
+        }
+        if self.has(Axis::Mesh) && self.has(Axis::Mass) && basis.has_block {
+            let grid = GRID.iter().filter(|(level, _)| *level >= reference_level);
+            wanted.extend(grid.map(|(level, factor)| (Role::Grid, self.with_mass(of_edge(*level), *factor), *level)));
+        }
+        wanted
+    }
 }
 
 /// Steps of a run: whole steps in every frame, none longer than its settings allow.

@@ -10,8 +10,8 @@ use super::practice::{Leader, Practice, State};
 use super::scene_view::Scale;
 use super::texts;
 use crate::haptic::LoopTiming;
-use crate::observables::ForceParts;
 use crate::observables::field::{Field, Range, VON_MISES};
+use crate::observables::{ForceParts, FrameRecord};
 use crate::training::score::Score;
 
 /// What the user has chosen.
@@ -77,20 +77,7 @@ pub fn controls(
 ) -> Wishes {
     let mut wishes = Wishes::default();
     ui.heading(&practice.scene().title);
-    ui.horizontal(|ui| {
-        let running = practice.state == State::Running;
-        let may_run = matches!(practice.state, State::Running | State::Paused);
-        let label = if running { texts::PAUSE } else { texts::PLAY };
-        if ui.add_enabled(may_run, egui::Button::new(label)).clicked() {
-            practice.state = if running { State::Paused } else { State::Running };
-        }
-        wishes.step = ui.add_enabled(practice.state == State::Paused, egui::Button::new(texts::STEP)).clicked();
-        if ui.button(texts::RESTART).clicked() {
-            wishes.restart = Some(practice.leader);
-        }
-        let done = egui::Button::new(texts::FINISH);
-        wishes.debrief = ui.add_enabled(!practice.records.is_empty(), done).clicked();
-    });
+    run_buttons(ui, practice, &mut wishes);
     if let Some(reason) = &practice.unwritten {
         ui.colored_label(ui.visuals().error_fg_color, format!("{} {reason}", texts::UNWRITTEN));
         wishes.write_again = ui.button(texts::WRITE_AGAIN).clicked();
@@ -118,14 +105,60 @@ pub fn controls(
         }
     }
     if practice.leader == Leader::Hand {
-        let mut speed = desk.speed * 1e3;
-        let largest = (practice.speed_limit * 1e3).min(50.0);
-        if ui.add(egui::Slider::new(&mut speed, 0.5..=largest).text(texts::HAND_SPEED)).changed() {
-            desk.speed = speed * 1e-3;
-        }
-        ui.small(texts::KEYS);
-        ui.small(if practice.path_is_free() { texts::FREE_PATH } else { texts::PLANNED_PATH });
+        hand(ui, practice, desk);
     }
+    tuning(ui, practice, choices);
+    ui.separator();
+    field(ui, practice, choices);
+    appearance::controls(ui, &mut choices.look, !practice.scene().targets.is_empty());
+    let regions = &practice.scene().regions;
+    if !regions.is_empty() {
+        let names = std::iter::once(texts::REMAINDER).chain(regions.iter().map(|region| region.name.as_str()));
+        wishes.recut |= appearance::layers(ui, &mut choices.look, names);
+    }
+    ui.separator();
+    wishes.recut |= cut(ui, choices);
+    ui.horizontal(|ui| {
+        for (preset, name) in Preset::ALL {
+            if ui.small_button(name).clicked() {
+                camera.preset(preset);
+            }
+        }
+    });
+    wishes
+}
+
+/// Run, pause, step, begin anew and finish.
+fn run_buttons(ui: &mut egui::Ui, practice: &mut Practice, wishes: &mut Wishes) {
+    ui.horizontal(|ui| {
+        let running = practice.state == State::Running;
+        let may_run = matches!(practice.state, State::Running | State::Paused);
+        let label = if running { texts::PAUSE } else { texts::PLAY };
+        if ui.add_enabled(may_run, egui::Button::new(label)).clicked() {
+            practice.state = if running { State::Paused } else { State::Running };
+        }
+        wishes.step = ui.add_enabled(practice.state == State::Paused, egui::Button::new(texts::STEP)).clicked();
+        if ui.button(texts::RESTART).clicked() {
+            wishes.restart = Some(practice.leader);
+        }
+        let done = egui::Button::new(texts::FINISH);
+        wishes.debrief = ui.add_enabled(!practice.records.is_empty(), done).clicked();
+    });
+}
+
+/// What a hand needs to know and to choose.
+fn hand(ui: &mut egui::Ui, practice: &Practice, desk: &mut Desk) {
+    let mut speed = desk.speed * 1e3;
+    let largest = (practice.speed_limit * 1e3).min(50.0);
+    if ui.add(egui::Slider::new(&mut speed, 0.5..=largest).text(texts::HAND_SPEED)).changed() {
+        desk.speed = speed * 1e-3;
+    }
+    ui.small(texts::KEYS);
+    ui.small(if practice.path_is_free() { texts::FREE_PATH } else { texts::PLANNED_PATH });
+}
+
+/// Effects with their sliders, and accuracy against cost.
+fn tuning(ui: &mut egui::Ui, practice: &mut Practice, choices: &mut Choices) {
     egui::CollapsingHeader::new(texts::EFFECTS).show(ui, |ui| {
         let (scene, tuning) = practice.tunable();
         super::effects_panel::effects(ui, scene, tuning);
@@ -137,7 +170,10 @@ pub fn controls(
         let (scene, tuning) = practice.tunable();
         choices.accuracy.get_or_insert_with(|| Accuracy::new(scene)).show(ui, scene, tuning, &timing, now);
     });
-    ui.separator();
+}
+
+/// Which field is drawn, and its scale.
+fn field(ui: &mut egui::Ui, practice: &Practice, choices: &mut Choices) {
     egui::ComboBox::from_label(texts::FIELD).selected_text(choices.scale.field.label).show_ui(ui, |ui| {
         for field in Field::drawn_of(practice.scene()) {
             if ui.selectable_label(choices.scale.field == field, field.label).clicked() {
@@ -159,13 +195,11 @@ pub fn controls(
         ui.checkbox(&mut choices.scale.logarithmic, texts::LOGARITHMIC);
     }
     colour_bar(ui, &choices.scale, choices.look.map);
-    appearance::controls(ui, &mut choices.look, !practice.scene().targets.is_empty());
-    let regions = &practice.scene().regions;
-    if !regions.is_empty() {
-        let names = std::iter::once(texts::REMAINDER).chain(regions.iter().map(|region| region.name.as_str()));
-        wishes.recut |= appearance::layers(ui, &mut choices.look, names);
-    }
-    ui.separator();
+}
+
+/// Where the tissue is cut open; true where that changed.
+fn cut(ui: &mut egui::Ui, choices: &mut Choices) -> bool {
+    let mut recut = false;
     ui.label(texts::CUT);
     ui.horizontal(|ui| {
         let mut axis = choices.cut.map(|(axis, _)| axis);
@@ -173,21 +207,14 @@ pub fn controls(
             if ui.radio(axis == value, name).clicked() {
                 axis = value;
                 choices.cut = value.map(|axis| (axis, 0.5));
-                wishes.recut = true;
+                recut = true;
             }
         }
     });
     if let Some((_, at)) = &mut choices.cut {
-        wishes.recut |= ui.add(egui::Slider::new(at, 0.0..=1.0).show_value(false)).changed();
+        recut |= ui.add(egui::Slider::new(at, 0.0..=1.0).show_value(false)).changed();
     }
-    ui.horizontal(|ui| {
-        for (preset, name) in Preset::ALL {
-            if ui.small_button(name).clicked() {
-                camera.preset(preset);
-            }
-        }
-    });
-    wishes
+    recut
 }
 
 /// Scale that a field begins with.
@@ -251,6 +278,25 @@ pub fn readings(
         ui.label(format!("{} {:.2} mm", texts::AT_DEPTH, record.depth * 1e3));
     });
     ui.checkbox(&mut choices.show_parts, texts::PARTS);
+    force_plot(ui, practice, choices.show_parts, reference);
+    numbers(ui, practice, record, haptic);
+    lights(ui, record);
+    if let Some(why) = record.verdict.sentence() {
+        ui.colored_label(egui::Color32::from_rgb(230, 159, 0), format!("{}: {why}", texts::DOUBTFUL));
+    }
+    match &practice.state {
+        State::Stopped(reason) => {
+            ui.colored_label(egui::Color32::from_rgb(230, 159, 0), format!("{}\n{reason}", texts::STOPPED));
+        }
+        State::Ended => {
+            ui.label(texts::ENDED);
+        }
+        State::Running | State::Paused => {}
+    }
+}
+
+/// Force against depth, before the curves that it is compared with.
+fn force_plot(ui: &mut egui::Ui, practice: &Practice, show_parts: bool, reference: &[ReferenceCurve]) {
     let curve = |of: &dyn Fn(&ForceParts) -> f64| -> PlotPoints<'static> {
         // A trainee's minutes are thousands of frames; the plot is some hundred pixels wide.
         let every = practice.records.len().div_ceil(1500).max(1);
@@ -277,7 +323,7 @@ pub fn readings(
                 plot.line(line.color(egui::Color32::GRAY).width(1.5));
             }
             plot.line(Line::new(texts::AXIAL, curve(&|f| f.axial)).width(2.0).color(egui::Color32::WHITE));
-            if choices.show_parts {
+            if show_parts {
                 for part in &ForceParts::PARTS {
                     let [r, g, b] = part.colour;
                     let points = curve(&|f| (part.of)(f));
@@ -285,6 +331,10 @@ pub fn readings(
                 }
             }
         });
+}
+
+/// What the last frame has, and how fast the run goes.
+fn numbers(ui: &mut egui::Ui, practice: &Practice, record: &FrameRecord, haptic: Option<LoopTiming>) {
     egui::Grid::new("numbers").num_columns(2).striped(true).show(ui, |ui| {
         let mut row = |name: &str, value: String| {
             ui.label(name);
@@ -314,6 +364,10 @@ pub fn readings(
             row(texts::HAPTIC_GAP, told);
         }
     });
+}
+
+/// Whether the run is healthy.
+fn lights(ui: &mut egui::Ui, record: &FrameRecord) {
     ui.horizontal_wrapped(|ui| {
         let imbalance = record.verdict.worst_imbalance;
         let bound = crate::verdict::Quantity::EnergyImbalance.bound();
@@ -330,18 +384,6 @@ pub fn readings(
         let inverted = record.health.inverted_cells;
         light(ui, texts::INVERTED_LIGHT, &inverted.to_string(), inverted == 0, inverted < 5);
     });
-    if let Some(why) = record.verdict.sentence() {
-        ui.colored_label(egui::Color32::from_rgb(230, 159, 0), format!("{}: {why}", texts::DOUBTFUL));
-    }
-    match &practice.state {
-        State::Stopped(reason) => {
-            ui.colored_label(egui::Color32::from_rgb(230, 159, 0), format!("{}\n{reason}", texts::STOPPED));
-        }
-        State::Ended => {
-            ui.label(texts::ENDED);
-        }
-        State::Running | State::Paused => {}
-    }
 }
 
 /// What an attempt was worth; false where it was closed.

@@ -313,7 +313,11 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "Bend",
         "GridPlace",
         "MaterialPlace",
-        "FreeContact",
+        "FreeTouch",
+        "PlannedTouch",
+        "StraightAxis",
+        "BentAxis",
+        "Pressing",
         "Contact",
         "Memory",
         "StepSums",
@@ -466,13 +470,19 @@ fn every_file_and_every_define_is_used() {
     }
 }
 
-/// Files in which effects have blocks of code: their order is physics.
-const BODIES: [&str; 4] =
-    ["shared/material_point", "stages/element_forces", "stages/integrate_nodes", "stages/tetrahedron_forces"];
+/// Blocks that stand before one of an effect that is earlier in the table: file, effect, and why.
+const OUT_OF_ORDER: [(&str, &str, &str); 2] = [
+    ("stages/measure_contact", "FLEXIBLE_NEEDLE", "shares the impulses of the nodes before they are cleared"),
+    ("stages/measure_dilatation", "DAMAGE", "holds the block of plasticity, whose strain it needs"),
+];
 
 #[test]
 fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
-    for (name, text) in SOURCES.iter().filter(|s| BODIES.contains(&s.0)) {
+    // What effects do in a stage, and in the material point of both elements: their order is physics.
+    let has_order = |name: &str| name.starts_with("stages/") || name == "shared/material_point";
+    let mut blocks = 0;
+    let mut excused = BTreeSet::new();
+    for (name, text) in SOURCES.iter().filter(|s| has_order(s.0)) {
         let mut last = 0;
         // Imports stand at the top of a file, blocks of code in its functions.
         let body = text.split("fn ").skip(1).collect::<Vec<_>>().join("fn ");
@@ -481,13 +491,19 @@ fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
                 continue;
             };
             assert!(place >= last, "{name}: the block of {line} comes out of order");
-            last = place;
+            blocks += 1;
+            match OUT_OF_ORDER.iter().find(|o| (o.0, o.1) == (name, line)) {
+                Some((_, _, why)) => excused.extend([(*name, *why)]),
+                None => last = place,
+            }
         }
         for effect in &EFFECTS {
             let count = body.lines().filter(|l| l.trim() == format!("#ifdef {}", effect.define)).count();
             assert!(count <= 1, "{name}: {count} blocks of {}", effect.key);
         }
     }
+    assert_eq!(excused.len(), OUT_OF_ORDER.len(), "an exception that nothing needs: {excused:?}");
+    println!("{blocks} blocks of effects");
 }
 
 #[test]

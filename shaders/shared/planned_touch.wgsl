@@ -1,0 +1,59 @@
+// How the needle on a planned path meets a contact node. The same functions as in shared/free_touch.
+#import shared/contact_node
+#import effects/puncture
+#import shared/tip_read
+
+struct PlannedTouch {
+    // Whether the node is to be kept out of the needle, and its r0 [m].
+    touches: bool,
+    rest_radius: f32,
+}
+
+alias Touch = PlannedTouch;
+
+// Share of the tip springs that acts on a grid node [N]; w: of how many stretched springs. The loop is empty for nodes that no
+// anchor can reach.
+fn tip_share(contact: Contact) -> vec4<f32> {
+    var share = vec2<f32>(0.0);
+    let near = abs(contact.rest_axial - tip_state.coordinate) <= puncture.anchor_reach;
+    for (var anchor = select(ANCHOR_COUNT, 0u, near); anchor < ANCHOR_COUNT; anchor++) {
+        let cell = tip_anchor_loads[anchor].cell.xyz;
+        let local = tip_anchor_loads[anchor].local.xyz;
+        let weight = select(vec3<f32>(0.0), 1.0 - local, contact.grid == cell)
+            + select(vec3<f32>(0.0), local, contact.grid == cell + 1u);
+        let force = tip_anchor_loads[anchor].force;
+        share += vec2<f32>(force, select(0.0, 1.0, force != 0.0)) * (weight.x * weight.y * weight.z);
+    }
+    return vec4<f32>(step_input.direction.xyz * share.x, share.y);
+}
+
+// Of contact node `index`, `from_axis` from the axis and `s` behind the tip.
+fn touch_at(index: u32, contact: Contact, from_axis: vec3<f32>, s: f32) -> Touch {
+    let passed = contact.pushed == 1u && contact.rest_axial < tip_state.coordinate && s > 0.0;
+    return Touch(passed, contact.rest_radius);
+}
+
+// Weight of its contact stiffness.
+fn touch_weight(touch: Touch) -> f32 {
+    return ring_weight(touch.rest_radius);
+}
+
+// Velocity past the needle, from that past its tip [m/s].
+fn past_needle(v: vec3<f32>, lever: vec3<f32>) -> vec3<f32> {
+    return v;
+}
+
+// Its overlap as it lets go of the end of what it touches; `d`: the gradient of s.
+fn at_end(touch: Touch, overlap: Overlap, d: vec3<f32>, s: f32) -> Overlap {
+    return overlap;
+}
+
+// What of the stiffness at the node counts in the step [N/m].
+fn counted_bound(touch: Touch, bound: f32) -> f32 {
+    return bound;
+}
+
+// What a node remembers that the needle has left.
+fn left_memory(index: u32) -> Memory {
+    return Memory();
+}
