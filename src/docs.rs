@@ -9,7 +9,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::effects::parameter::Parameter;
-use crate::effects::{EFFECTS, Effect};
+use crate::effects::{EFFECTS, Effect, SELF_CONTAINED, own};
 use crate::engine::Stage;
 use crate::material::{LAWS, Law};
 use crate::observables::ForceParts;
@@ -119,7 +119,7 @@ fn head(effect: &Effect) -> String {
     table(["key", &code(key)], rows)
 }
 
-/// The numbers of an effect that have a slider.
+/// The numbers of an effect that have a slider; where it is complete by itself, all that a scene may write.
 fn numbers(effect: &Effect) -> String {
     let row = |p: &Parameter| {
         let [from, to] = p.range.map(number);
@@ -127,7 +127,14 @@ fn numbers(effect: &Effect) -> String {
         [code(p.key), p.name.into(), p.unit.into(), format!("{from} to {to}"), by.into(), p.source.into()]
     };
     let heads = ["key in a scene", "what", "unit", "slider", "moves by", "the usual value comes from"];
-    table(heads, effect.parameters.iter().map(row))
+    let sliders = table(heads, effect.parameters.iter().map(row));
+    let Some(own) = SELF_CONTAINED.iter().find(|own| own.effect.key == effect.key) else { return sliders };
+    let row = |n: &own::Number| {
+        let [low, high] = n.range.map(number);
+        [code(&format!("{}.{}", effect.key, n.key)), n.text.into(), number(n.default), format!("{low} to {high}")]
+    };
+    let numbers = table(["key in a scene", "what", "default", "accepted"], own.numbers.iter().map(row));
+    if effect.parameters.is_empty() { numbers } else { format!("{numbers}\n{sliders}") }
 }
 
 /// The head of the source of an effect: its equations, assumptions and range.

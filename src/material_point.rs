@@ -87,12 +87,13 @@ impl Material {
     /// A material of a scene with the effects that are on; what it does not state itself comes from the scene's tables.
     pub fn of(tissue: &TissueMaterial, effects: &EffectSet) -> Self {
         let (own, common) = (tissue, effects);
+        let stated = |scene: &own::Chosen| own.own.iter().find(|o| o.effect == scene.effect).unwrap_or(scene).clone();
         Material {
             plasticity: common.plasticity.map(|p| own.plasticity.unwrap_or(p)),
             fibres: common.fibres.map(|p| own.fibres.unwrap_or(p)),
             viscoelastic: common.viscoelastic.clone().map(|p| own.viscoelastic.clone().unwrap_or(p)),
             damage: common.damage.map(|p| own.damage.unwrap_or(p)),
-            own: common.own.clone(),
+            own: common.own.iter().map(stated).collect(),
             ..Self::elastic(tissue.law, tissue.density)
         }
     }

@@ -1,11 +1,6 @@
 // Adhesion: tissue sticks to the tip and lets go; pure functions. Equations: src/effects/adhesion.rs.
-struct AdhesionParams {
-    // Forces F_s and F_k [N], stiffness k [N/m], distance slid until it sticks anew D [m].
-    static_force: f32,
-    kinetic_force: f32,
-    stiffness: f32,
-    sliding_distance: f32,
-}
+// Forces F_s and F_k [N], stiffness k [N/m], distance slid until it sticks anew D [m].
+#params AdhesionParams
 
 @group(0) @binding(14) var<uniform> adhesion: AdhesionParams;
 

@@ -1,11 +1,6 @@
 // Friction with stick memory: pure functions. Equations: src/effects/friction.rs.
-struct FrictionParams {
-    // Coefficient mu, tangential over normal stiffness, length over which mu grows along the shaft [m].
-    coefficient: f32,
-    stiffness_ratio: f32,
-    fade_length: f32,
-    _pad: f32,
-}
+// Coefficient mu, tangential over normal stiffness, length over which mu grows along the shaft [m].
+#params FrictionParams
 
 @group(0) @binding(5) var<uniform> friction: FrictionParams;
 

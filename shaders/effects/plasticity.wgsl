@@ -1,11 +1,6 @@
 // Plasticity: return mapping on the Mandel stress. Equations: src/effects/plasticity.rs.
-struct PlasticityParams {
-    // Yield stress sigma_y and hardening modulus H [Pa].
-    yield_stress: f32,
-    hardening: f32,
-    _pad0: f32,
-    _pad1: f32,
-}
+// Yield stress sigma_y and hardening modulus H [Pa].
+#params PlasticityParams
 
 struct PlasticState {
     // Columns of G - I, G = Fp^-1; w: equivalent plastic strain alpha.

@@ -112,8 +112,8 @@ fn material_point(place: PointPlace, H: mat3x3<f32>) -> PointAnswer {
 #endif
 #ifdef OWN
     // After all others, which know nothing of them: on the whole F, weakened like the rest.
-    advance_own(material, place.cell, H, out.cof, out.dj, out.intact);
-    let own = own_stress(material, place.cell, H, out.cof, out.dj);
+    advance_own(place.material, place.cell, H, out.cof, out.dj, out.intact);
+    let own = own_stress(place.material, place.cell, H, out.cof, out.dj);
     out.P += own.P;
     out.tangent += own.tangent;
 #endif

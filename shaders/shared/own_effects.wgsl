@@ -1,4 +1,4 @@
-// Effects of a program that uses the library. Contract and equations: src/effects/own.rs. `#for own ... #end` repeats its lines for
+// Effects that are complete by themselves. Contract and equations: src/effects/own.rs. `#for own ... #end` repeats its lines for
 // every one of them: `$own` is its key, `$number` its place, `$count` how many there are.
 #import shared/params
 #import shared/elastic
@@ -28,16 +28,18 @@ struct OwnState {
     _pad2: f32,
 }
 
-// Two vectors of numbers for each of at most four effects.
-@group(0) @binding(15) var<uniform> own_numbers: array<vec4<f32>, 8>;
+// Two vectors of numbers for each of at most four effects, of each of 16 materials.
+@group(0) @binding(15) var<uniform> own_numbers: array<vec4<f32>, 128>;
 @group(3) @binding(17) var<storage, read_write> own_states: array<OwnState>;
 
 #for own
 #import own/$own
 #end
 
-fn own_point(material: Material, number: u32, H: mat3x3<f32>, cof: mat3x3<f32>, dj: f32) -> OwnPoint {
-    let numbers = array<vec4<f32>, 2>(own_numbers[2u * number], own_numbers[2u * number + 1u]);
+fn own_point(material_index: u32, number: u32, H: mat3x3<f32>, cof: mat3x3<f32>, dj: f32) -> OwnPoint {
+    let material = materials[material_index];
+    let first = 8u * material_index + 2u * number;
+    let numbers = array<vec4<f32>, 2>(own_numbers[first], own_numbers[first + 1u]);
     return OwnPoint(H, cof, dj, material.bulk_modulus, material.shear_modulus, params.dt, numbers);
 }
 
@@ -47,7 +49,7 @@ struct OwnStress {
 }
 
 // Sum of all stresses; changes nothing.
-fn own_stress(material: Material, cell: u32, H: mat3x3<f32>, cof: mat3x3<f32>, dj: f32) -> OwnStress {
+fn own_stress(material: u32, cell: u32, H: mat3x3<f32>, cof: mat3x3<f32>, dj: f32) -> OwnStress {
     var out: OwnStress;
 #for own
     let point_$number = own_point(material, $number, H, cof, dj);
@@ -59,7 +61,7 @@ fn own_stress(material: Material, cell: u32, H: mat3x3<f32>, cof: mat3x3<f32>, d
 }
 
 // Brings all memories to this step; books what they supply to a point that keeps the part `intact` of its stiffness.
-fn advance_own(material: Material, cell: u32, H: mat3x3<f32>, cof: mat3x3<f32>, dj: f32, intact: f32) {
+fn advance_own(material: u32, cell: u32, H: mat3x3<f32>, cof: mat3x3<f32>, dj: f32, intact: f32) {
 #for own
     var memory_$number = own_states[cell * $count + $number].memory;
     let point_$number = own_point(material, $number, H, cof, dj);
@@ -72,7 +74,7 @@ fn advance_own(material: Material, cell: u32, H: mat3x3<f32>, cof: mat3x3<f32>, 
 }
 
 // Sum of all energies [J/m^3].
-fn own_energy(material: Material, cell: u32, H: mat3x3<f32>, dj: f32) -> f32 {
+fn own_energy(material: u32, cell: u32, H: mat3x3<f32>, dj: f32) -> f32 {
     let cof = cofactor(deformation_gradient(H));
     var energy = 0.0;
 #for own

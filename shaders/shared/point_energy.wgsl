@@ -10,7 +10,7 @@ fn free_energy(place: PointPlace, He: mat3x3<f32>, H: mat3x3<f32>, dj: f32) -> f
     energy -= double_dot(viscous_sum(place.cell), green_lagrange(H));
 #endif
 #ifdef OWN
-    energy += own_energy(materials[place.material], place.cell, H, dj);
+    energy += own_energy(place.material, place.cell, H, dj);
 #endif
     return energy;
 }

@@ -33,7 +33,7 @@ fn point_stress(place: PointPlace, H: mat3x3<f32>, pressure: f32) -> PointStress
     P -= F * viscous_sum(place.cell);
 #endif
 #ifdef OWN
-    P += own_stress(materials[place.material], place.cell, H, cof, dj).P;
+    P += own_stress(place.material, place.cell, H, cof, dj).P;
 #endif
 #ifdef TETRAHEDRA
     // The pressure that cells share is not weakened with one of them.

@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::SceneArgs;
+use crate::effects::own::Chosen;
 use crate::effects::parameter::COUNT;
 use crate::effects::{Effect, EffectSet, Numbers, TissueMaterial, damage, fibres, plasticity, viscoelastic};
 use crate::ending;
@@ -13,6 +14,7 @@ use crate::engine::stable_dt::power_iteration;
 use crate::error::{Result, brief};
 use crate::material::{describe_constants, describe_verdict};
 use crate::mesh::Mesh;
+use crate::model::Model;
 use crate::needle::{TipShape, Tool};
 use crate::scene::{Face, FaceDrive, RegionShape, Scene};
 use crate::simulation::advice::tool_mach;
@@ -61,23 +63,7 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
     for notice in &scene.notices {
         line(format!("note         {notice}"));
     }
-    let size = (scene.tissue.size * 1e3).to_array().map(four_digits);
-    let kind = match &model.mesh {
-        Mesh::Block(block) => {
-            let [nx, ny, nz] = block.cells();
-            format!("{nx} x {ny} x {nz} = ")
-        }
-        Mesh::Tets(_) => "tetrahedra, ".into(),
-    };
-    line(format!(
-        "tissue       {} x {} x {} mm, {kind}{} cells, {} nodes, smallest edge {:.3} mm",
-        size[0],
-        size[1],
-        size[2],
-        model.mesh.cell_count(),
-        model.mesh.node_count(),
-        model.mesh.smallest_edge() * 1e3
-    ));
+    line(format!("tissue       {}", describe_tissue(&model)));
     line(format!("material     {}: {}", scene.material.name, scene.material.source));
     for text in describe_material(&scene.material, &scene.effects) {
         line(format!("             {text}"));
@@ -97,25 +83,7 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         }
         line(format!("             {}", describe_verdict(&region.material.law)));
     }
-    let held: Vec<String> = Face::ALL
-        .into_iter()
-        .map(|f| {
-            let c = &scene.faces[f as usize];
-            let fixed: String =
-                ["x", "y", "z"].into_iter().zip(c.fixed).filter(|(_, on)| *on).map(|(n, _)| n).collect();
-            let moved = match c.drive {
-                None => String::new(),
-                Some(FaceDrive { cycles: 0, duration, .. }) => format!(" moved over {duration:.3} s"),
-                Some(FaceDrive { cycles, duration, .. }) => {
-                    format!(" moved {cycles} times to and fro, {duration:.3} s each way")
-                }
-            };
-            let loaded = if c.traction.is_some() { " loaded" } else { "" };
-            let held = if fixed.is_empty() { "free".into() } else { format!("{fixed} held") };
-            format!("{} {held}{moved}{loaded}", f.key())
-        })
-        .collect();
-    line(format!("boundaries   {}", held.join(", ")));
+    line(format!("boundaries   {}", describe_faces(scene)));
     for support in &scene.supports {
         let names = ["x", "y", "z"].into_iter().zip(support.fixed);
         let fixed: String = names.filter(|(_, on)| *on).map(|(name, _)| name).collect();
@@ -145,41 +113,7 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         line(format!("  {:<13}{}; cost: {}", effect.key, effect.summary, effect.cost));
         line(format!("  {:<13}{}", "", describe_parameters(effect, &scene.numbers())));
     }
-    line(format!("mass scaling {}", model.mass_scaling()));
-    line(format!(
-        "stable step  {:.3} us (wave-speed bound{})",
-        simulation.stable_dt * 1e6,
-        match model.mesh.cell_count() {
-            // It goes over all cells many times.
-            0..=MOST_ITERATED => format!("; power iteration {:.3} us", power_iteration(&model) * 1e6),
-            _ => format!("; no power iteration beyond {MOST_ITERATED} cells"),
-        }
-    ));
-    line(format!(
-        "step         {:.3} us{}, {} steps, {} frames, {:.3} s simulated",
-        simulation.dt() * 1e6,
-        if scene.solver.time_step.is_some() { " (the scene's own)" } else { "" },
-        simulation.total_steps(),
-        simulation.frame_count(),
-        simulation.duration()
-    ));
-    let info = simulation.engine().info().clone();
-    line(format!("engine       {} on {} ({})", info.engine, info.adapter, info.driver));
-    line(format!(
-        "device       {:.2} MB, {:.0} B per cell",
-        info.device_bytes as f64 / 1e6,
-        info.device_bytes as f64 / model.mesh.cell_count() as f64
-    ));
-    match predicted_seconds(&mut simulation)? {
-        Some(seconds) => line(format!(
-            "prediction   {seconds:.1} s of wall time on this adapter, real-time factor {:.2} (from a trial of {TRIAL} s)",
-            simulation.duration() / seconds
-        )),
-        None => line("prediction   shorter than the trial".into()),
-    }
-    for notice in &simulation.notices {
-        line(format!("note         {notice}"));
-    }
+    describe_run(&mut simulation, &mut line)?;
     line("ok".into());
     Ok(out.trim_end().into())
 }
@@ -215,7 +149,8 @@ fn describe_material(material: &TissueMaterial, effects: &EffectSet) -> Vec<Stri
             .filter(|_| effects.puncture.is_some())
             .map(|w| format!("membrane, {} mJ", four_digits(w * 1e3))),
     ];
-    let own: Vec<String> = own.into_iter().flatten().collect();
+    let of_own = |chosen: &Chosen| format!("{} {}", chosen.effect.effect.key, chosen.describe());
+    let own: Vec<String> = own.into_iter().flatten().chain(material.own.iter().map(of_own)).collect();
     if !own.is_empty() {
         lines.push(format!("its own: {}", own.join("; ")));
     }
@@ -235,6 +170,88 @@ fn describe_shape(shape: &RegionShape) -> String {
         }
         RegionShape::MeshTag(tag) => format!("cells of the mesh called {tag}"),
     }
+}
+
+/// Size, cells and nodes.
+fn describe_tissue(model: &Model) -> String {
+    let size = (model.scene.tissue.size * 1e3).to_array().map(four_digits);
+    let kind = match &model.mesh {
+        Mesh::Block(block) => {
+            let [nx, ny, nz] = block.cells();
+            format!("{nx} x {ny} x {nz} = ")
+        }
+        Mesh::Tets(_) => "tetrahedra, ".into(),
+    };
+    format!(
+        "{} x {} x {} mm, {kind}{} cells, {} nodes, smallest edge {:.3} mm",
+        size[0],
+        size[1],
+        size[2],
+        model.mesh.cell_count(),
+        model.mesh.node_count(),
+        model.mesh.smallest_edge() * 1e3
+    )
+}
+
+/// What holds, moves or loads each face.
+fn describe_faces(scene: &Scene) -> String {
+    let describe = |face: Face| {
+        let c = &scene.faces[face as usize];
+        let fixed: String = ["x", "y", "z"].into_iter().zip(c.fixed).filter(|(_, on)| *on).map(|(n, _)| n).collect();
+        let moved = match c.drive {
+            None => String::new(),
+            Some(FaceDrive { cycles: 0, duration, .. }) => format!(" moved over {duration:.3} s"),
+            Some(FaceDrive { cycles, duration, .. }) => {
+                format!(" moved {cycles} times to and fro, {duration:.3} s each way")
+            }
+        };
+        let loaded = if c.traction.is_some() { " loaded" } else { "" };
+        let held = if fixed.is_empty() { "free".into() } else { format!("{fixed} held") };
+        format!("{} {held}{moved}{loaded}", face.key())
+    };
+    Face::ALL.map(describe).join(", ")
+}
+
+/// Steps, engine and predicted time.
+fn describe_run(simulation: &mut Simulation, line: &mut impl FnMut(String)) -> Result<()> {
+    let model = simulation.model.clone();
+    let scene = &model.scene;
+    line(format!("mass scaling {}", model.mass_scaling()));
+    line(format!(
+        "stable step  {:.3} us (wave-speed bound{})",
+        simulation.stable_dt * 1e6,
+        match model.mesh.cell_count() {
+            // It goes over all cells many times.
+            0..=MOST_ITERATED => format!("; power iteration {:.3} us", power_iteration(&model) * 1e6),
+            _ => format!("; no power iteration beyond {MOST_ITERATED} cells"),
+        }
+    ));
+    line(format!(
+        "step         {:.3} us{}, {} steps, {} frames, {:.3} s simulated",
+        simulation.dt() * 1e6,
+        if scene.solver.time_step.is_some() { " (the scene's own)" } else { "" },
+        simulation.total_steps(),
+        simulation.frame_count(),
+        simulation.duration()
+    ));
+    let info = simulation.engine().info().clone();
+    line(format!("engine       {} on {} ({})", info.engine, info.adapter, info.driver));
+    line(format!(
+        "device       {:.2} MB, {:.0} B per cell",
+        info.device_bytes as f64 / 1e6,
+        info.device_bytes as f64 / model.mesh.cell_count() as f64
+    ));
+    match predicted_seconds(simulation)? {
+        Some(seconds) => line(format!(
+            "prediction   {seconds:.1} s of wall time on this adapter, real-time factor {:.2} (from a trial of {TRIAL} s)",
+            simulation.duration() / seconds
+        )),
+        None => line("prediction   shorter than the trial".into()),
+    }
+    for notice in &simulation.notices {
+        line(format!("note         {notice}"));
+    }
+    Ok(())
 }
 
 fn describe_plasticity(p: &plasticity::Params) -> String {
@@ -323,11 +340,10 @@ fn describe_table(effect: &Effect, numbers: &Numbers) -> String {
         let unit = if matches!(parameter.unit, "-" | COUNT) { "" } else { parameter.unit };
         Some(format!("{} {value} {unit}", parameter.name).trim_end().to_string())
     });
-    let own = numbers.effects.own.iter().filter(|chosen| chosen.effect.effect.key == effect.key).flat_map(|chosen| {
-        let pairs = chosen.effect.numbers.iter().zip(&chosen.numbers);
-        pairs.map(|(number, value)| format!("{} {}", number.key, four_digits(value / number.unit)))
-    });
-    named.chain(own).collect::<Vec<_>>().join(", ")
+    match numbers.effects.own.iter().find(|chosen| chosen.effect.effect.key == effect.key) {
+        Some(chosen) => chosen.describe(),
+        None => named.collect::<Vec<_>>().join(", "),
+    }
 }
 
 fn describe_tool(tool: &Tool) -> String {

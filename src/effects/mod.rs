@@ -18,6 +18,10 @@ pub mod viscoelastic;
 
 use crate::material::ElasticLaw;
 
+/// Effects of the program that have the form of [`own`]: law, memory, energy, column and numbers stand in one file, the WGSL in another,
+/// and this line is all that names them. For what acts in a cell and needs no other effect's state.
+pub const SELF_CONTAINED: &[&own::OwnEffect] = &[];
+
 /// One line per effect: its field in [`EffectSet`] and its entry in [`EFFECTS`].
 macro_rules! effects {
     ($($(#[$text:meta])* $name:ident,)+) => {
@@ -26,16 +30,15 @@ macro_rules! effects {
         #[derive(Debug, Clone, PartialEq, Default)]
         pub struct EffectSet {
             $($(#[$text])* pub $name: Option<$name::Params>,)+
-            /// Effects that the program brings along, in the order of the scene's list.
+            /// Those of [`SELF_CONTAINED`] and of a program that uses the library, in the order of the scene's list.
             pub own: Vec<own::Chosen>,
         }
 
-        /// All effects. The order is the order of their blocks in the stages.
-        pub const EFFECTS: [Effect; [$(stringify!($name)),+].len()] = [$($name::EFFECT),+];
+        const WITH_A_FIELD: [Effect; [$(stringify!($name)),+].len()] = [$($name::EFFECT),+];
 
         impl EffectSet {
-            /// Which effects are on, in the order of [`EFFECTS`].
-            fn presence(&self) -> [bool; EFFECTS.len()] {
+            /// Which effects with a field are on.
+            fn presence(&self) -> [bool; WITH_A_FIELD.len()] {
                 [$(self.$name.is_some()),+]
             }
         }
@@ -57,6 +60,20 @@ effects! {
     flexible_needle,
 }
 
+/// All effects. The order is the order of their blocks in the stages.
+pub const EFFECTS: [Effect; WITH_A_FIELD.len() + SELF_CONTAINED.len()] = {
+    let mut all = [WITH_A_FIELD[0]; WITH_A_FIELD.len() + SELF_CONTAINED.len()];
+    let mut place = 1;
+    while place < all.len() {
+        all[place] = match place < WITH_A_FIELD.len() {
+            true => WITH_A_FIELD[place],
+            false => SELF_CONTAINED[place - WITH_A_FIELD.len()].effect,
+        };
+        place += 1;
+    }
+    all
+};
+
 /// Material of the tissue with its origin.
 #[derive(Debug, Clone)]
 pub struct TissueMaterial {
@@ -72,6 +89,8 @@ pub struct TissueMaterial {
     pub fibres: Option<fibres::Params>,
     pub viscoelastic: Option<viscoelastic::Params>,
     pub damage: Option<damage::Params>,
+    /// Numbers of this material's own for effects of [`EffectSet::own`]; those that are not here have the scene's.
+    pub own: Vec<own::Chosen>,
     /// Tip forces in this material; `None`: those of the scene's puncture table.
     pub cutting: Option<puncture::Cutting>,
     /// A membrane: energy that puncturing this layer takes beyond cutting through it [J].
@@ -90,6 +109,7 @@ impl TissueMaterial {
             fibres: None,
             viscoelastic: None,
             damage: None,
+            own: Vec::new(),
             cutting: None,
             membrane_energy: None,
         }
@@ -102,6 +122,15 @@ pub struct Numbers<'a> {
     pub effects: &'a EffectSet,
     /// Of the tissue outside all regions.
     pub material: &'a TissueMaterial,
+}
+
+impl Numbers<'_> {
+    /// The scene's number `key` of the effect called `effect` in [`EffectSet::own`], in the unit of the key; `None`: it is not on.
+    pub fn own(&self, effect: &str, key: &str) -> Option<f64> {
+        let chosen = self.effects.own.iter().find(|chosen| chosen.effect.effect.key == effect)?;
+        let place = chosen.effect.numbers.iter().position(|number| number.key == key)?;
+        Some(chosen.numbers[place] / chosen.effect.numbers[place].unit)
+    }
 }
 
 /// What an effect acts on.
@@ -153,9 +182,9 @@ impl EffectSet {
         self.mass_scaling.is_some() && self.cohesive.is_none()
     }
 
-    /// The effects that are on, in the order of [`EFFECTS`]; behind them those of the program.
+    /// The effects that are on, in the order of [`EFFECTS`]; behind them those of [`EffectSet::own`].
     pub fn active(&self) -> impl Iterator<Item = &'static Effect> + '_ {
-        let built_in = EFFECTS.iter().zip(self.presence()).filter_map(|(effect, on)| on.then_some(effect));
+        let built_in = WITH_A_FIELD.iter().zip(self.presence()).filter_map(|(effect, on)| on.then_some(effect));
         built_in.chain(self.own.iter().map(|chosen| &chosen.effect.effect))
     }
 

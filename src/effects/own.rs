@@ -1,7 +1,8 @@
-//! Effects of a program that uses the library: what acts in a cell beside the twelve built in.
+//! Effects that are complete by themselves: what acts in a cell and needs the state of no other effect.
 //!
 //! Such an effect remembers a few numbers per cell, adds a stress of its own to that of the material and says what energy goes with it.
-//! It is a value, [`OwnEffect`], with its law in f64 and in WGSL; nothing of the library changes:
+//! It is a value, [`OwnEffect`], with its law in f64 and in WGSL. A program that uses the library hands it in with the scene and changes
+//! nothing of the library; the program's own ones stand in [`super::SELF_CONTAINED`]:
 //!
 //! ```text
 //! P = (1 - d) w (P_material(F) + P_own(F, s)) + p cof F        [Pa]
@@ -24,6 +25,7 @@ use glam::DMat3;
 use serde::{Deserialize, Serialize};
 
 use super::Effect;
+use crate::units::four_digits;
 
 /// Most own effects of a scene, and most numbers of each of them.
 pub const LARGEST_COUNT: usize = 4;
@@ -32,7 +34,7 @@ pub const LARGEST_NUMBER_COUNT: usize = 8;
 /// What an effect remembers of a cell: four numbers, zero at rest.
 pub type Memory = [f64; 4];
 
-/// A number of an own effect: a key of the table `[<key of the effect>]` in a scene file.
+/// A number of an own effect: a key of the table `[<key of the effect>]` in a scene file, and of that table in a region.
 #[derive(Debug, Clone, Copy)]
 pub struct Number {
     /// Key in the table; its end tells the unit.
@@ -76,7 +78,7 @@ pub struct Law {
     pub tangent: fn(&Point, &Memory) -> f64,
 }
 
-/// An effect that a program brings along.
+/// An effect that is complete by itself.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnEffect {
     /// Its entry: `key` is its word in the list `effects`, its table and the stem of its functions; its kind is
@@ -112,6 +114,15 @@ pub struct State {
     pub supplied: f64,
 }
 
+impl Chosen {
+    /// Keys and values of all numbers, in the units of the keys.
+    pub fn describe(&self) -> String {
+        let pairs = self.effect.numbers.iter().zip(&self.numbers);
+        let texts = pairs.map(|(number, value)| format!("{} {}", number.key, four_digits(value / number.unit)));
+        texts.collect::<Vec<_>>().join(", ")
+    }
+}
+
 impl OwnEffect {
     /// The effect with its default numbers.
     pub fn chosen(&'static self) -> Chosen {
@@ -129,7 +140,8 @@ impl OwnEffect {
         if !is_name(key) {
             return Some(format!("the key `{key}` of an own effect must be a name of small letters, digits and _"));
         }
-        if super::EFFECTS.iter().any(|e| e.key == key) {
+        let is_built_in = super::SELF_CONTAINED.contains(&self);
+        if !is_built_in && super::EFFECTS.iter().any(|e| e.key == key) {
             return Some(format!("the own effect `{key}` has the key of a built-in one"));
         }
         if self.effect.kind != super::Kind::Constitutive {

@@ -1,7 +1,7 @@
 //! The table of an effect: what a scene may write of it, stated once.
 //!
 //! From one entry of `parameters!` follow the key of the TOML table with its text in the schema, its unit and range, the field of `Params`
-//! with its default, and the slider where there is one. What is no plain number (a list, a vector, a word, a key that another one
+//! with its default, its name and place in a shader, and the slider where there is one. What is no plain number (a list, a vector, a word, a key that another one
 //! replaces) has a key, a field or a slider by hand in the same table; relations between keys are plain code in `src/scene/convert`.
 
 use crate::units::Unit;
@@ -38,6 +38,22 @@ pub trait Table: Sized + 'static {
     }
 }
 
+/// The fields of `Params` that are numbers, as a shader has them: `#params` of the composer writes the struct from the names, and
+/// the arrays of the device are filled with the values, both in the order of the table.
+pub trait ShaderNumbers {
+    const NAMES: &'static [&'static str];
+
+    /// In SI.
+    fn values(&self) -> Vec<f32>;
+
+    /// The values as a uniform wants them, up to a multiple of 16 bytes.
+    fn packed(&self) -> Vec<f32> {
+        let mut values = self.values();
+        values.resize(values.len().next_multiple_of(4), 0.0);
+        values
+    }
+}
+
 /// The table `Table` and the `Params` of an effect. The head names both structs, the key of the effect, and where its present `Params`
 /// stand in `Numbers`, for the sliders. Then the entries, each with its texts: that of a key is its description in the schema.
 ///
@@ -59,37 +75,46 @@ macro_rules! parameters {
         }
 
         $crate::effects::parameters::parameters! {
-            @ $effect [$(#[$table_text])* pub struct $Table] [$(#[$params_text])* pub struct Params] [] [] [] [] [] $($entries)*
+            @ $effect [$(#[$table_text])* pub struct $Table] [$(#[$params_text])* pub struct Params] [] [] [] [] [] [] $($entries)*
         }
     };
-    // What is read is sorted into fields, defaults, keys, plain numbers and sliders.
+    // What is read is sorted into fields, defaults, keys, plain numbers, sliders and names of the fields that are numbers.
     (
-        @ $effect:literal $table:tt $params:tt [$($field:tt)*] [$($default:tt)*] $key:tt $number:tt $slider:tt
+        @ $effect:literal $table:tt $params:tt [$($field:tt)*] [$($default:tt)*] $key:tt $number:tt $slider:tt [$($name_of:ident)*]
+        $(#[$text:meta])* field $name:ident: f64 = $value:expr; $($rest:tt)*
+    ) => {
+        $crate::effects::parameters::parameters! {
+            @ $effect $table $params [$($field)* $(#[$text])* pub $name: f64,] [$($default)* $name: $value,] $key $number $slider
+            [$($name_of)* $name] $($rest)*
+        }
+    };
+    (
+        @ $effect:literal $table:tt $params:tt [$($field:tt)*] [$($default:tt)*] $key:tt $number:tt $slider:tt $names:tt
         $(#[$text:meta])* field $name:ident: $Type:ty = $value:expr; $($rest:tt)*
     ) => {
         $crate::effects::parameters::parameters! {
             @ $effect $table $params [$($field)* $(#[$text])* pub $name: $Type,] [$($default)* $name: $value,] $key $number $slider
-            $($rest)*
+            $names $($rest)*
         }
     };
     (
-        @ $effect:literal $table:tt $params:tt $field:tt $default:tt [$($key:tt)*] $number:tt $slider:tt
+        @ $effect:literal $table:tt $params:tt $field:tt $default:tt [$($key:tt)*] $number:tt $slider:tt $names:tt
         $(#[$text:meta])* key $name:ident: $Type:ty; $($rest:tt)*
     ) => {
         $crate::effects::parameters::parameters! {
-            @ $effect $table $params $field $default [$($key)* $(#[$text])* pub $name: $Type,] $number $slider $($rest)*
+            @ $effect $table $params $field $default [$($key)* $(#[$text])* pub $name: $Type,] $number $slider $names $($rest)*
         }
     };
     (
-        @ $effect:literal $table:tt $params:tt $field:tt $default:tt $key:tt $number:tt [$($slider:tt)*]
+        @ $effect:literal $table:tt $params:tt $field:tt $default:tt $key:tt $number:tt [$($slider:tt)*] $names:tt
         slider $parameter:expr; $($rest:tt)*
     ) => {
         $crate::effects::parameters::parameters! {
-            @ $effect $table $params $field $default $key $number [$($slider)* $parameter,] $($rest)*
+            @ $effect $table $params $field $default $key $number [$($slider)* $parameter,] $names $($rest)*
         }
     };
     (
-        @ $effect:literal $table:tt $params:tt $field:tt $default:tt [$($key:tt)*] [$($number:tt)*] [$($slider:tt)*]
+        @ $effect:literal $table:tt $params:tt $field:tt $default:tt [$($key:tt)*] [$($number:tt)*] [$($slider:tt)*] $names:tt
         $(#[$text:meta])* $name:ident: $unit:expr, $within:expr => in $of:ident: $place:expr
         $(, slider($title:expr, $ends:expr, $source:expr) $(.$how:ident())*)?; $($rest:tt)*
     ) => {
@@ -107,16 +132,16 @@ macro_rules! parameters {
                 concat!($effect, ".", stringify!($name)), $title, $unit.word(), $ends, $source,
                 |numbers| present(numbers).map(|$of| $place / $unit.si),
             )$(.$how())*,)?]
-            $($rest)*
+            $names $($rest)*
         }
     };
     (
-        @ $effect:literal $table:tt $params:tt $field:tt $default:tt $key:tt $number:tt $slider:tt
+        @ $effect:literal $table:tt $params:tt $field:tt $default:tt $key:tt $number:tt $slider:tt $names:tt
         $(#[$text:meta])* $name:ident: $unit:expr, $within:expr => $(#[$field_text:meta])* $own:ident = $value:expr
         $(, slider $slide:tt $(.$how:ident())*)?; $($rest:tt)*
     ) => {
         $crate::effects::parameters::parameters! {
-            @ $effect $table $params $field $default $key $number $slider
+            @ $effect $table $params $field $default $key $number $slider $names
             $(#[$field_text])* field $own: f64 = $value;
             $(#[$text])* $name: $unit, $within => in params: params.$own $(, slider $slide $(.$how())*)?;
             $($rest)*
@@ -124,7 +149,7 @@ macro_rules! parameters {
     };
     (
         @ $effect:literal [$(#[$table_text:meta])* pub struct $Table:ident] [$($params:tt)*]
-        [$($field:tt)*] [$($default:tt)*] [$($key:tt)*] [$($number:tt)*] [$($slider:tt)*]
+        [$($field:tt)*] [$($default:tt)*] [$($key:tt)*] [$($number:tt)*] [$($slider:tt)*] [$($name:ident)*]
     ) => {
         $(#[$table_text])*
         #[derive(Debug, Clone, Default, serde::Deserialize, schemars::JsonSchema)]
@@ -144,6 +169,14 @@ macro_rules! parameters {
             const KEYS: &'static [$crate::effects::parameters::Key<Self>] = &[$($number)*];
         }
 
+        impl $crate::effects::parameters::ShaderNumbers for Params {
+            const NAMES: &'static [&'static str] = &[$(stringify!($name)),*];
+
+            fn values(&self) -> Vec<f32> {
+                vec![$(self.$name as f32),*]
+            }
+        }
+
         /// What may be changed while a run goes on.
         const PARAMETERS: &[$crate::effects::parameter::Parameter] = &[$($slider)*];
     };
@@ -153,7 +186,7 @@ pub(crate) use parameters;
 
 #[cfg(test)]
 mod tests {
-    use super::Table;
+    use super::{ShaderNumbers, Table};
     use crate::units::{MILLIMETRE, ONE};
     use crate::within::Within::{Between, Positive};
 
@@ -188,6 +221,8 @@ mod tests {
         let share = MadeUpTable { share: Some(0.75), ..Default::default() };
         assert_eq!(share.over(Params::default()), Params { length: 2e-3, both: [0.5, 0.75] });
         assert_eq!(MadeUpTable::KEYS.iter().map(|key| key.key).collect::<Vec<_>>(), ["length_mm", "share"]);
+        assert_eq!(Params::NAMES, ["length"]);
+        assert_eq!(Params::default().packed(), [2e-3, 0.0, 0.0, 0.0]);
         let [slider] = PARAMETERS else { panic!("one slider") };
         assert_eq!((slider.key, slider.unit, slider.logarithmic), ("made_up.length_mm", "mm", true));
         let refused = toml::from_str::<MadeUpTable>("lenth_mm = 4").unwrap_err().to_string();

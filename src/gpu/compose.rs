@@ -1,4 +1,5 @@
-//! The text composer of the shaders: `#import`, `#ifdef`, `#ifndef`, `#else`, `#endif`, `#for`, `#end`, `#const`.
+//! The text composer of the shaders: `#import`, `#ifdef`, `#ifndef`, `#else`, `#endif`, `#for`, `#end`, `#const`,
+//! `#params`.
 //!
 //! A file is included once, where it is first imported. `#for law ... #end` repeats its lines for every elastic law whose key is
 //! among the defines, in the order of [`LAWS`]: `$law` is its key, `$number` its place; `#for invariant law` and `#for stretch law`
@@ -14,6 +15,7 @@ use std::sync::{PoisonError, RwLock};
 
 use crate::effects;
 use crate::effects::own::OwnEffect;
+use crate::effects::parameters::ShaderNumbers;
 use crate::engine::WATCHED_STEP_RATIO;
 use crate::error::{Error, Result};
 use crate::material::law::Form;
@@ -29,6 +31,14 @@ pub const CONSTANTS: [&[(&str, f64)]; 4] = [
     &needle::free_path::SHADER_CONSTANTS,
     &effects::mass_scaling::SHADER_CONSTANTS,
     &[("WATCHED_STEP_RATIO", WATCHED_STEP_RATIO)],
+];
+
+/// Structs of the numbers of effects whose table stands in Rust alone: `#params NAME` writes the struct, with what is missing to 16
+/// bytes.
+pub const PARAMS: [(&str, &[&str]); 3] = [
+    ("PlasticityParams", effects::plasticity::Params::NAMES),
+    ("AdhesionParams", effects::adhesion::Params::NAMES),
+    ("FrictionParams", effects::friction::Params::NAMES),
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
@@ -239,6 +249,21 @@ fn compose_from(files: &[(&'static str, &str)], root: &str, defines: &Defines) -
     Ok(out)
 }
 
+/// What `#const` and `#params` stand for.
+fn generated(word: &str, name: &str) -> std::result::Result<String, String> {
+    if word == "const" {
+        let found = CONSTANTS.iter().copied().flatten().find(|(other, _)| *other == name);
+        // All digits of the f64: the compiler of WGSL rounds it as it would a number that stands there.
+        let text = found.map(|(name, value)| format!("const {name}: f32 = {value:?};\n"));
+        return text.ok_or_else(|| format!("unknown number `{name}` in #const"));
+    }
+    let found = PARAMS.iter().find(|(other, _)| *other == name);
+    let (name, fields) = found.ok_or_else(|| format!("unknown struct `{name}` in #params"))?;
+    let missing = (0..fields.len().next_multiple_of(4) - fields.len()).map(|n| format!("_pad{n}"));
+    let lines = fields.iter().map(|f| f.to_string()).chain(missing).map(|field| format!("    {field}: f32,\n"));
+    Ok(format!("struct {name} {{\n{}}}\n", lines.collect::<String>()))
+}
+
 fn include(
     files: &[(&'static str, &str)],
     name: &str,
@@ -297,15 +322,14 @@ fn include(
                     return fail(file, number, "stray #endif".into());
                 }
             }
-            "const" if active => match CONSTANTS.iter().copied().flatten().find(|(name, _)| *name == argument) {
-                Some((name, value)) => {
-                    // All digits of the f64: the compiler of WGSL rounds it as it would a number that stands there.
-                    out.source.push_str(&format!("const {name}: f32 = {value:?};\n"));
-                    out.origin.push((file, number));
+            "const" | "params" if active => match generated(word, argument) {
+                Ok(text) => {
+                    out.source.push_str(&text);
+                    out.origin.extend(text.lines().map(|_| (file, number)));
                 }
-                None => return fail(file, number, format!("unknown number `{argument}` in #const")),
+                Err(message) => return fail(file, number, message),
             },
-            "const" => {}
+            "const" | "params" => {}
             other => return fail(file, number, format!("unknown directive #{other}")),
         }
     }
@@ -333,6 +357,7 @@ mod tests {
         ("end", "#end\n"),
         ("x/constant", "#const SLACK\n#ifdef PUNCTURE\n#const TURNING\n#endif\n"),
         ("number", "#const SLAK\n"),
+        ("struct", "#params FictionParams\n"),
     ];
 
     #[test]
@@ -379,6 +404,7 @@ mod tests {
             ("endless", "endless.wgsl:2: #for without #end"),
             ("end", "unknown directive #end"),
             ("number", "unknown number `SLAK` in #const"),
+            ("struct", "unknown struct `FictionParams` in #params"),
         ] {
             let error = compose_from(FILES, root, &Defines::default()).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");

@@ -47,13 +47,6 @@ shared_structs! {
         failures: f32,
     }
     /// shaders/effects/plasticity.wgsl
-    struct PlasticityParams {
-        yield_stress: f32,
-        hardening: f32,
-        _pad0: f32,
-        _pad1: f32,
-    }
-    /// shaders/effects/plasticity.wgsl
     struct PlasticState {
         x: [f32; 4],
         y: [f32; 4],
@@ -215,13 +208,6 @@ shared_structs! {
         cap_dissipation: f32,
         _pad0: f32,
     }
-    /// shaders/effects/adhesion.wgsl
-    struct AdhesionParams {
-        static_force: f32,
-        kinetic_force: f32,
-        stiffness: f32,
-        sliding_distance: f32,
-    }
     /// shaders/effects/puncture.wgsl
     struct PathCell {
         cell: u32,
@@ -305,13 +291,6 @@ shared_structs! {
         _pad0: f32,
         _pad1: f32,
         _pad2: f32,
-    }
-    /// shaders/effects/friction.wgsl
-    struct FrictionParams {
-        coefficient: f32,
-        stiffness_ratio: f32,
-        fade_length: f32,
-        _pad: f32,
     }
     /// shaders/effects/flexible_needle.wgsl
     struct CentreLine {

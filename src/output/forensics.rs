@@ -99,7 +99,7 @@ pub fn write_forensics(
         whole_file::write(&folder.join(REPORT), report(&told, finding, checkpoint).as_bytes()),
         whole_file::write(&folder.join(FINDING), (json + "\n").as_bytes()),
         whole_file::write(&folder.join(STEPS), steps_table(&finding.steps).as_bytes()),
-        write_energy_table(&folder.join(ENERGIES), last),
+        write_energy_table(&folder.join(ENERGIES), &model.effects.own, last),
         draw(&folder.join(PICTURE), model, finding, device),
         checkpoint.write(&folder.join(CHECKPOINT)),
     ];

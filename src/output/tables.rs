@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use super::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, OutputFolder, SAMPLE_TABLE, TARGET_TABLE};
 use super::sample::{DrivenFace, SAMPLE, SampleRow};
 use super::target::{TARGETS, TargetRow};
+use crate::effects::own::Chosen;
 use crate::observables::FrameRecord;
 use crate::observables::quantity::{CORE, ENERGY, FORCE, Quantity, columns, own_columns, row};
 use crate::scene::Scene;
@@ -169,8 +170,9 @@ impl Tables {
 ///
 /// # Errors
 /// `Error::File` where it cannot be written.
-pub fn write_energy_table(path: &Path, records: &[FrameRecord]) -> Result<()> {
-    let mut table = Table::new(path.to_path_buf(), &columns(&ENERGY))?;
-    records.iter().try_for_each(|record| table.row(&row(&ENERGY, record)))?;
+pub fn write_energy_table(path: &Path, own: &[Chosen], records: &[FrameRecord]) -> Result<()> {
+    let own = own_columns(own);
+    let mut table = Table::new(path.to_path_buf(), &[columns(&ENERGY), columns(&own)].concat())?;
+    records.iter().try_for_each(|record| table.row(&[row(&ENERGY, record), row(&own, record)].concat()))?;
     table.make()
 }

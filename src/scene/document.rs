@@ -120,10 +120,19 @@ impl<'s> Document<'s> {
         })
     }
 
-    /// Takes the value of a top-level key out of what [`Document::deserialize`] reads; messages still find its place.
-    pub fn take(&mut self, key: &str) -> Option<DeValue<'s>> {
-        let DeValue::Table(table) = self.root.get_mut() else { return None };
-        table.remove(key).map(Spanned::into_inner)
+    /// Takes every table called `key` out of what [`Document::deserialize`] reads, each with its path: the one at the top, and those in
+    /// the tables of the list `list`. Messages still find their places.
+    pub fn take(&mut self, key: &str, list: &str) -> Vec<(String, DeValue<'s>)> {
+        let DeValue::Table(root) = self.root.get_mut() else { return Vec::new() };
+        let top = root.remove(key).map(|value| (key.to_string(), value.into_inner()));
+        let Some(DeValue::Array(entries)) = root.get_mut(list).map(Spanned::get_mut) else {
+            return top.into_iter().collect();
+        };
+        let below = entries.iter_mut().enumerate().filter_map(|(index, entry)| {
+            let DeValue::Table(table) = entry.get_mut() else { return None };
+            Some((format!("{list}.{index}.{key}"), table.remove(key)?.into_inner()))
+        });
+        top.into_iter().chain(below).collect()
     }
 
     /// Paths of all numbers that are NaN, infinite or too large for a double.

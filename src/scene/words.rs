@@ -8,7 +8,8 @@ use serde::de::{Deserializer, Error, Visitor};
 use serde_json::json;
 
 use super::needles;
-use crate::effects::EFFECTS;
+use crate::effects::own::Number;
+use crate::effects::{EFFECTS, SELF_CONTAINED};
 use crate::mesh::import::LengthUnit;
 
 /// A text that is one of `words`.
@@ -20,6 +21,27 @@ fn one_of<'a>(words: impl Iterator<Item = &'a str>) -> Schema {
 pub fn effects(_: &mut SchemaGenerator) -> Schema {
     let key = one_of(EFFECTS.iter().map(|effect| effect.key));
     json_schema!({ "type": "array", "items": key, "uniqueItems": true })
+}
+
+/// Adds the tables of effects that are complete by themselves to the tables of the others.
+pub fn self_contained_tables(around: &mut Schema) {
+    for effect in SELF_CONTAINED {
+        let number = |n: &Number| {
+            let text = format!("{}; default {}.", n.text, n.default);
+            let [low, high] = n.range;
+            (n.key.to_string(), json!({ "description": text, "type": "number", "minimum": low, "maximum": high }))
+        };
+        let numbers: serde_json::Map<String, serde_json::Value> = effect.numbers.iter().map(number).collect();
+        let table = json!({
+            "description": format!("Effect `{}`: {}.", effect.effect.key, effect.effect.summary),
+            "type": "object",
+            "additionalProperties": false,
+            "properties": numbers,
+        });
+        if let Some(properties) = around.get_mut("properties").and_then(serde_json::Value::as_object_mut) {
+            properties.insert(effect.effect.key.into(), table);
+        }
+    }
 }
 
 /// Gauges of the needle library.

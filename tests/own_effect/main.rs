@@ -124,6 +124,37 @@ fn the_effect_is_absent_where_it_is_not_listed() {
 }
 
 #[test]
+fn a_region_has_numbers_of_its_own() {
+    let region = "[[region]]\nname = \"core\"\nlayer_mm = [0, 2]\n\
+                  material = { law = \"neo_hookean\", c10_kpa = 5, bulk_modulus_kpa = 100 }\nswelling = { rate_per_s = 0.05 }\n";
+    let text = format!("{TEXT}\n{region}");
+    let scene = |overrides: &[String]| Scene::parse_with(Path::new("swelling.toml"), &text, overrides, &[&SWELLING]);
+    for engine in engines() {
+        let (record, mut simulation) = run(scene(&[]).unwrap(), engine);
+        let state = simulation.engine().read_state().unwrap();
+        let model = simulation.model.clone();
+        let mut seen = [0; 2];
+        for (cell, point) in state.points.iter().enumerate() {
+            let material = model.material_index(cell);
+            let rate = [0.2, 0.05][material];
+            close(&format!("{engine:?}: memory of cell {cell}"), point.own[0].memory[0], rate * record.time, 1e-5);
+            seen[material] += 1;
+        }
+        assert_eq!(seen[0], seen[1], "half of the cells are in the region");
+        at_most(&format!("{engine:?}: unexplained energy"), unexplained(&record).abs(), 5e-3);
+    }
+    let refused = scene(&["region.0.swelling.rate_per_s=3".into()]).unwrap_err().to_string();
+    assert!(refused.contains("`region.0.swelling.rate_per_s` is 3") && refused.contains("from -1 to 1"), "{refused}");
+    let absent = text.replace("\"swelling\"]", "]");
+    let absent = Scene::parse_with(Path::new("swelling.toml"), &absent, &[], &[&SWELLING]).unwrap();
+    assert!(
+        absent.notices.iter().any(|n| n.contains("Table `region.0.swelling` has no effect")),
+        "{:?}",
+        absent.notices
+    );
+}
+
+#[test]
 fn wrong_tables_are_refused_with_line_and_way_out() {
     let refused = |overrides: &[&str], words: &[&str]| {
         let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();

@@ -10,9 +10,9 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use stylet::effects::{EFFECTS, EffectSet, Kind, mass_scaling};
+use stylet::effects::{EFFECTS, EffectSet, Kind, SELF_CONTAINED, mass_scaling};
 use stylet::engine::Stage;
-use stylet::gpu::compose::{Defines, SCENE_DEFINES, SOURCES, compose, compose_without_effects};
+use stylet::gpu::compose::{Defines, PARAMS, SCENE_DEFINES, SOURCES, compose, compose_without_effects};
 use stylet::gpu::kernel::{BindingKind, Reflected, reflect};
 use stylet::gpu::plan::{Features, defines, stages};
 use stylet::gpu::structs::layouts;
@@ -82,7 +82,7 @@ fn effect_set(wanted: impl Fn(&str) -> bool) -> EffectSet {
         indentation: wanted("indentation").then(Default::default),
         friction: wanted("friction").then(Default::default),
         flexible_needle: wanted("flexible_needle").then(Default::default),
-        own: Vec::new(),
+        own: SELF_CONTAINED.iter().filter(|own| wanted(own.effect.key)).map(|own| own.chosen()).collect(),
     };
     let expected: Vec<&str> = EFFECTS.iter().map(|e| e.key).filter(|key| wanted(key)).collect();
     assert_eq!(set.keys(), expected, "order of the effect table");
@@ -297,12 +297,20 @@ fn layout_differences(name: &str, size: usize, fields: &[(&str, usize)], shader:
 fn host_structs_lie_as_the_shaders_read_them() {
     let shader = shader_structs();
     let mut wrong = Vec::new();
-    for (name, size, fields) in layouts() {
-        wrong.extend(layout_differences(name, size, &fields, shader.get(name)));
+    // Those that the composer writes are numbers one after the other.
+    let of_tables = PARAMS.iter().map(|(name, fields)| {
+        let count = fields.len().next_multiple_of(4);
+        let missing = (fields.len()..count).map(|place| ["_pad0", "_pad1", "_pad2"][place - fields.len()]);
+        let all = fields.iter().copied().chain(missing).enumerate();
+        (*name, 4 * count, all.map(|(place, field)| (field, 4 * place)).collect())
+    });
+    let host: Vec<_> = layouts().into_iter().chain(of_tables).collect();
+    for (name, size, fields) in &host {
+        wrong.extend(layout_differences(name, *size, fields, shader.get(*name)));
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // Structs that live in buffers must be known to the host.
-    let host: BTreeSet<&str> = layouts().into_iter().map(|l| l.0).collect();
+    let host: BTreeSet<&str> = host.into_iter().map(|l| l.0).collect();
     let local = [
         "CellEnergy",
         "IsochoricFactors",

@@ -11,7 +11,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::effects::viscoelastic::{LARGEST_TERM_COUNT, Term};
-use crate::effects::{Effect, Kind, damage, fibres, keys_of, plasticity, viscoelastic};
+use crate::effects::{Effect, Kind, SELF_CONTAINED, damage, fibres, keys_of, plasticity, viscoelastic};
 use crate::error::{Error, Result};
 use crate::material::law::{Constant, constants, owners};
 use crate::material::{Continuation, ElasticLaw, LAWS, LawWord, Mode, Verdict, describe_verdict};
@@ -496,6 +496,12 @@ fn effects(args: &MaterialArgs, material: &mut Material) -> Result<()> {
         material.fibres = on(&fibres::EFFECT).then(|| material.fibres.unwrap_or_default());
         material.viscoelastic = on(&viscoelastic::EFFECT).then(|| material.viscoelastic.clone().unwrap_or_default());
         material.damage = on(&damage::EFFECT).then(|| material.damage.unwrap_or_default());
+        material.own.retain(|chosen| on(&chosen.effect.effect));
+        for effect in SELF_CONTAINED.iter().filter(|effect| on(&effect.effect)) {
+            if material.own.iter().all(|chosen| chosen.effect != *effect) {
+                material.own.push(effect.chosen());
+            }
+        }
     }
     let without = |option: &str, effect: &str| {
         Error::input(

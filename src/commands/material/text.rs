@@ -11,6 +11,7 @@ pub(super) fn effect_keys(material: &Material) -> String {
     keys.extend(material.fibres.map(|_| fibres::EFFECT.key));
     keys.extend(material.viscoelastic.as_ref().map(|_| viscoelastic::EFFECT.key));
     keys.extend(material.damage.map(|_| damage::EFFECT.key));
+    keys.extend(material.own.iter().map(|chosen| chosen.effect.effect.key));
     if keys.is_empty() { "elastic".into() } else { keys.join(", ") }
 }
 
@@ -137,6 +138,9 @@ pub(super) fn head(args: &MaterialArgs, subject: &Subject) -> String {
                 args.cell_mm
             ),
         );
+    }
+    for chosen in &m.own {
+        line("", &format!("{}: {}", chosen.effect.effect.key, chosen.describe()));
     }
     line("test", &format!("loading axis x, rate {} 1/s; stresses in kPa", args.rate));
     text

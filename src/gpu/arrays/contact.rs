@@ -3,34 +3,17 @@
 use bytemuck::Zeroable;
 use glam::DVec3;
 
-use super::super::structs::{
-    AdhesionParams, CentreLine, ContactNode, ContactRecord, FrictionParams, IndentationParams,
-};
+use super::super::structs::{CentreLine, ContactNode, ContactRecord, IndentationParams};
 use super::{Array, Life, Place, bytes_of, read_all, to_bytes, vec4, vector, zeros};
+use crate::effects::parameters::ShaderNumbers;
 use crate::engine::ContactState;
 use crate::gpu::layout::Layout;
 use crate::model::{ContactSurface, Model};
 use crate::needle::Tool;
 
 pub(super) const ARRAYS: &[Array] = &[
-    Array::constant("adhesion", |s| {
-        let p = s.model.effects.adhesion.unwrap_or_default();
-        bytes_of(&[AdhesionParams {
-            static_force: p.static_force as f32,
-            kinetic_force: p.kinetic_force as f32,
-            stiffness: p.stiffness as f32,
-            sliding_distance: p.sliding_distance as f32,
-        }])
-    }),
-    Array::constant("friction", |s| {
-        let p = s.model.effects.friction.unwrap_or_default();
-        bytes_of(&[FrictionParams {
-            coefficient: p.coefficient as f32,
-            stiffness_ratio: p.stiffness_ratio as f32,
-            fade_length: p.fade_length as f32,
-            _pad: 0.0,
-        }])
-    }),
+    Array::constant("adhesion", |s| bytes_of(&s.model.effects.adhesion.unwrap_or_default().packed())),
+    Array::constant("friction", |s| bytes_of(&s.model.effects.friction.unwrap_or_default().packed())),
     Array::new("centre_line", Life::Input, |_| zeros(1, size_of::<CentreLine>())),
     Array::constant("indentation", |s| bytes_of(&[indentation_params(s.model)])),
     Array::constant("contact_nodes", |s| bytes_of(&contact_nodes(s.model, s.layout))).at(Place::Sampled(4)),

@@ -4,10 +4,11 @@ use bytemuck::Zeroable;
 use glam::{DMat3, DVec3};
 
 use super::super::structs::{
-    DamageParams, FibreParams, Material, PlasticState, PlasticityParams, PointHistory, PronySeries, PronyTerm,
-    ViscousLayout, ViscousStress,
+    DamageParams, FibreParams, Material, PlasticState, PointHistory, PronySeries, PronyTerm, ViscousLayout,
+    ViscousStress,
 };
 use super::{Array, Place, bytes_of, read_all, to_bytes, vec4, vector, zeros};
+use crate::effects::parameters::ShaderNumbers;
 use crate::engine::elements::HOURGLASS_MODULUS;
 use crate::material_point::{Material as Constants, PointState};
 use crate::model::{LARGEST_MATERIAL_COUNT, Model};
@@ -19,14 +20,7 @@ pub(super) const ARRAYS: &[Array] = &[
     })
     .at(Place::Sampled(1)),
     Array::constant("plasticity", |s| {
-        bytes_of(&per_material(s.model, |m| {
-            let p = m.plasticity.unwrap_or_default();
-            PlasticityParams {
-                yield_stress: p.yield_stress as f32,
-                hardening: p.hardening as f32,
-                ..Zeroable::zeroed()
-            }
-        }))
+        bytes_of(&per_material(s.model, |m| m.plasticity.unwrap_or_default().packed()).concat())
     }),
     Array::state("plastic_state", |s| zeros(s.cells(), size_of::<PlasticState>())).exchanged(
         |bytes, _, state| {
@@ -104,9 +98,9 @@ pub(super) const ARRAYS: &[Array] = &[
 ];
 
 /// One entry per material of a scene; the rest of the 16 repeats the first.
-fn per_material<T: Copy>(model: &Model, entry: impl Fn(&Constants) -> T) -> Vec<T> {
+pub(super) fn per_material<T: Clone>(model: &Model, entry: impl Fn(&Constants) -> T) -> Vec<T> {
     let mut entries: Vec<T> = model.materials.iter().map(&entry).collect();
-    entries.resize(LARGEST_MATERIAL_COUNT, entries[0]);
+    entries.resize(LARGEST_MATERIAL_COUNT, entries[0].clone());
     entries
 }
 

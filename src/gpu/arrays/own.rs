@@ -1,16 +1,19 @@
-//! Numbers and memory of effects that the program brings along, and what they supply.
+//! Numbers and memory of effects that are complete by themselves, and what they supply.
 
 use super::super::structs::OwnState;
+use super::material::per_material;
 use super::{Array, bytes_of, read_all, to_bytes, zeros};
 use crate::effects::own::{self, LARGEST_COUNT, LARGEST_NUMBER_COUNT};
 
 pub(super) const ARRAYS: &[Array] = &[
     Array::constant("own_numbers", |s| {
-        let mut numbers = [0.0f32; LARGEST_COUNT * LARGEST_NUMBER_COUNT];
-        for (places, chosen) in numbers.chunks_exact_mut(LARGEST_NUMBER_COUNT).zip(&s.model.effects.own) {
-            places.iter_mut().zip(&chosen.numbers).for_each(|(place, number)| *place = *number as f32);
-        }
-        bytes_of(&numbers)
+        bytes_of(&per_material(s.model, |material| {
+            let mut numbers = [0.0f32; LARGEST_COUNT * LARGEST_NUMBER_COUNT];
+            for (places, chosen) in numbers.chunks_exact_mut(LARGEST_NUMBER_COUNT).zip(&material.own) {
+                places.iter_mut().zip(&chosen.numbers).for_each(|(place, number)| *place = *number as f32);
+            }
+            numbers
+        }))
     }),
     // One entry per cell and effect, and behind them the sums of the measuring threads: a stage binds few arrays.
     Array {

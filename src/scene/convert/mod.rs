@@ -31,6 +31,7 @@ use super::builder::hourglass_quartic;
 use super::document::{Document, Problems, closest};
 use super::file::*;
 use super::*;
+use crate::effects::SELF_CONTAINED;
 use crate::effects::own::OwnEffect;
 use crate::effects::parameters::Table;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
@@ -82,6 +83,7 @@ pub fn parse(
 ) -> std::result::Result<Scene, String> {
     let mut document = Document::parse(path, source, overrides)?;
     Check::new(&document, path).finite_numbers(&document)?;
+    let own = &[SELF_CONTAINED, own].concat();
     let own_numbers = own::take_tables(&mut document, own);
     let mut check = Check { own_numbers, ..Check::new(&document, path) };
     let file: SceneFile = document.deserialize()?;
@@ -94,7 +96,7 @@ struct Check<'a> {
     notices: Vec<String>,
     /// Folder that relative paths start from: that of the file.
     folder: &'a Path,
-    /// Tables of effects that the program brings along.
+    /// Tables of effects that are complete by themselves.
     own_numbers: OwnNumbers,
 }
 
@@ -136,6 +138,7 @@ impl Check<'_> {
         let motion = self.motion(file, tool.is_some());
         let mut effects = self.effects(file, own, &tool, &motion, (&faces, tissue.size), &material);
         effects.own = self.own_effects(file, own);
+        self.own_numbers_of_regions(file, &effects, &mut regions);
         parameters::settle(
             &mut material,
             &[parameters::of_preset(preset.as_ref()), file.own_tables()],

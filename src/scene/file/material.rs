@@ -109,6 +109,7 @@ pub struct MaterialTable {
 /// A part of the tissue with a material of its own: exactly one shape, in the coordinates of the scene.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = words::self_contained_tables)]
 pub struct RegionTable {
     /// Name for messages and outputs, e.g. "skin".
     pub name: String,

@@ -67,6 +67,7 @@ use text_or_table;
 /// A Stylet scene.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = words::self_contained_tables)]
 pub struct SceneFile {
     /// One line for pictures and reports; default: the file name.
     pub title: Option<String>,

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::super::numbers::{Numbers, list, written};
 use super::{Draft, Drawn};
+use crate::effects::SELF_CONTAINED;
 
 impl Draft {
     /// Tip forces; returns the puncture force [N].
@@ -113,7 +114,7 @@ impl Draft {
         }
     }
 
-    /// Gravity, plasticity, damage, fibres, viscosity.
+    /// Gravity, plasticity, damage, fibres, viscosity, and what is complete by itself.
     pub(super) fn bulk_effects(&mut self, n: &mut Numbers, tame: bool, soft: &Drawn) {
         if n.chance(0.25) {
             self.effects.push("gravity");
@@ -162,6 +163,23 @@ impl Draft {
                 let tau: Vec<f64> = (0..count).map(|_| n.log(0.01, 20.0)).collect();
                 write!(self.tables, "[viscoelastic]\ng = {}\ntau_s = {}\n\n", list(&g), list(&tau)).expect("grows");
             }
+        }
+        for own in SELF_CONTAINED {
+            if !n.chance(0.1) {
+                continue;
+            }
+            let key = own.effect.key;
+            self.effects.push(key);
+            writeln!(self.tables, "[{key}]").expect("text grows");
+            for number in own.numbers {
+                // A reasonable value is between the default and its half.
+                let value = match tame {
+                    true => number.default * n.between(0.5, 1.0),
+                    false => n.between(number.range[0], number.range[1]),
+                };
+                writeln!(self.tables, "{} = {}", number.key, written(value)).expect("text grows");
+            }
+            self.tables.push('\n');
         }
     }
 }
