@@ -267,7 +267,8 @@ pub fn explain() -> String {
     }
     text += &format!(
         "\nThe imbalance is measured against the largest external work so far, at least against the energy of a strain of {FLOOR_STRAIN:e} in \
-         the whole tissue and the work of {FLOOR_STEPS} steps at the rate of the frame. Energy that was created beyond half of the work stops a run after {PATIENCE} frames.\n"
+         the whole tissue and the work of {FLOOR_STEPS} steps at the rate of the frame. Energy that was created beyond half of the work stops a run after {PATIENCE} \
+         frames, and {USELESS_PART} times the work, created or lost, at once.\n"
     );
     text
 }
@@ -275,6 +276,10 @@ pub fn explain() -> String {
 /// Energy that was created, over what was put in, beyond which a run stops after [`PATIENCE`] frames: it grows exponentially.
 pub const CREATED_PART: f64 = 0.5;
 pub const PATIENCE: u32 = 3;
+
+/// Energy that was created or lost, over what was put in, beyond which a run stops at once: the step that follows such a state only
+/// gets shorter, without an end.
+pub const USELESS_PART: f64 = 10.0;
 
 #[cfg(test)]
 mod tests {

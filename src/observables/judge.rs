@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::FrameRecord;
-use crate::verdict::{BOUNDS, Bound, CREATED_PART, Doubt, FLOOR_STEPS, PATIENCE, Quantity, Verdict};
+use crate::verdict::{BOUNDS, Bound, CREATED_PART, Doubt, FLOOR_STEPS, PATIENCE, Quantity, USELESS_PART, Verdict};
 
 /// What stops a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,6 +136,9 @@ impl Judge {
             frames,
             energy: (bound.quantity == Quantity::EnergyImbalance).then_some((missing, put_in)),
         };
+        if (missing / put_in).abs() > USELESS_PART {
+            return Some(trouble(Quantity::EnergyImbalance.bound(), (missing / put_in).abs(), USELESS_PART, 1));
+        }
         let created = -missing / put_in;
         self.creating = if created > CREATED_PART { self.creating + 1 } else { 0 };
         if self.creating >= PATIENCE {
@@ -202,6 +205,16 @@ mod tests {
         }
         let found: Vec<bool> = (4..7).map(|n| judge.check(&frame(n, 4e-3, 7e-3), 100_000).is_some()).collect();
         assert_eq!(found, [false, false, true]);
+    }
+
+    #[test]
+    fn ten_times_the_work_out_of_nothing_stops_at_once() {
+        let mut judge = judge();
+        assert_eq!(judge.check(&frame(0, 0.0, 0.0), 1), None);
+        assert_eq!(judge.check(&frame(1, 1e-3, 1e-3), 100_000), None);
+        assert_eq!(judge.check(&frame(2, 1e-3, 8e-3), 100_000), None);
+        let found = judge.check(&frame(3, 1e-3, 13e-3), 100_000).unwrap();
+        assert_eq!((found.quantity, found.bound, found.frames), (Quantity::EnergyImbalance, USELESS_PART, 1));
     }
 
     #[test]

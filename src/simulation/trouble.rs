@@ -18,15 +18,18 @@ impl Simulation {
             (Quantity::EnergyImbalance, Some((missing, scale))) => {
                 let (place, step) = (self.fastest(), self.step_above_the_stable_one());
                 let word = if missing < 0.0 { "created" } else { "lost" };
+                let when = match trouble.frames {
+                    1 => "at any time".to_string(),
+                    frames => format!("in {frames} frames on end"),
+                };
                 self.error(
                     record,
                     format!(
-                        "{:.3e} J of energy were {word} since t = 0, {:.0} % of the {scale:.3e} J that were put in (at most {:.0} % in \
-                         {} frames on end); {place}{step}",
+                        "{:.3e} J of energy were {word} since t = 0, {:.0} % of the {scale:.3e} J that were put in (at most {:.0} % \
+                         {when}); {place}{step}",
                         missing.abs(),
                         100.0 * missing.abs() / scale,
                         100.0 * trouble.bound,
-                        trouble.frames
                     ),
                 )
             }

@@ -21,7 +21,7 @@
 //! | flexible needle | punctures below half of its buckling load |
 //! | tip numbers | tip springs 0.3 to 10 N/mm, contact stiffness 0.5 to 5, damping to 0.6, softening and fade near their defaults |
 //! | indentation | 0.85 radii and a quarter of the height |
-//! | faces | pressed by 0.35, pulled or sheared by 0.5, turned by 90 degrees, loaded by 0.3 E, not at once; by half a cell against a face that holds their common edge (what a scene is told before it runs) |
+//! | faces | pressed by 0.35, pulled or sheared by 0.5, turned by 90 degrees, loaded by 0.3 E, bent by a load to a strain of 0.3, pressed by half of the buckling load where the sides are free, not at once; by half a cell against a face that holds their common edge (what a scene is told before it runs) |
 //! | gravity | 10 m/s^2 and a tenth of E |
 //! | plasticity, fibres | yields above 0.1 E, hardens below 20 E; k1 up to 5 mu, k2 up to 3 |
 //! | bond | fails at twice its onset or later, strength 0.05 to 6 E, and above the dead load that hangs on it |

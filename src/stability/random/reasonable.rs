@@ -206,6 +206,22 @@ fn faces(model: &Model, softest: f64, not: &mut impl FnMut(bool, String)) {
         if let Some(traction) = condition.traction {
             not(traction.length() <= MOST_LOAD * softest, format!("load of {:.2} E", traction.length() / softest));
             not(condition.traction_ramp > 0.0, "load that comes at once".into());
+            let outwards = if face.is_max() { 1.0 } else { -1.0 };
+            let pressure = -traction[face.axis()] * outwards;
+            // A block without hold across an axis is a cantilever there: Euler's load P = pi^2 E I / (2 L)^2 with I/A = w^2/12.
+            for across in (0..3).filter(|axis| *axis != face.axis()) {
+                let is_free = |other: &Face| other.axis() != across || scene.faces[*other as usize].fixed == [false; 3];
+                if Face::ALL.iter().all(is_free) {
+                    let slenderness = length / scene.tissue.size[across];
+                    let buckling = PI.powi(2) / 48.0 * softest / slenderness.powi(2);
+                    not(
+                        pressure <= 0.5 * buckling,
+                        format!("pressed by {:.2} of its buckling load", pressure / buckling),
+                    );
+                    let bending = 6.0 * traction[across].abs() * slenderness / softest;
+                    not(bending <= MOST_LOAD, format!("bends under a load to a strain of {bending:.2}"));
+                }
+            }
         }
     }
 }
