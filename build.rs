@@ -10,13 +10,13 @@ fn main() -> io::Result<()> {
         "built_in.rs",
         "/// Relative path and bytes of every built-in file, sorted.\npub const BUILT_IN: &[(&str, &[u8])]",
         built_in,
-        |path, name| format!("({name:?}, include_bytes!({path:?}))"),
+        |path, name| format!("({name:?}, include_bytes!({path}))"),
     )?;
     // Those that draw are not composed.
     let shaders = files(&["shaders/effects", "shaders/materials", "shaders/shared", "shaders/stages"])?;
     list("shader_sources.rs", "pub const SOURCES: &[(&str, &str)]", shaders, |path, name| {
         let name = name.trim_start_matches("shaders/").trim_end_matches(".wgsl");
-        format!("({name:?}, include_str!({path:?}))")
+        format!("({name:?}, include_str!({path}))")
     })
 }
 
@@ -31,11 +31,13 @@ fn files(folders: &[&str]) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// Writes the constant `head` with an entry for every file.
-fn list(file: &str, head: &str, names: Vec<String>, entry: impl Fn(&Path, &str) -> String) -> io::Result<()> {
+/// Writes the constant `head` with an entry for every file, made from an expression for its path and its name.
+fn list(file: &str, head: &str, names: Vec<String>, entry: impl Fn(&str, &str) -> String) -> io::Result<()> {
     let mut text = format!("{head} = &[\n");
     for name in names {
-        writeln!(text, "    {},", entry(&root().join(&name), &name)).map_err(io::Error::other)?;
+        // The folder is asked for when the list is compiled: a checkout that was moved with its `target` finds its files.
+        let path = format!("concat!(env!(\"CARGO_MANIFEST_DIR\"), {:?})", format!("/{name}"));
+        writeln!(text, "    {},", entry(&path, &name)).map_err(io::Error::other)?;
     }
     fs::write(PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default()).join(file), text + "];\n")
 }
