@@ -1,5 +1,7 @@
 //! The one error type. A message tells what is wrong, where it stands and the way out.
 
+#![warn(missing_docs)]
+
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -17,25 +19,54 @@ pub enum Error {
     Scene(String),
     /// Another input (file, folder, option) is wrong.
     #[error("{message}\n  way out: {way_out}")]
-    Input { message: String, way_out: String },
+    Input {
+        /// What is wrong, and where.
+        message: String,
+        /// What to do about it.
+        way_out: String,
+    },
     /// No adapter, wrong adapter name, or a device that could not be opened.
     #[error("{message}\n  way out: {way_out}")]
-    Adapter { message: String, way_out: String },
+    Adapter {
+        /// What is not to be had.
+        message: String,
+        /// What to install, to name or to take instead.
+        way_out: String,
+    },
     /// A shader does not compose or does not validate: a broken internal promise.
     #[error("shader {stage}: {message}")]
-    Shader { stage: String, message: String },
+    Shader {
+        /// Stage of a step, or file and line of the source.
+        stage: String,
+        /// Why it is refused.
+        message: String,
+    },
     /// The device reported an error or was lost.
     #[error("device: {0}")]
     Device(String),
     /// The simulation left the range in which its numbers mean something.
     #[error("run stopped in frame {frame} (step {step}, t = {time_s:.6} s): {message}")]
-    Diverged { frame: u64, step: u64, time_s: f64, message: String },
+    Diverged {
+        /// Frame after which the run was stopped, from 0.
+        frame: u64,
+        /// Steps from t = 0 to its end.
+        step: u64,
+        /// Simulated time at its end [s].
+        time_s: f64,
+        /// What left its bound, and where.
+        message: String,
+    },
     /// The end was asked for, and the frame under way was given up.
     #[error("ended by {0} within a frame")]
     Ended(&'static str),
     /// A file could not be written or read.
     #[error("{}: {source}\n  way out: {}", named(path), way_out_of(source))]
-    File { path: PathBuf, source: std::io::Error },
+    File {
+        /// Where it stands or should stand.
+        path: PathBuf,
+        /// What the system answered.
+        source: std::io::Error,
+    },
 }
 
 /// A path in a message.

@@ -11,6 +11,7 @@
 //! tool. [`stability`] runs that line on the hard cases, [`study`] many times over, [`training`] scores what a trainee did, [`haptic`]
 //! gives the forces to a device at 1 kHz. [`untrusted`] lists the readers of files, [`docs`] renders the parts of `docs/` that follow from
 //! tables. `docs/architecture.md` has the floors that these modules stand on; `tests/architecture.rs` holds them.
+//! The modules of the facade carry `#![warn(missing_docs)]`.
 
 #[macro_use]
 pub mod terminal;

@@ -13,6 +13,8 @@
 //! account belong to the middle of the last step ([`crate::observables::EnergyAccount::half_step`]). What stops a run is measured
 //! by the work alone.
 
+#![warn(missing_docs)]
+
 use serde::{Deserialize, Serialize};
 
 /// Strain whose energy in the whole tissue is the floor of the imbalance.
@@ -25,22 +27,34 @@ pub const FLOOR_STEPS: f64 = 50.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
+    /// Energy lost or created without a cause, over the largest external work so far.
     EnergyImbalance,
+    /// Energy taken by raised masses and the speed limit, over the largest external work so far.
     CuredEnergy,
+    /// Node steps that ran into the speed limit, of all of a frame.
     ClampedShare,
+    /// Node steps with a raised mass, of all so far.
     RaisedShare,
+    /// Cells inside out at their centre, of all cells.
     InvertedCells,
+    /// Cells with a corner folded over and a sound centre, of all cells.
     FoldedCells,
+    /// Hourglass over internal energy, sums over all frames so far.
     HourglassShare,
+    /// Kinetic energy of the mass that mass scaling added, over internal energy, sums over all frames so far.
     InertiaShare,
+    /// Cell steps whose return mapping missed the yield condition, of all so far.
     ClippedReturns,
+    /// Frames without a balance of the flexible needle, of all so far.
     UnbalancedNeedle,
+    /// 1 where a displacement or velocity is NaN or out of range, else 0.
     NotFinite,
 }
 
 /// One row of the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Bound {
+    /// What is limited.
     pub quantity: Quantity,
     /// Name in files.
     pub key: &'static str,
@@ -195,12 +209,15 @@ impl Bound {
 /// Something that makes a run doubtful.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Doubt {
+    /// What is beyond its first bound.
     pub quantity: Quantity,
     /// Largest value so far (at the end, where [`Quantity::is_of_the_end`]), and the bound that it left.
     pub value: f64,
+    /// Largest value of a run that is ok, [`Bound::ok`].
     pub bound: f64,
     /// Frame and time [s] at which it began.
     pub frame: u64,
+    /// End of that frame [s].
     pub time_s: f64,
     /// Where: the fastest node or the worst cell when it began.
     pub place: Option<String>,
@@ -232,6 +249,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
+    /// True without doubts.
     pub fn is_ok(&self) -> bool {
         self.doubts.is_empty()
     }
@@ -275,6 +293,7 @@ pub fn explain() -> String {
 
 /// Energy that was created, over what was put in, beyond which a run stops after [`PATIENCE`] frames: it grows exponentially.
 pub const CREATED_PART: f64 = 0.5;
+/// Frames on end with more than [`CREATED_PART`] until a run stops.
 pub const PATIENCE: u32 = 3;
 
 /// Energy that was created or lost, over what was put in, beyond which a run stops at once: the step that follows such a state only

@@ -1,19 +1,35 @@
 //! Effects are chosen by the scene. `None` means absent: no define, no buffer, no binding, no code.
 
+#![warn(missing_docs)]
+
+#[allow(missing_docs)]
 pub mod adhesion;
+#[allow(missing_docs)]
 pub mod cohesive;
+#[allow(missing_docs)]
 pub mod damage;
+#[allow(missing_docs)]
 pub mod fibres;
+#[allow(missing_docs)]
 pub mod flexible_needle;
+#[allow(missing_docs)]
 pub mod friction;
+#[allow(missing_docs)]
 pub mod gravity;
+#[allow(missing_docs)]
 pub mod indentation;
+#[allow(missing_docs)]
 pub mod mass_scaling;
 pub mod own;
+#[allow(missing_docs)]
 pub mod parameter;
+#[allow(missing_docs)]
 pub mod parameters;
+#[allow(missing_docs)]
 pub mod plasticity;
+#[allow(missing_docs)]
 pub mod puncture;
+#[allow(missing_docs)]
 pub mod viscoelastic;
 
 use crate::material::ElasticLaw;
@@ -22,7 +38,7 @@ use crate::material::ElasticLaw;
 /// and this line is all that names them. For what acts in a cell and needs no other effect's state.
 pub const SELF_CONTAINED: &[&own::OwnEffect] = &[];
 
-/// One line per effect: its field in [`EffectSet`] and its entry in [`EFFECTS`].
+/// One line per effect, under the text of its field: the field in [`EffectSet`] and its entry in [`EFFECTS`].
 macro_rules! effects {
     ($($(#[$text:meta])* $name:ident,)+) => {
         /// The effects of one scene, one field per effect, in the order of [`EFFECTS`]. Parameters of a constitutive effect are those of
@@ -46,17 +62,29 @@ macro_rules! effects {
 }
 
 effects! {
+    /// Inertia of the tissue times a factor, for longer steps.
     mass_scaling,
+    /// Weight of the tissue.
     gravity,
+    /// Permanent flow above a yield stress.
     plasticity,
+    /// One family of fibres that stiffen in tension.
     fibres,
+    /// Stress that relaxes with time.
     viscoelastic,
+    /// Failure by plastic displacement.
     damage,
+    /// Faces between cells that separate.
     cohesive,
+    /// Tip law, and contact with the opened path of the needle.
     puncture,
+    /// Tissue that sticks to the tip and lets go.
     adhesion,
+    /// Contact of the top face with a sphere or a flat punch.
     indentation,
+    /// Coulomb friction with stick memory.
     friction,
+    /// The needle as a beam clamped in its hub.
     flexible_needle,
 }
 
@@ -81,13 +109,17 @@ pub struct TissueMaterial {
     pub name: String,
     /// Where the constants come from, one line.
     pub source: String,
+    /// Elastic constants.
     pub law: ElasticLaw,
     /// Density [kg/m^3].
     pub density: f64,
     /// Parameters of this material's own; `None`: those of the scene's table, if the effect is on.
     pub plasticity: Option<plasticity::Params>,
+    /// The same for fibres.
     pub fibres: Option<fibres::Params>,
+    /// The same for relaxation.
     pub viscoelastic: Option<viscoelastic::Params>,
+    /// The same for failure.
     pub damage: Option<damage::Params>,
     /// Numbers of this material's own for effects of [`EffectSet::own`]; those that are not here have the scene's.
     pub own: Vec<own::Chosen>,
@@ -119,6 +151,7 @@ impl TissueMaterial {
 /// Where [`parameter::Parameter`] finds its present value.
 #[derive(Debug, Clone, Copy)]
 pub struct Numbers<'a> {
+    /// Those of the scene.
     pub effects: &'a EffectSet,
     /// Of the tissue outside all regions.
     pub material: &'a TissueMaterial,
@@ -160,6 +193,7 @@ impl Kind {
 pub struct Effect {
     /// Key in the scene's `effects` list and stem of its files.
     pub key: &'static str,
+    /// What it acts on.
     pub kind: Kind,
     /// Keys of effects of which one must be on beside it; none: it works alone.
     pub needs: &'static [&'static str],

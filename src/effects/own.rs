@@ -21,6 +21,8 @@
 //! ```
 //! `OwnPoint` is in `shaders/shared/own_effects.wgsl` and has the fields of [`Point`].
 
+#![warn(missing_docs)]
+
 use glam::DMat3;
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +31,7 @@ use crate::units::four_digits;
 
 /// Most own effects of a scene, and most numbers of each of them.
 pub const LARGEST_COUNT: usize = 4;
+/// Most numbers of one of them.
 pub const LARGEST_NUMBER_COUNT: usize = 8;
 
 /// What an effect remembers of a cell: four numbers, zero at rest.
@@ -58,6 +61,7 @@ pub struct Point<'a> {
     pub numbers: &'a [f64],
     /// Of the material at rest [Pa].
     pub bulk_modulus: f64,
+    /// Of the material at rest [Pa].
     pub shear_modulus: f64,
     /// Time step [s]; zero where nothing is brought forward.
     pub dt: f64,
@@ -86,7 +90,9 @@ pub struct OwnEffect {
     pub effect: Effect,
     /// Column of `energy.csv` for what it has supplied [J], e.g. `swelling_j`.
     pub column: &'static str,
+    /// Keys of its table; [`Point::numbers`] has their values in this order.
     pub numbers: &'static [Number],
+    /// What it does in a cell, in f64.
     pub law: Law,
     /// The functions in WGSL.
     pub shader: &'static str,
@@ -102,13 +108,16 @@ impl PartialEq for OwnEffect {
 /// An own effect that is on, with its numbers in SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chosen {
+    /// What acts.
     pub effect: &'static OwnEffect,
+    /// In SI, in the order of [`OwnEffect::numbers`].
     pub numbers: Vec<f64>,
 }
 
 /// What a cell remembers of one effect.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct State {
+    /// Brought forward by [`Law::advance`].
     pub memory: Memory,
     /// Work that was supplied since it was last told, weighted with the stiffness that was left [J/m^3].
     pub supplied: f64,

@@ -1,6 +1,8 @@
 //! Where the work on the tissue goes. What engines deliver per frame, the account since t = 0, how the one becomes the other and the
 //! columns of `energy.csv` follow from one table: a new energy is one line of it, beside the engines.
 
+#![warn(missing_docs)]
+
 use std::ops::{AddAssign, Sub};
 
 use serde::{Deserialize, Serialize};
@@ -12,6 +14,7 @@ use crate::effects::own::LARGEST_COUNT;
 pub struct EnergyPart {
     /// Column of `energy.csv`.
     pub column: &'static str,
+    /// What it is, in words of a table.
     pub meaning: &'static str,
     /// Its value [J].
     pub of: fn(&EnergyAccount) -> f64,

@@ -1,5 +1,7 @@
 //! What passes between a run and its engine in a frame: the input of every step, and sums.
 
+#![warn(missing_docs)]
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +38,7 @@ pub struct DriveStep {
     pub translation: DVec3,
     /// cos(theta1) - cos(theta0) and sin(theta1) - sin(theta0).
     pub cosine: f64,
+    /// sin(theta1) - sin(theta0).
     pub sine: f64,
 }
 
@@ -88,6 +91,7 @@ impl StepInput {
 pub struct Health {
     /// Smallest J at cell centres, and at cell corners.
     pub min_j: f64,
+    /// Smallest J at cell corners.
     pub min_corner_j: f64,
     /// Cells with J <= 0 at the centre or a corner.
     pub inverted_cells: u32,
@@ -97,7 +101,9 @@ pub struct Health {
     pub inverted_cell: Option<u32>,
     /// Largest damage d; cells deleted so far; cell steps whose return mapping did not meet the yield condition.
     pub largest_damage: f64,
+    /// Cells that are deleted or severed at the end of the frame.
     pub deleted_cells: u32,
+    /// Cell steps of the frame whose return mapping missed the yield condition.
     pub return_failures: u32,
     /// Area of the cohesive faces that have parted: damage times area [m^2].
     pub torn_area: f64,
@@ -115,19 +121,26 @@ pub struct Health {
 /// sums over the steps of the frame. SI.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameSums {
+    /// Frame number.
     pub frame: u64,
+    /// How many were summed.
     pub steps: u32,
     /// Impulse on the tissue [N s] along the insertion direction: tip law in the bulk and in membranes, tissue that sticks to the
     /// tip, contact normals, friction.
     pub cutting_impulse: f64,
+    /// Tip law in membranes [N s].
     pub membrane_impulse: f64,
+    /// Tissue that sticks to the tip [N s].
     pub adhesion_impulse: f64,
+    /// Contact normals [N s].
     pub spreading_impulse: f64,
     /// The part of `spreading_impulse` that acts on the shaft of a needle.
     pub shaft_impulse: f64,
+    /// Friction [N s].
     pub friction_impulse: f64,
     /// Whole impulse [N s] and angular impulse about the tip [N m s], world frame.
     pub impulse: DVec3,
+    /// About the tip, world frame [N m s].
     pub angular_impulse: DVec3,
     /// Work done by the tool [J]; with a flexible needle that of its hub, once the run has booked the beam.
     pub tool_work: f64,

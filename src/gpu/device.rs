@@ -1,5 +1,7 @@
 //! Adapter choice and device. Our own selection, so that a wrong name lists the right ones.
 
+#![warn(missing_docs)]
+
 use std::sync::{Arc, Mutex};
 
 use super::kernel::KernelCache;
@@ -10,8 +12,11 @@ use crate::error::{Error, Result};
 /// An opened device and what is known about its adapter.
 #[derive(Clone)]
 pub struct Gpu {
+    /// Makes buffers and pipelines.
     pub device: wgpu::Device,
+    /// Takes what is submitted, in order.
     pub queue: wgpu::Queue,
+    /// Name, backend and kind of the adapter.
     pub info: wgpu::AdapterInfo,
     /// First error that the device reported outside a call of ours, if any.
     pub failure: Arc<Mutex<Option<String>>>,
@@ -27,6 +32,9 @@ pub fn describe(info: &wgpu::AdapterInfo) -> String {
 }
 
 /// All adapters that wgpu finds under `WGPU_BACKEND` (all backends without it).
+///
+/// # Errors
+/// `Error::Adapter` where `WGPU_BACKEND` names a backend that there is not.
 pub fn adapters() -> Result<Vec<wgpu::Adapter>> {
     adapters_of(wgpu::Backends::all())
 }
@@ -220,6 +228,9 @@ impl Gpu {
     }
 
     /// Fails when the device has reported an error since it was opened.
+    ///
+    /// # Errors
+    /// `Error::Device` with the first of them.
     pub fn check(&self) -> Result<()> {
         let failure = self.failure.lock().map_or(None, |f| f.clone());
         failure.map_or(Ok(()), |text| Err(Error::Device(text)))

@@ -1,5 +1,7 @@
 //! Motion of the tool: phases as a scene states them, and the legs of a rigid motion that they make.
 
+#![warn(missing_docs)]
+
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +16,7 @@ pub struct Motion {
     pub entry: DVec3,
     /// Unit vector of the insertion, into the tissue (z < 0).
     pub direction: DVec3,
+    /// One after the other; the tip stands on the surface before the first.
     pub phases: Vec<Phase>,
     /// What the hub does beside the phases.
     pub vibration: Option<Vibration>,
@@ -44,17 +47,49 @@ impl Vibration {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Phase {
     /// Advance to `depth` at `speed` [m/s].
-    Insert { speed: f64, depth: f64 },
+    Insert {
+        /// Along the needle [m/s].
+        speed: f64,
+        /// Of the tip at the end [m].
+        depth: f64,
+    },
     /// Stand still for `duration` [s].
-    Hold { duration: f64 },
+    Hold {
+        /// Until the next phase [s].
+        duration: f64,
+    },
     /// Go back to `depth` (>= 0 or slightly negative: out of the tissue) at `speed` [m/s].
-    Withdraw { speed: f64, depth: f64 },
+    Withdraw {
+        /// Along the needle, positive [m/s].
+        speed: f64,
+        /// Of the tip at the end [m].
+        depth: f64,
+    },
     /// Bring the tip to `to` [m] on a straight line at `speed` [m/s], and meanwhile the needle to `direction`.
-    Move { to: DVec3, speed: f64, direction: DVec3 },
+    Move {
+        /// Tip at the end [m].
+        to: DVec3,
+        /// Of the tip on its line [m/s].
+        speed: f64,
+        /// Unit vector of the insertion at the end.
+        direction: DVec3,
+    },
     /// Turn to `direction` at `rate` [rad/s] about `pivot` [m], a point fixed in space.
-    Turn { direction: DVec3, rate: f64, pivot: DVec3 },
+    Turn {
+        /// Unit vector of the insertion at the end.
+        direction: DVec3,
+        /// Angular speed [rad/s].
+        rate: f64,
+        /// Stays where it is [m].
+        pivot: DVec3,
+    },
     /// Outside the tissue, in no time: to another `entry` [m] (z = 0) and `direction`, at the same height along the needle.
-    Reposition { entry: DVec3, direction: DVec3 },
+    Reposition {
+        /// Where the axis then meets the top face [m].
+        entry: DVec3,
+        /// Unit vector of the insertion from then on.
+        direction: DVec3,
+    },
 }
 
 /// One phase as a rigid motion with constant rates.
@@ -93,8 +128,11 @@ pub struct HandPose {
 pub struct Placement {
     /// Tip [m], its velocity [m/s], direction (unit) and its rate of change [1/s].
     pub tip: DVec3,
+    /// Of the tip [m/s].
     pub velocity: DVec3,
+    /// Unit vector of the insertion.
     pub direction: DVec3,
+    /// Rate of change of the direction [1/s].
     pub turning: DVec3,
     /// Distance of the tip behind the top face at rest, along the needle [m].
     pub depth: f64,

@@ -1,16 +1,22 @@
 //! Shape of the tool: a needle, solid or hollow, or an indenter.
 
+#![warn(missing_docs)]
+
 /// A rigid tool.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Tool {
+    /// Solid or hollow, with a cone or a bevel.
     Needle(NeedleShape),
     /// Sphere of the given radius [m].
     Sphere {
+        /// Of the ball [m].
         radius: f64,
     },
     /// Flat cylindrical punch of the given radius [m]; `bonded` sticks to the tissue where it touches first.
     FlatPunch {
+        /// Of the flat face [m].
         radius: f64,
+        /// A node that was touched once is held where it was touched.
         bonded: bool,
     },
 }
@@ -33,7 +39,9 @@ pub struct NeedleShape {
     /// Young's modulus [Pa] and density [kg/m^3] of the material, and diameter of the bore [m] (0: solid): how a flexible
     /// needle bends.
     pub youngs_modulus: f64,
+    /// Of the material [kg/m^3].
     pub density: f64,
+    /// Of the bore [m]; 0: solid.
     pub inner_diameter: f64,
     /// Length from the tip to the hub [m]; with the density it gives the mass.
     pub length: f64,

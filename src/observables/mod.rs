@@ -1,6 +1,8 @@
 //! What a run tells about itself: one record per display frame, fields on request. [`quantity`] lists what stands in tables,
 //! [`crate::engine::energy`] where the work goes, [`field`] what is written and drawn of the tissue.
 
+#![warn(missing_docs)]
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -40,6 +42,7 @@ pub struct ForcePart {
     pub name: &'static str,
     /// Column of `force.csv`.
     pub column: &'static str,
+    /// What it is, in words of a table.
     pub meaning: &'static str,
     /// Red, green, blue; people with colour-blindness tell the parts apart (Okabe and Ito 2008).
     pub colour: [u8; 3],
@@ -135,6 +138,7 @@ pub struct FrameRecord {
     pub depth: f64,
     /// Index of the motion phase.
     pub phase: usize,
+    /// Means over the frame.
     pub force: ForceParts,
     /// Material coordinate of the tip along its path, a [m].
     pub tip_coordinate: f64,
@@ -143,11 +147,13 @@ pub struct FrameRecord {
     /// Moment of the same about the axis along the normal of the face through the centre of the tissue at rest, right-handed about the
     /// coordinate axis [N m].
     pub face_moments: [f64; 6],
+    /// Where the work since t = 0 went.
     pub energy: EnergyAccount,
     /// On the run up to this frame.
     pub verdict: Verdict,
     /// Zero without a flexible needle.
     pub needle: NeedleRecord,
+    /// Signs of trouble within the frame.
     pub health: Health,
     /// What the bore of a hollow needle holds.
     pub core: Option<CoreSample>,
@@ -158,6 +164,7 @@ pub struct FrameRecord {
 /// Fields of one moment, for VTU files and pictures.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FieldSnapshot {
+    /// Frame at whose end it was taken.
     pub frame: u64,
     /// Time [s].
     pub time: f64,
@@ -185,17 +192,22 @@ pub struct FieldSnapshot {
     pub stiffness: Vec<f64>,
     /// Equivalent plastic strain alpha and damage d per cell; empty without `plasticity`, `damage`.
     pub plastic_strain: Vec<f64>,
+    /// Damage d per cell, 0..1; empty without `damage`.
     pub damage: Vec<f64>,
     /// Index of the material per cell, 0 outside all regions; empty without regions.
     pub material: Vec<f64>,
 }
 
 mod core_sample;
+#[allow(missing_docs)]
 pub mod field;
+#[allow(missing_docs)]
 mod judge;
 mod needle_volume;
+#[allow(missing_docs)]
 pub mod quantity;
 mod recorder;
+#[allow(missing_docs)]
 mod target;
 
 pub use crate::engine::{EnergyAccount, EnergyPart, FrameEnergies, Health};

@@ -1,5 +1,7 @@
 //! Scenes without a file: a block of tissue with the defaults of scene files, for programs that use the library, benchmarks and tests.
 
+#![warn(missing_docs)]
+
 use glam::DVec3;
 
 use super::{FaceCondition, Outputs, Scene, SolverSettings};

@@ -3,16 +3,22 @@
 //! `file` holds the TOML form (units in the key names), `presets` and `needles` the library of materials and needles;
 //! [`Scene::load`] reads, checks and converts. Nothing after this module knows about millimetres.
 
+#![warn(missing_docs)]
+
 mod block;
 pub mod builder;
 mod convert;
 pub(crate) mod document;
 pub mod edit;
+#[allow(missing_docs)]
 pub mod file;
 mod loading;
+#[allow(missing_docs)]
 pub mod needles;
 pub mod presets;
+#[allow(missing_docs)]
 pub mod task;
+#[allow(missing_docs)]
 pub mod tissue_preset;
 mod words;
 
@@ -36,6 +42,7 @@ pub const MOST_STEPS_PER_FRAME: u64 = 50_000;
 
 /// Upper estimate of the memory of a frame's record, and of a target's in it [B].
 pub const RECORD_BYTES: usize = 1024;
+/// Upper estimate of what a target adds to a record [B].
 pub const RECORD_BYTES_PER_TARGET: usize = 128;
 
 /// One simulation: what is there, what moves, what is simulated and what is written.
@@ -47,6 +54,7 @@ pub struct Scene {
     pub title: String,
     /// File that the scene was read from.
     pub path: PathBuf,
+    /// Size and cells of the block; on a mesh of tetrahedra the box around it.
     pub tissue: Tissue,
     /// Material outside all regions.
     pub material: TissueMaterial,
@@ -58,11 +66,15 @@ pub struct Scene {
     pub supports: Vec<Support>,
     /// Conditions on the six faces, indexed by [`Face`].
     pub faces: [FaceCondition; 6],
+    /// What touches or pierces the tissue.
     pub tool: Option<Tool>,
     /// Motion of the tool; empty exactly when there is no tool.
     pub motion: Motion,
+    /// What acts beside the elasticity of the tissue.
     pub effects: EffectSet,
+    /// How it is integrated over time.
     pub solver: SolverSettings,
+    /// Pictures and field files.
     pub outputs: Outputs,
     /// Points of the tissue that the insertion wants to reach.
     pub targets: Vec<Target>,
@@ -75,6 +87,9 @@ pub struct Scene {
 impl Scene {
     /// Reads, checks and converts a scene file. `overrides` are `key=value` texts (`motion.phase.0.speed_mm_s=5`) that
     /// replace values of the file. Every error is an [`Error::Scene`] with file, line, excerpt and way out.
+    ///
+    /// # Errors
+    /// `Error::Scene` where the file cannot be read, or it or an override is wrong.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
         Self::load_with(path, overrides, &[])
     }
@@ -88,6 +103,9 @@ impl Scene {
     }
 
     /// The same with the text of the file in memory; `path` stands for it in messages, and files that it names start from there.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
     pub fn parse(path: &Path, source: &str, overrides: &[String]) -> Result<Scene> {
         Self::parse_with(path, source, overrides, &[])
     }
@@ -153,7 +171,9 @@ impl Scene {
 pub struct Region {
     /// Name for messages and outputs, e.g. `skin`.
     pub name: String,
+    /// Where it lies.
     pub shape: RegionShape,
+    /// What it is made of.
     pub material: TissueMaterial,
 }
 
@@ -162,22 +182,32 @@ pub struct Region {
 pub enum RegionShape {
     /// Depths below the top face, `top <= -z < bottom`.
     Layer {
+        /// Smallest depth [m], inside.
         top: f64,
+        /// Largest depth [m], outside.
         bottom: f64,
     },
     /// Axis-parallel box.
     Box {
+        /// Corner of the smallest coordinates [m].
         low: DVec3,
+        /// Corner of the largest coordinates [m].
         high: DVec3,
     },
+    /// Ball about a point.
     Sphere {
+        /// Midpoint [m].
         centre: DVec3,
+        /// Largest distance from the midpoint [m].
         radius: f64,
     },
     /// Cylinder between two points of its axis.
     Cylinder {
+        /// Axis point in one end face [m].
         from: DVec3,
+        /// Axis point in the other end face [m].
         to: DVec3,
+        /// Largest distance from the axis [m].
         radius: f64,
     },
     /// Cells of a tetrahedral mesh that carry this region name.
@@ -215,6 +245,7 @@ pub struct Target {
 /// A named node set that is held.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Support {
+    /// Name in the mesh file.
     pub set: String,
     /// Components held at zero: x, y, z.
     pub fixed: [bool; 3],
@@ -224,9 +255,13 @@ pub struct Support {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(usize)]
 pub enum Face {
+    /// x = -size.x/2.
     XMin = 0,
+    /// x = size.x/2.
     XMax = 1,
+    /// y = -size.y/2.
     YMin = 2,
+    /// y = size.y/2.
     YMax = 3,
     /// Bottom, z = -size.z.
     ZMin = 4,
@@ -235,6 +270,7 @@ pub enum Face {
 }
 
 impl Face {
+    /// In the order of their indices.
     pub const ALL: [Face; 6] = [Face::XMin, Face::XMax, Face::YMin, Face::YMax, Face::ZMin, Face::ZMax];
 
     /// Key in the scene file.
@@ -263,6 +299,7 @@ pub struct FaceCondition {
     /// Dead load per rest area [Pa], x, y, z, switched on at t = 0 and growing linearly over `traction_ramp` [s]
     /// (0 = at once).
     pub traction: Option<DVec3>,
+    /// Time over which the dead load grows [s]; 0: at once.
     pub traction_ramp: f64,
 }
 
@@ -328,6 +365,7 @@ pub struct Outputs {
     pub fields_at: Vec<f64>,
     /// Times of pictures and field files in a scene with a tool on a free path [s].
     pub pictures_at_time: Vec<f64>,
+    /// Times of VTU files in a scene with a tool on a free path [s].
     pub fields_at_time: Vec<f64>,
     /// Width of a picture in pixels.
     pub picture_width: u32,

@@ -3,16 +3,25 @@
 //! [`start`] prepares it, [`change`] puts another scene in its place, [`checkpoint`] keeps it and goes on from it, [`flexible_needle`] bends
 //! its needle; `stretch` and `trouble` stop it, [`investigation`] and [`trial`] find out why. [`fields`] is what it shows.
 
+#![warn(missing_docs)]
+
 pub mod advice;
+#[allow(missing_docs)]
 pub mod change;
+#[allow(missing_docs)]
 pub mod checkpoint;
 pub mod fields;
 pub mod flexible_needle;
+#[allow(missing_docs)]
 pub mod investigation;
+#[allow(missing_docs)]
 mod run_engine;
+#[allow(missing_docs)]
 pub mod start;
+#[allow(missing_docs)]
 pub mod stiffening;
 mod stretch;
+#[allow(missing_docs)]
 pub mod trial;
 mod trouble;
 
@@ -61,6 +70,7 @@ impl Purpose {
 
 /// A simulation that is advanced frame by frame.
 pub struct Simulation {
+    /// Scene, mesh and materials as the engine has them.
     pub model: Arc<Model>,
     /// Stable step: the wave-speed bound at rest [s].
     pub stable_dt: f64,
@@ -125,6 +135,7 @@ impl Simulation {
         self.judge.verdict()
     }
 
+    /// For what no record has: state, forces, images.
     pub fn engine(&mut self) -> &mut dyn Engine {
         &mut *self.engine
     }
@@ -149,10 +160,12 @@ impl Simulation {
         self.clock.dt
     }
 
+    /// At present: tissue that stiffens takes more.
     pub fn steps_per_frame(&self) -> u64 {
         self.clock.steps_per_frame
     }
 
+    /// Of the whole run, with the present time step.
     pub fn total_steps(&self) -> u64 {
         self.total_steps
     }
@@ -200,6 +213,9 @@ impl Simulation {
 
     /// Computes the next `count` steps for the sake of the time that they take, in frames of their own that leave no record; false
     /// where the run has no more of them. No frame can follow.
+    ///
+    /// # Errors
+    /// `Error::Device` where the device fails, `Error::Ended` where the end was asked for.
     pub fn try_steps(&mut self, count: u64) -> Result<bool> {
         let most = self.clock.steps_per_frame;
         let (first, end) = (self.tried_steps, self.tried_steps + count);
@@ -239,6 +255,10 @@ impl Simulation {
     }
 
     /// Gives the engine the frames that may be started; [`Simulation::next_frame`] does so by itself.
+    ///
+    /// # Errors
+    /// `Error::Device` where the device fails, `Error::Ended` where the end was asked for; those of [`RunEngine::new`] where
+    /// stiffer tissue takes an engine with more steps.
     pub fn start_frames(&mut self) -> Result<()> {
         while self.may_start(self.started) {
             self.take_due_steps()?;
@@ -253,6 +273,7 @@ impl Simulation {
     ///
     /// # Errors
     /// `Error::Diverged` when the state has left the range in which its numbers mean something; `Error::Device`.
+    /// Those of [`Simulation::start_frames`] too.
     pub fn next_frame(&mut self) -> Result<Option<FrameRecord>> {
         self.start_frames()?;
         if self.collected == self.started {
