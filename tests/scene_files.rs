@@ -211,6 +211,10 @@ fn wrong_boundaries() {
         let tables = format!("[boundaries]\nz_max = {text}\n\n[needle]");
         assert_refused(&[("[needle]", &tables)], "z_max", &[expected]);
     }
+    let loads = "[boundaries]\nx_min = {traction_kpa = [1, 0, 0]}\n\
+                 z_max = {traction_kpa = [0, 0, 1], traction_ramp_s = 0.5}\n\n[needle]";
+    let expected = ["z_max grows over 0.5 s and that of face x_min over 0 s", "the same traction_ramp_s for both"];
+    assert_refused(&[("[needle]", loads)], "z_max", &expected);
 }
 
 #[test]

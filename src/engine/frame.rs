@@ -23,7 +23,7 @@ pub const LARGEST_DISPLACEMENT: f64 = 0.03;
 pub struct StepInput {
     /// Tool pose at the beginning of the step, where forces are evaluated.
     pub pose: Option<ToolPose>,
-    /// Increment of the ramped loads' factor: value at the beginning of the step, 0..1.
+    /// Part of the loads on faces that acts at the beginning of the step, 0 to 1.
     pub load_factor: f64,
     /// Motion of the driven faces during the step.
     pub drives: [DriveStep; 6],

@@ -11,7 +11,7 @@ impl Check<'_> {
     /// Conditions of the six faces; those of a mesh are the sides of its bounding box and free unless written.
     pub(super) fn faces(&mut self, table: &BoundariesTable, of_mesh: bool) -> [FaceCondition; 6] {
         let entries = [&table.x_min, &table.x_max, &table.y_min, &table.y_max, &table.z_min, &table.z_max];
-        Face::ALL.map(|face| {
+        let conditions = Face::ALL.map(|face| {
             let default = if of_mesh || face == Face::ZMax { FaceKind::Free } else { FaceKind::Fixed };
             match entries[face as usize] {
                 None => face_of_kind(face, default),
@@ -23,7 +23,29 @@ impl Check<'_> {
                     self.face(face, table)
                 }
             }
-        })
+        });
+        self.one_ramp(&conditions);
+        conditions
+    }
+
+    /// One factor scales the loads of a run: they grow together.
+    fn one_ramp(&mut self, conditions: &[FaceCondition; 6]) {
+        let mut loaded = Face::ALL.into_iter().filter(|face| conditions[*face as usize].traction.is_some());
+        let ramp = |face: Face| conditions[face as usize].traction_ramp;
+        let Some(first) = loaded.next() else { return };
+        for other in loaded.filter(|other| ramp(*other) != ramp(first)) {
+            let (one, two) = (four_digits(ramp(first)), four_digits(ramp(other)));
+            self.problems.report(
+                &format!("boundaries.{}.traction_ramp_s", other.key()),
+                format!(
+                    "the load of face {} grows over {two} s and that of face {} over {one} s",
+                    other.key(),
+                    first.key()
+                ),
+                "the loads of a scene grow together",
+                format!("write the same traction_ramp_s for both faces, e.g. {one}"),
+            );
+        }
     }
 
     fn face(&mut self, face: Face, table: &FaceTable) -> FaceCondition {

@@ -214,7 +214,7 @@ pub struct FaceTable {
     pub cycles: Option<u32>,
     /// Dead load per rest area [kPa].
     pub traction_kpa: Option<[f64; 3]>,
-    /// Time over which the load grows linearly [s]; default 0: at once.
+    /// Time over which the load grows linearly [s], the same for all loaded faces; default 0: at once.
     pub traction_ramp_s: Option<f64>,
 }
 
