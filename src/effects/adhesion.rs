@@ -24,6 +24,7 @@ use super::{Effect, Kind};
 use crate::units::{MILLIMETRE, NEWTON, NEWTON_PER_MILLIMETRE};
 use crate::within::Within::{NotNegative, Positive};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "adhesion",
     kind: Kind::Tool,

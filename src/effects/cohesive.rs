@@ -30,6 +30,7 @@ use super::{Effect, Kind};
 use crate::units::{JOULE_PER_SQUARE_METRE, KILOPASCAL, ONE};
 use crate::within::Within::{Between, Positive};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "cohesive",
     kind: Kind::Faces,
@@ -128,7 +129,9 @@ pub const TORN_REACH: f64 = 0.3;
 /// A plane of the block that may separate: all points with coordinate `at` [m] on the axis 0, 1 or 2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
+    /// 0, 1 or 2.
     pub axis: usize,
+    /// Coordinate along the axis [m].
     pub at: f64,
     /// Where the needle passes it, the tip opens it: pairs within the radius of the needle lose their bond with it.
     pub tip_driven: bool,
@@ -144,10 +147,15 @@ pub const LEAST_OPENING_RATIO: f64 = 1.1;
 /// The law with its penalty stiffness.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Law {
+    /// Largest traction in opening [Pa].
     pub strength: f64,
+    /// Largest traction in sliding [Pa].
     pub shear_strength: f64,
+    /// Fracture energy of opening G_Ic [J/m^2].
     pub energy: f64,
+    /// Fracture energy of sliding G_IIc [J/m^2].
     pub shear_energy: f64,
+    /// Exponent of the mixture of modes (dimensionless).
     pub exponent: f64,
     /// K [Pa/m].
     pub penalty: f64,

@@ -17,6 +17,7 @@ use super::{Effect, Kind};
 use crate::units::{MILLIMETRE, ONE};
 use crate::within::Within::{Between, NotNegative, Positive};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "damage",
     kind: Kind::Constitutive,

@@ -18,6 +18,7 @@ use crate::material::kinematics::{cofactor, isochoric_factor, jacobian_minus_one
 use crate::units::{KILOPASCAL, ONE};
 use crate::within::Within::{NotNegative, Positive};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "fibres",
     kind: Kind::Constitutive,

@@ -34,6 +34,7 @@ use crate::needle::beam::{BeamParams, Section};
 use crate::units::MILLIMETRE;
 use crate::within::Within::{Between, NotNegative};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "flexible_needle",
     kind: Kind::Tool,

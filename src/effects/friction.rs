@@ -21,8 +21,9 @@ pub struct Stick {
     pub stretch: DVec3,
     /// Force on the tissue [N].
     pub force: DVec3,
-    /// Dissipated by sliding in the step, and stored after it [J].
+    /// Dissipated by sliding in the step [J].
     pub dissipated: f64,
+    /// Stored after it [J].
     pub stored: f64,
 }
 
@@ -49,6 +50,7 @@ pub fn part_on_shaft(s: f64, tip_length: f64, fade: f64) -> f64 {
     ((s - tip_length) / fade).clamp(0.0, 1.0)
 }
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "friction",
     kind: Kind::Tool,

@@ -10,6 +10,7 @@ use serde::Deserialize;
 use super::parameter::{Parameter, Value};
 use super::{Effect, Kind};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "gravity",
     kind: Kind::Nodes,

@@ -18,6 +18,7 @@ use crate::needle::Tool;
 use crate::units::{OF_CRITICAL, ONE};
 use crate::within::Within::{NotNegative, Positive};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "indentation",
     kind: Kind::Contact,

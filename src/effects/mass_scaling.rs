@@ -11,6 +11,7 @@
 use super::parameter::Parameter;
 use super::{Effect, Kind};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "mass_scaling",
     kind: Kind::Nodes,
@@ -47,16 +48,16 @@ pub fn stable_mass(mass: f64, bound: f64, dt: f64) -> f64 {
     (bound * dt * dt / (4.0 * RAISED_STEP_RATIO)).max(mass).min(MOST_RAISED * mass)
 }
 
-/// Largest ratio of tool speed to scaled shear wave speed that `auto` allows, and beyond which a scene is told that inertia will show
-/// (dimensionless).
+/// Largest ratio of tool speed to scaled shear wave speed that `auto` allows (dimensionless).
 pub const AUTO_MACH: f64 = 0.03;
+/// The ratio beyond which a scene is told that inertia will show (dimensionless).
 pub const MOST_MACH: f64 = 2.0 * AUTO_MACH;
 
-/// Passages of a scaled shear wave through the tissue during which `auto` lets a face move or a load grow, and below which a scene is
-/// told that inertia will show. Sheared by v t on one side, a block has `1/6 m v^2` of kinetic and `1/2 G (v t / L)^2 V` of elastic
+/// Passages of a scaled shear wave through the tissue during which `auto` lets a face move or a load grow. Sheared by v t on one side, a block has `1/6 m v^2` of kinetic and `1/2 G (v t / L)^2 V` of elastic
 /// energy: with p passages in all, and twice the kinetic energy for the wave of the sudden start, the sum of the one over the run is
 /// 2/p^2 of the other: 3 % at 8 passages, 8 % at 5.
 pub const AUTO_PASSAGES: f64 = 8.0;
+/// Passages below which a scene is told that inertia will show.
 pub const FEWEST_PASSAGES: f64 = 5.0;
 
 /// Parameters in SI units.

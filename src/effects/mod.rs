@@ -2,34 +2,20 @@
 
 #![warn(missing_docs)]
 
-#[allow(missing_docs)]
 pub mod adhesion;
-#[allow(missing_docs)]
 pub mod cohesive;
-#[allow(missing_docs)]
 pub mod damage;
-#[allow(missing_docs)]
 pub mod fibres;
-#[allow(missing_docs)]
 pub mod flexible_needle;
-#[allow(missing_docs)]
 pub mod friction;
-#[allow(missing_docs)]
 pub mod gravity;
-#[allow(missing_docs)]
 pub mod indentation;
-#[allow(missing_docs)]
 pub mod mass_scaling;
 pub mod own;
-#[allow(missing_docs)]
 pub mod parameter;
-#[allow(missing_docs)]
 pub mod parameters;
-#[allow(missing_docs)]
 pub mod plasticity;
-#[allow(missing_docs)]
 pub mod puncture;
-#[allow(missing_docs)]
 pub mod viscoelastic;
 
 use crate::material::ElasticLaw;

@@ -20,6 +20,7 @@ pub struct Parameter {
     pub logarithmic: bool,
     /// Where the usual value comes from.
     pub source: &'static str,
+    /// Where the present value is found.
     pub value: Value,
 }
 
@@ -32,12 +33,14 @@ pub type Components = fn(&Numbers) -> Option<Vec<f64>>;
 /// The present value in the unit of the key; `None` where the scene has no such number.
 #[derive(Debug, Clone, Copy)]
 pub enum Value {
+    /// One number.
     Number(fn(&Numbers) -> Option<f64>),
     /// A list, which is always written whole, with the lists that are refused without it: key and values.
     List(Components, Option<(&'static str, Components)>),
 }
 
 impl Parameter {
+    /// A number with a slider that moves by amounts.
     pub const fn new(
         key: &'static str,
         name: &'static str,

@@ -11,9 +11,11 @@ use crate::within::Within;
 pub struct Key<T: Table> {
     /// In the table; its end tells the unit.
     pub key: &'static str,
+    /// Unit of the key.
     pub unit: Unit,
     /// What is accepted, in that unit.
     pub within: Within,
+    /// What a table says, in that unit; `None`: nothing.
     pub written: fn(&T) -> Option<f64>,
     /// Where it goes, in SI.
     pub place: fn(&mut T::Params) -> &mut f64,
@@ -41,6 +43,7 @@ pub trait Table: Sized + 'static {
 /// The fields of `Params` that are numbers, as a shader has them: `#params` of the composer writes the struct from the names, and
 /// the arrays of the device are filled with the values, both in the order of the table.
 pub trait ShaderNumbers {
+    /// Names of the fields.
     const NAMES: &'static [&'static str];
 
     /// In SI.

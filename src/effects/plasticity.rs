@@ -23,6 +23,7 @@ use crate::material::{ElasticLaw, deviator, equivalent};
 use crate::units::KILOPASCAL;
 use crate::within::Within::{NotNegative, Positive};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "plasticity",
     kind: Kind::Constitutive,

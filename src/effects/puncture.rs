@@ -49,14 +49,17 @@ use crate::within::Within::{Between, NotNegative, Positive};
 /// as fast as the needle's speed times four with steps of 2.7 ms at 2 mm/s: with 13 um steps beyond 1.6 ms held the
 /// puncture back (by 14 % of the peak force at 2.4 ms).
 pub const FIRST_ADVANCE: f64 = 5e-6;
+/// The most that it may advance in a step [m].
 pub const LARGEST_ADVANCE: f64 = 22e-6;
 
 /// The same in ways that the needle travels in the step: the tip may always go the first, and never more than the second.
 pub const LEAST_TRAVELS: f64 = 1.25;
+/// See [`LEAST_TRAVELS`].
 pub const MOST_TRAVELS: f64 = 4.0;
 
 /// Bounds of lambda, the stretch of the material lines at the tip: a tip in squeezed or torn cells neither leaps nor stands.
 pub const LEAST_STRETCH: f64 = 0.2;
+/// See [`LEAST_STRETCH`].
 pub const MOST_STRETCH: f64 = 3.0;
 
 /// What the shaders have of this file.
@@ -141,6 +144,7 @@ pub fn share_beyond(force: f64, threshold: f64) -> f64 {
     if force > threshold { 1.0 - threshold / force } else { 0.0 }
 }
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "puncture",
     kind: Kind::Contact,
@@ -278,6 +282,8 @@ fn of_the_scene<'a>(numbers: &Numbers<'a>) -> Option<&'a Params> {
 /// How the path of the needle is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+// Texts of the words would split their list in the schema.
+#[allow(missing_docs)]
 pub enum PathWord {
     Auto,
     Free,

@@ -20,6 +20,7 @@ use serde::Deserialize;
 use super::parameter::{Parameter, Value};
 use super::{Effect, Kind, Numbers};
 
+/// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
     key: "viscoelastic",
     kind: Kind::Constitutive,
@@ -96,6 +97,7 @@ pub struct Term {
 /// Parameters in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Params {
+    /// Prony terms of the relaxation.
     pub terms: Vec<Term>,
 }
 
