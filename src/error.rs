@@ -102,7 +102,8 @@ pub fn brief(text: &str) -> String {
         let most = if piece.contains(std::path::MAIN_SEPARATOR) { PATH } else { WORD };
         short += &shortened(piece, most);
     }
-    plain(&shortened(&short, TEXT)).into_owned()
+    // What is written out is up to eight times as long as it was.
+    shortened(&plain(&shortened(&short, TEXT)), TEXT).into_owned()
 }
 
 /// A text of more than `most` bytes without its middle.
@@ -153,6 +154,13 @@ mod tests {
         let path = format!("{}/scene.toml", "folder/".repeat(60));
         assert_eq!(brief(&path), path);
         assert_eq!(brief("\u{e4}".repeat(100).as_str()).matches("...").count(), 1);
+    }
+
+    #[test]
+    fn what_is_written_out_stays_short_too() {
+        // Found by libFuzzer: 2 kB of control characters made 8 kB of message.
+        let short = brief(&format!("column `{}` is unknown", "\u{b} ".repeat(3000)));
+        assert!(short.len() <= 2000 && short.ends_with("` is unknown"), "{} bytes: {short}", short.len());
     }
 
     #[test]
