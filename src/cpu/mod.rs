@@ -6,6 +6,7 @@ mod indenter_contact;
 mod integrate_nodes;
 mod needle_contact;
 mod needle_touch;
+mod opening;
 mod slit_contact;
 mod tip;
 
@@ -62,6 +63,7 @@ pub struct CpuEngine {
     /// Force across the needle on every anchor of a free tip [N].
     tip_sway: DVec3,
     contact_energy: f64,
+    opening: opening::OpeningState,
     /// What the points have dissipated and earlier frames have told.
     booked: FrameEnergies,
     /// Centre-line of a flexible needle in the frame under way.
@@ -85,6 +87,7 @@ impl CpuEngine {
             cut_samples: vec![0; model.puncture.as_ref().and_then(|p| p.free.as_ref()).map_or(0, |f| f.cell_count())],
             bond: Bond::default(),
             contact: vec![ContactState::default(); model.contact_nodes.len()],
+            stations: vec![0.0; model.opening().map_or(0, |o| o.stations.len())],
             pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
         }
@@ -117,6 +120,7 @@ impl CpuEngine {
             tip_energy: 0.0,
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
+            opening: Default::default(),
             booked: FrameEnergies::default(),
             centre_line: None,
             node_impulse: vec![DVec3::ZERO; model.contact_nodes.len()],
@@ -167,6 +171,9 @@ impl CpuEngine {
         self.cohesive_forces(input.pose.as_ref());
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             self.needle_contact(plan, &pose, input.step);
+            if let Some(opening) = &plan.opening {
+                self.opening(plan, opening, &pose);
+            }
         }
         if let (Some(_), Some(pose)) = (model.effects.indentation, input.pose) {
             self.indenter_contact(&pose);
@@ -238,6 +245,11 @@ impl CpuEngine {
         let dissipated = self.dissipated();
         let sums = &mut self.sums;
         sums.energy.elastic = measures.iter().map(|m| m.elastic).sum();
+        // The stage `opening` has what cells around the path hold, since it knows the path.
+        if let Some(opening) = model.opening() {
+            let theirs: f64 = opening.cells.iter().map(|near| measures[near.cell as usize].elastic).sum();
+            sums.energy.elastic += self.opening.elastic - theirs;
+        }
         sums.energy.hourglass = measures.iter().map(|m| m.hourglass).sum();
         sums.energy.viscous = measures.iter().map(|m| m.viscous).sum();
         // What deletion has taken out may be turned inside out.

@@ -78,7 +78,9 @@ impl CpuEngine {
         let force: f64 = anchors.iter().map(|p| spring * p.gap).sum();
         let p = &plan.params;
         let speed = pose.velocity.length();
-        let threshold = plan.threshold(a) * p.rate_factor(speed);
+        // The tissue that the tip opens as it advances is strained at once.
+        let resistance = self.opening.resistance;
+        let threshold = plan.threshold(a) * p.rate_factor(speed) + resistance;
         if force > threshold {
             let lambda = anchors.iter().map(|p| p.stretch).sum::<f64>() / count;
             let cap = advance_limit(a == 0.0, speed * self.dt);
@@ -91,7 +93,7 @@ impl CpuEngine {
             let lost: f64 = before.iter().zip(&anchors).map(|(b, p)| spring * p.gap * (b.gap - p.gap)).sum();
             let force = anchors.iter().map(|p| spring * p.gap).sum();
             let beyond = if advance == cap { puncture::share_beyond(force, threshold) } else { 0.0 };
-            self.sums.energy.tip += lost * (1.0 - beyond);
+            self.sums.energy.tip += lost * (1.0 - beyond) - resistance * advance;
             self.sums.energy.advance_cap += lost * beyond;
         }
         self.state.bond.gap = mean_distance(&anchors);

@@ -263,6 +263,12 @@ parameters! {
     /// The free path may lead anywhere in the block: a hand holds the needle.
     field anywhere: bool = false;
 
+    /// "ring" (default): nodes around a softened path are pushed aside; "opening": the tissue beside the path is carried exactly, and forces
+    /// follow from toughness and elastic constants.
+    key scheme: Option<SchemeWord>;
+    /// How the tissue beside the path is carried.
+    field scheme: SchemeWord = SchemeWord::Ring;
+
     /// Exponent of the speed of the needle in the tip forces, 0 to 1; default 0: no rate.
     rate_exponent: ONE, NotNegative(1.0) =>
     /// Exponent n of the rate of cutting in the tip forces; 0: no rate.
@@ -287,6 +293,16 @@ fn of_the_scene<'a>(numbers: &Numbers<'a>) -> Option<&'a Params> {
 pub enum PathWord {
     Auto,
     Free,
+}
+
+/// How the tissue beside the path of the needle is carried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+// As above.
+#[allow(missing_docs)]
+pub enum SchemeWord {
+    Ring,
+    Opening,
 }
 
 /// Tip forces of one material [N].

@@ -27,6 +27,8 @@ pub struct State {
     /// Memory per contact node: stretch of the stick spring [m], overlap at activation [m], axial position at
     /// activation [m]; `touching` tells whether the last two are set.
     pub contact: Vec<ContactState>,
+    /// Stretch of the stick spring of every station of the path along the needle [m]; empty without the scheme `opening`.
+    pub stations: Vec<f64>,
     /// Damage D of every pair of copies that may separate.
     pub pairs: Vec<f64>,
     /// History per cell; empty without `plasticity` and `viscoelastic`.
@@ -43,6 +45,7 @@ impl State {
                 s.stiffness.len(),
                 s.cut_samples.len(),
                 s.contact.len(),
+                s.stations.len(),
                 s.pairs.len(),
                 s.points.len(),
             ]

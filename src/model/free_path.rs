@@ -86,12 +86,14 @@ impl Model {
         let cuttings = std::iter::once(&self.scene.material).chain(self.scene.regions.iter().map(|r| &r.material));
         let path = PlannedPath { entry: motion.entry, direction: motion.direction };
         self.puncture = Some(PuncturePlan {
+            opening: None,
             free: Some(FreePlan { low, count, cuttings: cuttings.map(cutting).collect() }),
             segments: vec![PathSegment {
                 start: 0.0,
                 cutting: cutting(&self.scene.material),
                 transition_length: params.transition_length,
                 membrane: false,
+                hole: 0.0,
             }],
             exit: f64::INFINITY,
             anchors: Vec::new(),

@@ -3,6 +3,7 @@
 mod contact;
 mod free_path;
 mod indentation;
+pub mod opening;
 mod puncture;
 mod slit;
 

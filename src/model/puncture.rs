@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+use super::opening::{OpeningInput, OpeningPlan};
 use super::{ContactNode, ContactSurface, FreePlan, Model};
 use crate::effects::puncture;
-use crate::effects::puncture::{Cutting, left_before_exit};
+use crate::effects::puncture::{Cutting, SchemeWord, left_before_exit};
 use crate::mesh::{BlockMesh, Bore};
 use crate::needle::gap::Profile;
 use crate::needle::slit::REFERENCE_EDGE;
@@ -55,6 +56,8 @@ pub struct PathSegment {
     pub transition_length: f64,
     /// A layer with a puncture energy of its own.
     pub membrane: bool,
+    /// Rest radius of the hole that the slit of the tip acts like, in the scheme `opening` [m].
+    pub hole: f64,
 }
 
 /// What the effect `puncture` prepares.
@@ -79,6 +82,8 @@ pub struct PuncturePlan {
     pub face_damping: f64,
     /// The path is not planned but found while the tip moves.
     pub free: Option<FreePlan>,
+    /// The scheme that carries the tissue beside the path by points.
+    pub opening: Option<OpeningPlan>,
 }
 
 impl PuncturePlan {
@@ -174,7 +179,38 @@ impl Model {
             needle,
             path,
             free: None,
+            opening: None,
         });
+        if params.scheme == SchemeWord::Opening {
+            self.plan_opening();
+        }
+    }
+
+    /// The scheme `opening` on the path that is planned.
+    fn plan_opening(&mut self) {
+        let (Some(mesh), Some(plan)) = (self.mesh.as_block(), &self.puncture) else { return };
+        let opening = OpeningPlan::new(
+            mesh,
+            &OpeningInput {
+                path: &plan.path,
+                needle: &plan.needle,
+                deepest: self.scene.motion.deepest(),
+                exit: plan.exit,
+                cell_size: self.scene.tissue.cell_size,
+                shear_modulus: self.scene.material.law.shear_modulus(),
+                p_wave_modulus: self.scene.material.law.p_wave_modulus(),
+                hole: &|depth| plan.segment(depth.max(0.0)).hole,
+            },
+        );
+        self.puncture.as_mut().expect("planned above").opening = Some(opening);
+        let plan = self.puncture.as_mut().expect("planned above");
+        plan.cells.clear();
+        self.contact_nodes.iter_mut().for_each(|c| c.pushed = false);
+    }
+
+    /// The scheme `opening`, where the scene has it.
+    pub fn opening(&self) -> Option<&OpeningPlan> {
+        self.puncture.as_ref().and_then(|plan| plan.opening.as_ref())
     }
 
     /// Largest part of the tip springs that one node can carry: where the anchors are in the first cells of the path.
@@ -232,7 +268,13 @@ fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, e
                 transition_length = transition_length.min(end - start);
                 cutting = cutting.of_membrane(energy, transition_length);
             }
-            PathSegment { start, cutting, transition_length, membrane: material.membrane_energy.is_some() }
+            PathSegment {
+                start,
+                cutting,
+                transition_length,
+                membrane: material.membrane_energy.is_some(),
+                hole: 0.083e-3,
+            }
         })
         .collect()
 }

@@ -6,6 +6,7 @@ pub mod centre_line;
 pub mod free_path;
 pub mod gap;
 pub mod motion;
+pub mod opening;
 mod shape;
 pub mod slit;
 

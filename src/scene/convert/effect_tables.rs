@@ -5,10 +5,10 @@ use super::super::file::*;
 use super::{Check, MM, Within};
 use crate::effects::cohesive::AXES;
 use crate::effects::parameters::Table;
-use crate::effects::puncture::PathWord;
+use crate::effects::puncture::{PathWord, SchemeWord};
 use crate::effects::{self, EffectSet, TissueMaterial};
 use crate::needle::beam::Section;
-use crate::needle::{Motion, Tool};
+use crate::needle::{Motion, TipShape, Tool};
 use crate::units::four_digits;
 
 impl Check<'_> {
@@ -59,6 +59,7 @@ impl Check<'_> {
     pub(super) fn puncture(&mut self, t: &PunctureTable) -> effects::puncture::Params {
         let mut params = self.table("puncture", t);
         params.always_free = t.path == Some(PathWord::Free);
+        params.scheme = t.scheme.unwrap_or(SchemeWord::Ring);
         if params.softened_radius >= params.ring_radius {
             let key = if t.softened_radius_mm.is_some() { "softened_radius_mm" } else { "ring_radius_mm" };
             self.problems.report(
@@ -79,6 +80,36 @@ impl Check<'_> {
             ));
         }
         params
+    }
+
+    /// What the scheme `opening` does not carry yet.
+    pub(super) fn opening_limits(&mut self, effects: &EffectSet, tool: Option<&Tool>, motion: &Motion, tets: bool) {
+        let Some(puncture) = effects.puncture.filter(|p| p.scheme == SchemeWord::Opening) else { return };
+        let needle = match tool {
+            Some(Tool::Needle(needle)) => Some(needle),
+            _ => None,
+        };
+        let without = [
+            (tets, "a mesh of tetrahedra"),
+            (puncture.always_free || motion.is_free(), "a free path"),
+            (effects.cohesive.is_some(), "the effect cohesive"),
+            (effects.flexible_needle.is_some(), "the effect flexible_needle"),
+            (effects.plasticity.is_some(), "the effect plasticity"),
+            (effects.viscoelastic.is_some(), "the effect viscoelastic"),
+            (effects.damage.is_some(), "the effect damage"),
+            (!effects.own.is_empty(), "effects of the program's own"),
+            (needle.is_some_and(|n| n.bore.is_some()), "a hollow needle"),
+            (needle.is_some_and(|n| n.tip != TipShape::Cone), "a bevel"),
+        ];
+        let found: Vec<&str> = without.iter().filter(|(there, _)| *there).map(|(_, what)| *what).collect();
+        if !found.is_empty() {
+            self.problems.report(
+                "puncture.scheme",
+                format!("the scheme opening does not carry {} yet", found.join(", ")),
+                "a solid cone on one straight path through elastic tissue",
+                "leave the key out for the scheme ring",
+            );
+        }
     }
 
     pub(super) fn cohesive(&mut self, t: &CohesiveTable, tissue: &TissueTable) -> effects::cohesive::Params {

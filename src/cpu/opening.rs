@@ -1,0 +1,362 @@
+//! Stage `opening` in f64: tissue beside the path of the needle, carried by points. Equations: src/needle/opening.rs.
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use super::{ContactSums, CpuEngine};
+use crate::engine::elements::{CORNERS, CellForces, CellShape, Elements};
+use crate::material::TangentBound;
+use crate::material::kinematics::cofactor;
+use crate::material_point::{Material, PointState, Volumetric};
+use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, mean_place};
+use crate::model::{Model, PuncturePlan};
+use crate::needle::ToolPose;
+use crate::needle::opening::{Derivatives, Station};
+
+/// What is derived of one station: of the energy E.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct StationSums {
+    /// By its centre and the rate of its centre [N], [J].
+    centre: DVec3,
+    centre_rate: DVec3,
+    /// By rc [N] and rc_Z [J].
+    radius: f64,
+    radius_rate: f64,
+    energy: f64,
+}
+
+impl StationSums {
+    /// Adds derivatives of an energy per volume, of the volume `by` [m^3].
+    fn add(&mut self, d: &Derivatives, by: f64) {
+        self.centre -= d.place * by;
+        self.centre_rate += d.centre_rate * by;
+        self.radius += d.radius * by;
+        self.radius_rate += d.radius_rate * by;
+    }
+}
+
+/// A station as it is: geometry, place along the needle, and what the tip has cut.
+#[derive(Debug, Clone, Copy)]
+struct Now {
+    section: Station,
+    /// Distance behind the tip [m].
+    behind: f64,
+    cut: f64,
+    cut_rate: f64,
+    /// Radius that a cut station would have [m], and its rate with `behind`.
+    full: f64,
+    slope: f64,
+}
+
+/// Memory of the scheme.
+#[derive(Debug, Clone, Default)]
+pub(super) struct OpeningState {
+    /// Force that opening takes per advance of the tip [N].
+    pub resistance: f64,
+    /// Elastic energy of points and near cells in the last step [J].
+    pub elastic: f64,
+    /// Normal force of every station in the last step [N], and the friction on it.
+    pub normal: Vec<f64>,
+    pub friction: Vec<f64>,
+}
+
+/// Differences of a quantity along the stations: weights of the neighbours before and behind station `i`.
+fn neighbours(i: usize, count: usize, spacing: f64) -> (usize, usize, f64) {
+    let (before, behind) = (i.saturating_sub(1), (i + 1).min(count - 1));
+    (before, behind, 1.0 / (spacing * (behind - before) as f64))
+}
+
+/// The path in a cell: the mean of the stations in it.
+fn within(now: &[Now], cell: &NearCell) -> Station {
+    let mut mean = Station::default();
+    let by = 1.0 / f64::from(cell.count);
+    for n in &now[usize::from(cell.first)..][..usize::from(cell.count)] {
+        mean.centre += n.section.centre * by;
+        mean.centre_rate += n.section.centre_rate * by;
+        mean.radius += n.section.radius * by;
+        mean.radius_rate += n.section.radius_rate * by;
+    }
+    mean
+}
+
+impl CpuEngine {
+    /// Where all stations are.
+    fn stations_now(&self, plan: &PuncturePlan, opening: &OpeningPlan, tip: DVec3) -> Vec<Now> {
+        let mesh = self.model.mesh.block();
+        let (u, a) = (&self.state.displacement, self.state.tip_coordinate);
+        let t = plan.path.direction;
+        let mut now: Vec<Now> = opening
+            .stations
+            .par_iter()
+            .map(|station| {
+                let centre = mean_place(&station.centre, &station.nodes, mesh, u);
+                let behind = (tip - mean_place(&station.disc, &station.nodes, mesh, u)).dot(t);
+                let (full, slope) = opening.radius(behind);
+                let (cut, cut_rate) = opening.cut(station, a);
+                let section = Station { centre, radius: full * cut, ..Station::default() };
+                Now { section, behind, cut, cut_rate, full, slope }
+            })
+            .collect();
+        for i in 0..now.len() {
+            let (before, behind, by) = neighbours(i, now.len(), opening.spacing);
+            let (a, b) = (now[before].section, now[behind].section);
+            let rate = (b.centre - a.centre) * by;
+            now[i].section.centre_rate = rate - t * rate.dot(t);
+            now[i].section.radius_rate = (b.radius - a.radius) * by;
+        }
+        now
+    }
+
+    /// Stage `opening`: forces of points, near cells, the guide on the needle and friction.
+    pub(super) fn opening(&mut self, plan: &PuncturePlan, opening: &OpeningPlan, pose: &ToolPose) {
+        let model = self.model.clone();
+        let now = self.stations_now(plan, opening, pose.tip);
+        let t = plan.path.direction;
+        let mut sums = vec![StationSums::default(); now.len()];
+        let mut elastic = 0.0;
+        // Points: every station its own.
+        let displacement = &self.state.displacement;
+        let points: Vec<_> = opening
+            .stations
+            .par_iter()
+            .zip(&now)
+            .map(|(station, now)| point_forces(&model, opening, station, &now.section, displacement))
+            .collect();
+        for ((station, local), sums) in opening.stations.iter().zip(&points).zip(&mut sums) {
+            for (node, (force, bound)) in station.nodes.iter().zip(&local.1) {
+                self.external[*node as usize] -= *force;
+                self.added_bound[*node as usize] += bound;
+            }
+            *sums = local.0;
+            elastic += local.0.energy;
+        }
+        // Cells that the map reaches.
+        let elements = &self.elements;
+        let states = &self.state;
+        let cells: Vec<_> = opening
+            .cells
+            .par_iter()
+            .map(|near| near_cell_forces(&model, elements, opening, near, &within(&now, near), &states.displacement))
+            .collect();
+        for (near, (forces, derivatives, energy)) in opening.cells.iter().zip(cells) {
+            self.cells[near.cell as usize] = forces;
+            elastic += energy;
+            for sums in &mut sums[usize::from(near.first)..][..usize::from(near.count)] {
+                sums.add(&derivatives, 1.0 / f64::from(near.count));
+            }
+        }
+        self.opening.elastic = elastic;
+        self.station_reactions(opening, pose, &now, &sums, t);
+    }
+
+    /// Forces of the stations on their nodes, on the needle and on the tip; friction.
+    fn station_reactions(
+        &mut self,
+        opening: &OpeningPlan,
+        pose: &ToolPose,
+        now: &[Now],
+        sums: &[StationSums],
+        t: DVec3,
+    ) {
+        let model = self.model.clone();
+        let count = now.len();
+        // By rc with all that follows from it, and by the centre.
+        let mut radius: Vec<f64> = sums.iter().map(|s| s.radius).collect();
+        let mut centre: Vec<DVec3> = sums.iter().map(|s| s.centre).collect();
+        for (i, s) in sums.iter().enumerate() {
+            let (before, behind, by) = neighbours(i, count, opening.spacing);
+            radius[behind] += s.radius_rate * by;
+            radius[before] -= s.radius_rate * by;
+            let rate = s.centre_rate - t * s.centre_rate.dot(t);
+            centre[behind] += rate * by;
+            centre[before] -= rate * by;
+        }
+        self.opening.resistance = now.iter().zip(&radius).map(|(n, r)| r * n.full * n.cut_rate).sum();
+        let normal = averaged_normal(opening, now, sums);
+        let velocity = &self.state.velocity;
+        let mut stored = 0.0;
+        let mut booked = ContactSums::default();
+        let mut friction_forces = vec![0.0; count];
+        for (i, station) in opening.stations.iter().enumerate() {
+            let n = &now[i];
+            let aside = n.section.centre - pose.tip;
+            let aside = aside - t * aside.dot(t);
+            // The middle of the path lies on the needle where it is open.
+            let held = opening.guide * (n.section.radius / opening.map.shaft);
+            stored += 0.5 * held * aside.length_squared();
+            let guide = aside * -held;
+            let spread = radius[i] * n.slope * n.cut;
+            let mean_velocity: DVec3 =
+                station.disc.iter().map(|(p, w)| velocity[station.nodes[usize::from(*p)] as usize] * *w).sum();
+            let mut rubbing = 0.0;
+            let memory = &mut self.state.stations[i];
+            if let Some(friction) = model.effects.friction {
+                let on_shaft =
+                    crate::effects::friction::part_on_shaft(n.behind, opening.tip_length, friction.fade_length) * n.cut;
+                let limit = friction.coefficient * normal[i].max(0.0) * on_shaft;
+                let kt = friction.stiffness_ratio * opening.stick;
+                let motion = (mean_velocity - pose.velocity).dot(t) * self.dt;
+                let (old, trial) = (*memory, *memory + motion);
+                *memory = if limit > 0.0 { trial.clamp(-limit / kt, limit / kt) } else { 0.0 };
+                rubbing = -kt * *memory;
+                booked.friction_work += 0.5 * kt * (old + *memory) * (trial - *memory);
+                stored += 0.5 * kt * *memory * *memory;
+                for (place, w) in &station.disc {
+                    self.added_bound[station.nodes[usize::from(*place)] as usize] += 2.0 * kt * w;
+                }
+            }
+            friction_forces[i] = rubbing;
+            let along = t * (spread + rubbing);
+            for (place, w) in &station.disc {
+                self.external[station.nodes[usize::from(*place)] as usize] += along * *w;
+            }
+            let across = guide - centre[i];
+            for (place, w) in &station.centre {
+                let node = station.nodes[usize::from(*place)] as usize;
+                self.external[node] += across * *w;
+                self.added_bound[node] += 2.0 * held * w;
+            }
+            booked.normal += t * spread + guide;
+            booked.friction += t * rubbing;
+        }
+        self.opening.normal = normal;
+        self.opening.friction = friction_forces;
+        self.sums.book(&booked, pose, self.dt);
+        self.contact_energy += stored;
+    }
+}
+
+/// Normal force of every station [N], averaged over its neighbours on the shaft: it is known cell by cell.
+fn averaged_normal(opening: &OpeningPlan, now: &[Now], sums: &[StationSums]) -> Vec<f64> {
+    let on = |n: &Now| if n.behind >= opening.tip_length { n.cut } else { 0.0 };
+    (0..now.len())
+        .map(|i| {
+            let around = i.saturating_sub(opening.averaged)..=(i + opening.averaged).min(now.len() - 1);
+            let weight: f64 = around.clone().map(|j| on(&now[j])).sum();
+            let sum: f64 = around.map(|j| on(&now[j]) * sums[j].radius).sum();
+            if weight > 0.0 { sum / weight } else { 0.0 }
+        })
+        .collect()
+}
+
+/// Stress [Pa] of what keeps the shape: law and fibres, without the pressure, which is the cell's.
+fn shape_stress(material: &Material, h: DMat3) -> DMat3 {
+    material.stress(h, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default())
+}
+
+/// Forces (with the sign of f_int) and bounds of the points of a station at its nodes.
+fn point_forces(
+    model: &Model,
+    opening: &OpeningPlan,
+    station: &OpeningStation,
+    section: &Station,
+    displacement: &[DVec3],
+) -> (StationSums, Vec<(DVec3, f64)>) {
+    let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
+    let mut local = vec![(DVec3::ZERO, 0.0); u.len()];
+    let mut sums = StationSums::default();
+    let middle: Vec<f64> = {
+        let mut all = vec![0.0; u.len()];
+        station.centre.iter().for_each(|(p, w)| all[usize::from(*p)] += w);
+        all
+    };
+    for point in &station.points {
+        let (y, gradient) = point.place_and_gradient(&u);
+        let map = opening.map.at(section, y, gradient);
+        let f = map.gradient(gradient);
+        let material = model.material(point.cell as usize);
+        let h = f - DMat3::IDENTITY;
+        let d = map.pull_back(shape_stress(material, h));
+        sums.energy += point.volume * material.energy(h, 0.0, 1.0, &PointState::default()).stored;
+        sums.add(&d, point.volume);
+        let tangent = material.tangent_bound(h, &PointState::default());
+        let cof = cofactor(gradient);
+        let (by_gradient, by_place) = map.amplification();
+        let mut sizes = [(0.0, 0.0); 8];
+        for c in 0..8 {
+            let node = usize::from(point.corners[c]);
+            local[node].0 += (d.gradient * point.gradients[c] + d.place * point.weights[c]) * point.volume;
+            let aside = (point.weights[c] - middle[node]).abs();
+            sizes[c] =
+                (by_gradient * point.gradients[c].length() + by_place * aside, (cof * point.gradients[c]).length());
+        }
+        let (all, all_cof) = sizes.iter().fold((0.0, 0.0), |s, x| (s.0 + x.0, s.1 + x.1));
+        for c in 0..8 {
+            let bound = tangent.straight * sizes[c].0 * all + tangent.turned * sizes[c].1 * all_cof;
+            local[usize::from(point.corners[c])].1 += point.volume * bound;
+        }
+    }
+    (sums, local)
+}
+
+/// Places of Gauss' rule in a cell, -1..1, are at the corners times this.
+const GAUSS: f64 = 0.577_350_269_189_625_8;
+
+/// Forces of a cell that the map reaches, derivatives of its energy by the path, and that energy. The gradient of y is that of its centre,
+/// as elsewhere; the map is taken at eight places.
+fn near_cell_forces(
+    model: &Model,
+    elements: &Elements,
+    opening: &OpeningPlan,
+    near: &NearCell,
+    section: &Station,
+    displacement: &[DVec3],
+) -> (CellForces, Derivatives, f64) {
+    let cell = near.cell as usize;
+    let shape = CellShape::new(&model.mesh, cell);
+    let u = shape.gather(displacement);
+    let nodes = model.mesh.cell_nodes(cell);
+    let y: [DVec3; 8] = std::array::from_fn(|i| model.mesh.rest_position(nodes[i]) + u[i]);
+    let gradient = DMat3::IDENTITY + shape.displacement_gradient(&u);
+    let material = model.material(cell);
+    let (mut sum, mut places, mut energy) = (Derivatives::ZERO, [DVec3::ZERO; 8], 0.0);
+    let (mut dilation, mut grown, mut straight, mut turned) = (0.0, 1.0f64, 0.0f64, 0.0f64);
+    let part = shape.volume / 8.0;
+    let weights = |at: usize| -> [f64; 8] {
+        std::array::from_fn(|i| (0..3).map(|a| 0.5 * (1.0 + GAUSS * CORNERS[at][a] * CORNERS[i][a])).product())
+    };
+    let maps: [_; 8] = std::array::from_fn(|at| {
+        let place = weights(at).iter().zip(y).map(|(w, y)| y * *w).sum();
+        opening.map.at(section, place, gradient)
+    });
+    for (at, map) in maps.iter().enumerate() {
+        dilation += map.dilation / 8.0;
+        // Points carry the rest of what keeps the shape.
+        let volume = part * near.shares[at];
+        if volume == 0.0 {
+            continue;
+        }
+        let h = map.gradient(gradient) - DMat3::IDENTITY;
+        let d = map.pull_back(shape_stress(material, h) * volume);
+        energy += volume * material.energy(h, 0.0, 1.0, &PointState::default()).stored;
+        for (place, w) in places.iter_mut().zip(weights(at)) {
+            *place += d.place * w;
+        }
+        sum.add(&d);
+        let tangent = material.tangent_bound(h, &PointState::default());
+        let (by_gradient, by_place) = map.amplification();
+        grown = grown.max(by_gradient + by_place * shape.edge());
+        (straight, turned) = (straight.max(tangent.straight), turned.max(tangent.turned));
+    }
+    // The volume is the cell's.
+    let (j, cof) = (gradient.determinant(), cofactor(gradient));
+    let change = j * dilation - 1.0;
+    let pressure = material.law.bulk_modulus * change;
+    energy += shape.volume * 0.5 * material.law.bulk_modulus * change * change;
+    sum.gradient += cof * (pressure * dilation * shape.volume);
+    for (at, map) in maps.iter().enumerate() {
+        let d = map.pull_back_dilation(pressure * j * part);
+        for (place, w) in places.iter_mut().zip(weights(at)) {
+            *place += d.place * w;
+        }
+        sum.add(&d);
+    }
+    let mut forces = elements.hourglass_forces(model, cell, &shape, &u);
+    let tangent = TangentBound { straight: straight * grown * grown, turned };
+    let bound = elements.stiffness_bound(model, cell, cof * dilation.abs().max(1.0), tangent, 0.0);
+    for (i, b) in shape.gradients().iter().enumerate() {
+        forces.force[i] += sum.gradient * *b + places[i];
+        forces.bound[i] += bound[i];
+    }
+    (forces, sum, energy)
+}

@@ -1,0 +1,328 @@
+//! What the scheme `opening` of the effect `puncture` prepares: stations along the planned path, the points that carry the tissue beside
+//! it, and the cells around it. Equations: src/needle/opening.rs and docs/effects/opening.md.
+
+use std::collections::BTreeMap;
+
+use glam::{DMat3, DVec3};
+
+use crate::engine::elements::CORNERS;
+use crate::mesh::BlockMesh;
+use crate::needle::lateral_axes;
+use crate::needle::opening::OpeningMap;
+use crate::needle::{NeedleShape, PlannedPath};
+
+/// Distance between stations, in needle radii.
+const SPACING: f64 = 0.18;
+
+/// Radius of the zone whose tissue is carried by points: twice the cell edge, but within these, in needle radii.
+const NEAR: [f64; 2] = [1.2, 2.4];
+
+/// Radii of the points of a station: nodes of Gauss' rule in the logarithm of the radius.
+const RADII: usize = 8;
+
+/// How far the stations go beyond the deepest place of the tip, in needle radii.
+const BEYOND: f64 = 1.5;
+
+/// Nodes and weights of Gauss' rule of [`RADII`] points on -1..1 (half of them; the others are their mirror).
+const GAUSS: [(f64, f64); RADII / 2] = [
+    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
+    (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
+    (0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
+];
+
+/// A mean over nodes: their places in [`Station::nodes`] and weights.
+pub type Mean = Vec<(u16, f64)>;
+
+/// A point that carries tissue beside the path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathPoint {
+    /// Index of the cell that it is in.
+    pub cell: u32,
+    /// The corners of that cell, as places in [`Station::nodes`]; their weights and gradients [1/m].
+    pub corners: [u16; 8],
+    pub weights: [f64; 8],
+    pub gradients: [DVec3; 8],
+    /// Rest volume that it stands for [m^3].
+    pub volume: f64,
+    /// Rest position [m].
+    pub place: DVec3,
+}
+
+/// A section of the path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpeningStation {
+    /// Material coordinate Z of its middle [m].
+    pub depth: f64,
+    /// All nodes that it acts on.
+    pub nodes: Vec<u32>,
+    /// Mean of the innermost ring: the middle of the path. Mean over the section of the needle: where it is along the needle.
+    pub centre: Mean,
+    pub disc: Mean,
+    pub points: Vec<PathPoint>,
+    /// Rest radius of the hole that the slit of the tip acts like [m].
+    pub hole: f64,
+}
+
+/// A cell that the map reaches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearCell {
+    pub cell: u32,
+    /// Part of the volume of each of its octants that points do not carry, in the order of the corners.
+    pub shares: [f64; 8],
+    /// First station of those that lie in it, and their number.
+    pub first: u16,
+    pub count: u16,
+}
+
+/// What the scheme prepares.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpeningPlan {
+    pub map: OpeningMap,
+    /// Length of the tip [m]; behind it the radius is that of the shaft.
+    pub tip_length: f64,
+    /// Distance between stations [m].
+    pub spacing: f64,
+    pub stations: Vec<OpeningStation>,
+    /// Ascending in the cell.
+    pub cells: Vec<NearCell>,
+    /// Stiffness that holds the middle of the path on the needle, per station [N/m].
+    pub guide: f64,
+    /// Stiffness of the stick spring of friction per station, before its factor [N/m].
+    pub stick: f64,
+    /// Half of the length over which the normal force is averaged for friction, in stations.
+    pub averaged: usize,
+}
+
+impl OpeningPlan {
+    /// Radius of the needle at `s` behind its tip [m], and its rate.
+    pub fn radius(&self, s: f64) -> (f64, f64) {
+        let rate = self.map.shaft / self.tip_length;
+        match s {
+            s if s <= 0.0 => (0.0, 0.0),
+            s if s < self.tip_length => (rate * s, rate),
+            _ => (self.map.shaft, 0.0),
+        }
+    }
+
+    /// Part of a station that a tip at the material coordinate a has cut, and its rate [1/m]. Above the surface as just below it.
+    pub fn cut(&self, station: &OpeningStation, a: f64) -> (f64, f64) {
+        let part = (a - station.depth.max(0.5 * self.spacing)) / self.spacing + 0.5;
+        (part.clamp(0.0, 1.0), if part > 0.0 && part < 1.0 { 1.0 / self.spacing } else { 0.0 })
+    }
+}
+
+/// What the stations are made from.
+pub struct OpeningInput<'a> {
+    pub path: &'a PlannedPath,
+    pub needle: &'a NeedleShape,
+    /// Deepest material coordinate of the tip and the end of the material [m].
+    pub deepest: f64,
+    pub exit: f64,
+    pub cell_size: f64,
+    /// Shear modulus and p-wave modulus of the tissue [Pa].
+    pub shear_modulus: f64,
+    pub p_wave_modulus: f64,
+    /// Rest radius of the hole at a material coordinate [m].
+    pub hole: &'a dyn Fn(f64) -> f64,
+}
+
+/// Collects the nodes of a station.
+#[derive(Default)]
+struct Nodes {
+    places: BTreeMap<u32, u16>,
+    list: Vec<u32>,
+}
+
+impl Nodes {
+    fn place(&mut self, node: usize) -> u16 {
+        let next = self.list.len() as u16;
+        *self.places.entry(node as u32).or_insert_with(|| {
+            self.list.push(node as u32);
+            next
+        })
+    }
+}
+
+/// A rest position in the block: cell, corners, weights and gradients [1/m].
+struct Place {
+    cell: usize,
+    corners: [usize; 8],
+    weights: [f64; 8],
+    gradients: [DVec3; 8],
+    inside: bool,
+}
+
+/// Where a rest position lies; outside of the block as the nearest cell goes on.
+fn place_in(mesh: &BlockMesh, x: DVec3) -> Place {
+    let ([i, j, k], at) = mesh.locate(x);
+    let (corners, cell) = (mesh.cell_nodes(mesh.cell_index(i, j, k)), mesh.cell_index(i, j, k));
+    let width = mesh.cell_size(cell);
+    let exact = (x - mesh.rest_position(corners[0])) / width;
+    let inside = (exact - at).abs().max_element() < 1e-9;
+    let (mut weights, mut gradients) = ([0.0; 8], [DVec3::ZERO; 8]);
+    for (c, signs) in CORNERS.iter().enumerate() {
+        let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (exact[a] - 0.5));
+        weights[c] = n[0] * n[1] * n[2];
+        gradients[c] = DVec3::from(*signs) / width * DVec3::new(n[1] * n[2], n[2] * n[0], n[0] * n[1]);
+    }
+    Place { cell, corners, weights, gradients, inside }
+}
+
+impl OpeningPlan {
+    /// Stations, points and cells of a straight path through a block.
+    pub fn new(mesh: &BlockMesh, input: &OpeningInput) -> Self {
+        let shaft = input.needle.radius;
+        let spacing = SPACING * shaft;
+        let near = (2.0 * input.cell_size).clamp(NEAR[0] * shaft, NEAR[1] * shaft);
+        let angles = 4 * (24.0f64.max(4.0 * std::f64::consts::PI * near / input.cell_size) / 4.0).ceil() as usize;
+        let direction = input.path.direction;
+        // An oblique path reaches the surface at one side before its axis does.
+        let tilt = direction.truncate().length() / -direction.z;
+        let first = -(near * tilt / spacing).ceil() as i32;
+        let end = (input.deepest + BEYOND * shaft).min(input.exit);
+        let count = (end / spacing).floor().max(2.0) as i32;
+        let stations: Vec<OpeningStation> = (first..count)
+            .map(|i| station(mesh, input, (f64::from(i) + 0.5) * spacing, spacing, near, angles))
+            .collect();
+        // A volume at the wall of the hole grows by R^2 s0/a^4: by a thousandth.
+        let least = 0.03 * stations.iter().map(|s| s.hole).fold(f64::INFINITY, f64::min).powi(2) / shaft;
+        let average = (1.45 * shaft).max(1.5 * input.cell_size);
+        let mut plan = OpeningPlan {
+            map: OpeningMap { direction, rest_direction: direction, shaft, least: least * least },
+            tip_length: input.needle.tip_length,
+            spacing,
+            stations,
+            cells: Vec::new(),
+            guide: 50.0 * input.shear_modulus * spacing,
+            stick: 2.0 * input.p_wave_modulus * spacing,
+            averaged: ((average / spacing).round() as usize).max(1) / 2,
+        };
+        plan.cells = near_cells(mesh, input, &plan, near, f64::from(count) * spacing);
+        plan
+    }
+}
+
+fn station(
+    mesh: &BlockMesh,
+    input: &OpeningInput,
+    depth: f64,
+    spacing: f64,
+    near: f64,
+    angles: usize,
+) -> OpeningStation {
+    let PlannedPath { entry, direction, .. } = *input.path;
+    let (e1, e2) = lateral_axes(direction);
+    let hole = (input.hole)(depth).min(0.9 * near);
+    let middle = entry + direction * depth;
+    let at = |r: f64, part: f64| {
+        let angle = std::f64::consts::TAU * part;
+        middle + (e1 * angle.cos() + e2 * angle.sin()) * r
+    };
+    let mut nodes = Nodes::default();
+    let mut mean = |radii: &[f64], directions: usize| -> Mean {
+        let mut sums: BTreeMap<u16, f64> = BTreeMap::new();
+        let mut count = 0.0;
+        for r in radii {
+            for i in 0..directions {
+                let Place { corners, weights, .. } = place_in(mesh, at(*r, (i as f64 + 0.5) / directions as f64));
+                count += 1.0;
+                for (node, w) in corners.iter().zip(weights) {
+                    *sums.entry(nodes.place(*node)).or_default() += w;
+                }
+            }
+        }
+        sums.into_iter().map(|(n, w)| (n, w / count)).collect()
+    };
+    let centre = mean(&[hole], 8);
+    let shaft = input.needle.radius;
+    let disc = mean(&[0.125, 0.375, 0.625, 0.875].map(|part: f64| shaft * part.sqrt()), 8);
+    let long = (near / hole).ln();
+    let mut points = Vec::with_capacity(RADII * angles);
+    for (x, w) in GAUSS.iter().flat_map(|(x, w)| [(-x, *w), (*x, *w)]) {
+        let r = hole * (0.5 * long * (x + 1.0)).exp();
+        let volume = 0.5 * long * w * r * r * std::f64::consts::TAU / angles as f64 * spacing;
+        for i in 0..angles {
+            let place = at(r, (i as f64 + 0.5) / angles as f64);
+            let Place { cell, corners, weights, gradients, inside } = place_in(mesh, place);
+            if !inside {
+                continue;
+            }
+            points.push(PathPoint {
+                cell: cell as u32,
+                corners: corners.map(|n| nodes.place(n)),
+                weights,
+                gradients,
+                volume,
+                place,
+            });
+        }
+    }
+    OpeningStation { depth, nodes: nodes.list, centre, disc, points, hole }
+}
+
+/// Cells that the map reaches, with the part of their volume outside of the zone of points.
+fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: f64, end: f64) -> Vec<NearCell> {
+    const SAMPLES: usize = 6;
+    let faded = crate::needle::opening::FADED * plan.map.shaft;
+    let last = plan.stations.len() - 1;
+    let first = plan.stations[0].depth - 0.5 * plan.spacing;
+    let coordinates = |x: DVec3| {
+        let relative = x - input.path.entry;
+        let axial = relative.dot(input.path.direction);
+        ((relative - input.path.direction * axial).length(), axial)
+    };
+    (0..mesh.cell_count())
+        .filter_map(|cell| {
+            let size = mesh.cell_size(cell);
+            let low = mesh.rest_position(mesh.cell_nodes(cell)[0]);
+            let (r, s) = coordinates(low + 0.5 * size);
+            let reach = 0.5 * size.length();
+            if r > faded + reach || s > end + reach {
+                return None;
+            }
+            let shares = CORNERS.map(|corner| {
+                let mut outside = 0usize;
+                for n in 0..SAMPLES.pow(3) {
+                    let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64 * 0.5;
+                    let at = DVec3::new(part(n % SAMPLES), part(n / SAMPLES % SAMPLES), part(n / SAMPLES.pow(2)));
+                    let octant = DVec3::from(corner).max(DVec3::ZERO) * 0.5;
+                    let (r0, s0) = coordinates(low + (at + octant) * size);
+                    outside += usize::from(r0 > near || s0 > end || s0 < first);
+                }
+                outside as f64 / SAMPLES.pow(3) as f64
+            });
+            // Half of its extent along the path, of a sphere where the path is oblique.
+            let t = input.path.direction.abs();
+            let half = 0.5 * size.dot(t * t);
+            let index = |s: f64| (((s - first) / plan.spacing).round().max(0.0) as usize).min(last + 1);
+            let (from, to) = (index(s - half), index(s + half));
+            let nearest = (((s - first) / plan.spacing).max(0.0) as usize).min(last);
+            let (from, to) = if to > from { (from, to) } else { (nearest, nearest + 1) };
+            Some(NearCell { cell: cell as u32, shares, first: from as u16, count: (to - from) as u16 })
+        })
+        .collect()
+}
+
+/// Mean of `y = X + u` over nodes.
+pub fn mean_place(mean: &Mean, nodes: &[u32], mesh: &BlockMesh, u: &[DVec3]) -> DVec3 {
+    mean.iter()
+        .map(|(place, w)| {
+            let node = nodes[*place as usize] as usize;
+            (mesh.rest_position(node) + u[node]) * *w
+        })
+        .sum()
+}
+
+impl PathPoint {
+    /// y and grad y there, from the displacements of the nodes of its station.
+    pub fn place_and_gradient(&self, u: &[DVec3]) -> (DVec3, DMat3) {
+        let (mut y, mut h) = (self.place, DMat3::IDENTITY);
+        for ((corner, w), g) in self.corners.iter().zip(self.weights).zip(self.gradients) {
+            let u = u[*corner as usize];
+            y += u * w;
+            h += DMat3::from_cols(u * g.x, u * g.y, u * g.z);
+        }
+        (y, h)
+    }
+}
