@@ -245,11 +245,8 @@ impl CpuEngine {
         let dissipated = self.dissipated();
         let sums = &mut self.sums;
         sums.energy.elastic = measures.iter().map(|m| m.elastic).sum();
-        // The stage `opening` has what cells around the path hold, since it knows the path.
-        if let Some(opening) = model.opening() {
-            let theirs: f64 = opening.cells.iter().map(|near| measures[near.cell as usize].elastic).sum();
-            sums.energy.elastic += self.opening.elastic - theirs;
-        }
+        // Beside what cells hold of a path of no width.
+        sums.energy.elastic += self.opening.elastic;
         sums.energy.hourglass = measures.iter().map(|m| m.hourglass).sum();
         sums.energy.viscous = measures.iter().map(|m| m.viscous).sum();
         // What deletion has taken out may be turned inside out.

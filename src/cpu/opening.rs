@@ -11,7 +11,7 @@ use crate::material_point::{Material, PointState, Volumetric};
 use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, mean_place};
 use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
-use crate::needle::opening::{Derivatives, Station};
+use crate::needle::opening::{Derivatives, Opening, Station};
 
 /// What is derived of one station: of the energy E.
 #[derive(Debug, Clone, Copy, Default)]
@@ -53,7 +53,7 @@ struct Now {
 pub(super) struct OpeningState {
     /// Force that opening takes per advance of the tip [N].
     pub resistance: f64,
-    /// Elastic energy of points and near cells in the last step [J].
+    /// Elastic energy that opening added in the last step [J].
     pub elastic: f64,
     /// Normal force of every station in the last step [N], and the friction on it.
     pub normal: Vec<f64>,
@@ -138,8 +138,13 @@ impl CpuEngine {
             .par_iter()
             .map(|near| near_cell_forces(&model, elements, opening, near, &within(&now, near), &states.displacement))
             .collect();
-        for (near, (forces, derivatives, energy)) in opening.cells.iter().zip(cells) {
-            self.cells[near.cell as usize] = forces;
+        for (near, added) in opening.cells.iter().zip(cells) {
+            let Some((forces, derivatives, energy)) = added else { continue };
+            let cell = &mut self.cells[near.cell as usize];
+            for i in 0..8 {
+                cell.force[i] += forces.force[i];
+                cell.bound[i] += forces.bound[i];
+            }
             elastic += energy;
             for sums in &mut sums[usize::from(near.first)..][..usize::from(near.count)] {
                 sums.add(&derivatives, 1.0 / f64::from(near.count));
@@ -240,8 +245,21 @@ fn averaged_normal(opening: &OpeningPlan, now: &[Now], sums: &[StationSums]) -> 
 }
 
 /// Stress [Pa] of what keeps the shape: law and fibres, without the pressure, which is the cell's.
-fn shape_stress(material: &Material, h: DMat3) -> DMat3 {
-    material.stress(h, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default())
+fn shape_stress(material: &Material, f: DMat3) -> DMat3 {
+    material.stress(f - DMat3::IDENTITY, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default())
+}
+
+/// Its energy [J/m^3].
+fn shape_energy(material: &Material, f: DMat3) -> f64 {
+    material.energy(f - DMat3::IDENTITY, 0.0, 1.0, &PointState::default()).stored
+}
+
+/// What opening adds at a place: derivatives of `W(F) - W(F_h)` and that difference, per volume.
+fn opened(material: &Material, map: &Opening, gradient: DMat3) -> (Derivatives, f64) {
+    let f = map.gradient(gradient);
+    let mut d = map.pull_back(shape_stress(material, f));
+    d.gradient -= shape_stress(material, gradient);
+    (d, shape_energy(material, f) - shape_energy(material, gradient))
 }
 
 /// Forces (with the sign of f_int) and bounds of the points of a station at its nodes.
@@ -252,24 +270,23 @@ fn point_forces(
     section: &Station,
     displacement: &[DVec3],
 ) -> (StationSums, Vec<(DVec3, f64)>) {
+    let mut sums = StationSums::default();
+    // What is not opened is as its cells have it.
+    if section.radius == 0.0 {
+        return (sums, Vec::new());
+    }
     let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
     let mut local = vec![(DVec3::ZERO, 0.0); u.len()];
-    let mut sums = StationSums::default();
-    let middle: Vec<f64> = {
-        let mut all = vec![0.0; u.len()];
-        station.centre.iter().for_each(|(p, w)| all[usize::from(*p)] += w);
-        all
-    };
+    let mut middle = vec![0.0; u.len()];
+    station.centre.iter().for_each(|(p, w)| middle[usize::from(*p)] += w);
     for point in &station.points {
         let (y, gradient) = point.place_and_gradient(&u);
         let map = opening.map.at(section, y, gradient);
-        let f = map.gradient(gradient);
         let material = model.material(point.cell as usize);
-        let h = f - DMat3::IDENTITY;
-        let d = map.pull_back(shape_stress(material, h));
-        sums.energy += point.volume * material.energy(h, 0.0, 1.0, &PointState::default()).stored;
+        let (d, energy) = opened(material, &map, gradient);
+        sums.energy += point.volume * energy;
         sums.add(&d, point.volume);
-        let tangent = material.tangent_bound(h, &PointState::default());
+        let tangent = material.tangent_bound(map.gradient(gradient) - DMat3::IDENTITY, &PointState::default());
         let cof = cofactor(gradient);
         let (by_gradient, by_place) = map.amplification();
         let mut sizes = [(0.0, 0.0); 8];
@@ -277,8 +294,7 @@ fn point_forces(
             let node = usize::from(point.corners[c]);
             local[node].0 += (d.gradient * point.gradients[c] + d.place * point.weights[c]) * point.volume;
             let aside = (point.weights[c] - middle[node]).abs();
-            sizes[c] =
-                (by_gradient * point.gradients[c].length() + by_place * aside, (cof * point.gradients[c]).length());
+            sizes[c] = (by_gradient * point.gradients[c].length() + by_place * aside, (cof * point.gradients[c]).length());
         }
         let (all, all_cof) = sizes.iter().fold((0.0, 0.0), |s, x| (s.0 + x.0, s.1 + x.1));
         for c in 0..8 {
@@ -292,7 +308,7 @@ fn point_forces(
 /// Places of Gauss' rule in a cell, -1..1, are at the corners times this.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
 
-/// Forces of a cell that the map reaches, derivatives of its energy by the path, and that energy. The gradient of y is that of its centre,
+/// What opening adds to a cell: forces, derivatives of its energy by the path, and that energy. The gradient of y is that of its centre,
 /// as elsewhere; the map is taken at eight places.
 fn near_cell_forces(
     model: &Model,
@@ -301,7 +317,10 @@ fn near_cell_forces(
     near: &NearCell,
     section: &Station,
     displacement: &[DVec3],
-) -> (CellForces, Derivatives, f64) {
+) -> Option<(CellForces, Derivatives, f64)> {
+    if section.radius == 0.0 {
+        return None;
+    }
     let cell = near.cell as usize;
     let shape = CellShape::new(&model.mesh, cell);
     let u = shape.gather(displacement);
@@ -310,7 +329,7 @@ fn near_cell_forces(
     let gradient = DMat3::IDENTITY + shape.displacement_gradient(&u);
     let material = model.material(cell);
     let (mut sum, mut places, mut energy) = (Derivatives::ZERO, [DVec3::ZERO; 8], 0.0);
-    let (mut dilation, mut grown, mut straight, mut turned) = (0.0, 1.0f64, 0.0f64, 0.0f64);
+    let (mut dilation, mut grown) = (0.0, 1.0f64);
     let part = shape.volume / 8.0;
     let weights = |at: usize| -> [f64; 8] {
         std::array::from_fn(|i| (0..3).map(|a| 0.5 * (1.0 + GAUSS * CORNERS[at][a] * CORNERS[i][a])).product())
@@ -319,6 +338,8 @@ fn near_cell_forces(
         let place = weights(at).iter().zip(y).map(|(w, y)| y * *w).sum();
         opening.map.at(section, place, gradient)
     });
+    let tangent = material.tangent_bound(gradient - DMat3::IDENTITY, &PointState::default());
+    let (mut straight, mut turned) = (tangent.straight, tangent.turned);
     for (at, map) in maps.iter().enumerate() {
         dilation += map.dilation / 8.0;
         // Points carry the rest of what keeps the shape.
@@ -326,37 +347,37 @@ fn near_cell_forces(
         if volume == 0.0 {
             continue;
         }
-        let h = map.gradient(gradient) - DMat3::IDENTITY;
-        let d = map.pull_back(shape_stress(material, h) * volume);
-        energy += volume * material.energy(h, 0.0, 1.0, &PointState::default()).stored;
-        for (place, w) in places.iter_mut().zip(weights(at)) {
-            *place += d.place * w;
+        let (d, w) = opened(material, map, gradient);
+        energy += volume * w;
+        for (place, weight) in places.iter_mut().zip(weights(at)) {
+            *place += d.place * (weight * volume);
         }
-        sum.add(&d);
-        let tangent = material.tangent_bound(h, &PointState::default());
+        sum.add(&d, volume);
+        let tangent = material.tangent_bound(map.gradient(gradient) - DMat3::IDENTITY, &PointState::default());
         let (by_gradient, by_place) = map.amplification();
         grown = grown.max(by_gradient + by_place * shape.edge());
         (straight, turned) = (straight.max(tangent.straight), turned.max(tangent.turned));
     }
     // The volume is the cell's.
     let (j, cof) = (gradient.determinant(), cofactor(gradient));
-    let change = j * dilation - 1.0;
-    let pressure = material.law.bulk_modulus * change;
-    energy += shape.volume * 0.5 * material.law.bulk_modulus * change * change;
-    sum.gradient += cof * (pressure * dilation * shape.volume);
+    let bulk = material.law.bulk_modulus;
+    let (closed, open) = (j - 1.0, j * dilation - 1.0);
+    energy += shape.volume * 0.5 * bulk * (open * open - closed * closed);
+    sum.gradient += cof * (bulk * (open * dilation - closed) * shape.volume);
     for (at, map) in maps.iter().enumerate() {
-        let d = map.pull_back_dilation(pressure * j * part);
-        for (place, w) in places.iter_mut().zip(weights(at)) {
-            *place += d.place * w;
+        let d = map.pull_back_dilation(bulk * open * j);
+        for (place, weight) in places.iter_mut().zip(weights(at)) {
+            *place += d.place * (weight * part);
         }
-        sum.add(&d);
+        sum.add(&d, part);
     }
-    let mut forces = elements.hourglass_forces(model, cell, &shape, &u);
-    let tangent = TangentBound { straight: straight * grown * grown, turned };
-    let bound = elements.stiffness_bound(model, cell, cof * dilation.abs().max(1.0), tangent, 0.0);
+    let opened = TangentBound { straight: straight * grown * grown, turned };
+    let with = elements.stiffness_bound(model, cell, cof * dilation.max(1.0), opened, 0.0);
+    let without = elements.stiffness_bound(model, cell, cof, tangent, 0.0);
+    let mut forces = CellForces::default();
     for (i, b) in shape.gradients().iter().enumerate() {
-        forces.force[i] += sum.gradient * *b + places[i];
-        forces.bound[i] += bound[i];
+        forces.force[i] = sum.gradient * *b + places[i];
+        forces.bound[i] = (with[i] - without[i]).max(0.0);
     }
-    (forces, sum, energy)
+    Some((forces, sum, energy))
 }

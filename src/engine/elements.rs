@@ -469,23 +469,6 @@ impl Elements {
         (out, met)
     }
 
-    /// Hourglass forces of an intact hexahedron, and the bound of their stiffness at every corner; what keeps its shape and volume is not
-    /// in them.
-    pub fn hourglass_forces(&self, model: &Model, cell: usize, shape: &CellShape, u: &[DVec3; 8]) -> CellForces {
-        let q = shape.hourglass_modes(u);
-        let q2: f64 = q.iter().map(|q| q.length_squared()).sum();
-        let folding = q2 / (shape.scale() * shape.scale());
-        let k = self.hourglass(model, cell) * shape.edge();
-        let mut out =
-            CellForces { force: [DVec3::ZERO; 8], bound: [k * (1.0 + 3.0 * self.quartic * folding) / 8.0; 8] };
-        for (i, force) in out.force.iter_mut().enumerate() {
-            for (q, gamma) in q.iter().zip(shape.hourglass_vector(i)) {
-                *force += *q * (k * (1.0 + self.quartic * folding) * gamma);
-            }
-        }
-        out
-    }
-
     /// Energies and Jacobians of one cell.
     pub fn measure(
         &self,

@@ -108,13 +108,13 @@ impl Derivatives {
         radius_rate: 0.0,
     };
 
-    /// Adds those of another energy.
-    pub fn add(&mut self, other: &Derivatives) {
-        self.gradient += other.gradient;
-        self.place += other.place;
-        self.centre_rate += other.centre_rate;
-        self.radius += other.radius;
-        self.radius_rate += other.radius_rate;
+    /// Adds those of another energy, `by` times.
+    pub fn add(&mut self, other: &Derivatives, by: f64) {
+        self.gradient += other.gradient * by;
+        self.place += other.place * by;
+        self.centre_rate += other.centre_rate * by;
+        self.radius += other.radius * by;
+        self.radius_rate += other.radius_rate * by;
     }
 }
 
