@@ -189,6 +189,14 @@ fn stage_text(stage: Stage) -> [&'static str; 2] {
         Stage::NeedleContact => {
             ["opened path or separated faces against the needle, friction, tip springs", "`puncture`"]
         }
+        Stage::OpeningStations => {
+            ["where the sections of an opened path are, and what is cut", "`puncture`, scheme opening"]
+        }
+        Stage::OpeningPoints => ["forces of the points beside the path", "`puncture`, scheme opening"],
+        Stage::OpeningCells => ["what opening adds to the cells around the path", "`puncture`, scheme opening"],
+        Stage::OpeningReactions => ["normal force, friction, reaction on needle and tip", "`puncture`, scheme opening"],
+        Stage::OpeningNodes => ["all of it on the nodes", "`puncture`, scheme opening"],
+        Stage::MeasureOpening => ["energy of opening and its sums", "`puncture`, scheme opening"],
         Stage::IndenterContact => ["top face against a sphere or punch", "`indentation`"],
         Stage::IntegrateNodes => ["gather, loads, damping, central difference, prescribed motion", "always"],
         Stage::MeasureCells => ["energies and Jacobians", "always"],

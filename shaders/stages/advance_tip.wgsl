@@ -9,6 +9,10 @@
 #ifdef ADHESION
 #import effects/adhesion
 #endif
+#ifdef OPENING
+#import effects/opening
+@group(3) @binding(23) var<storage, read> opening_record: OpeningRecord;
+#endif
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
@@ -80,7 +84,12 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
     let spring = puncture.tip_stiffness / f32(ANCHOR_COUNT);
     let before = tip_state.coordinate;
     let speed = length(step_input.velocity.xyz);
-    let threshold = tip_threshold(before, speed);
+    var resistance = 0.0;
+#ifdef OPENING
+    // The tissue that the tip opens as it advances is strained at once.
+    resistance = opening_record.now.x;
+#endif
+    let threshold = tip_threshold(before, speed) + resistance;
     var place = place_anchor(anchor, before);
     if (lane < ANCHOR_COUNT) {
         gaps[lane] = place.gap;
@@ -157,7 +166,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         tip_state.gap = distance / f32(ANCHOR_COUNT);
         let lost_now = select(0.0, lost, after > before);
         let beyond = lost_now * select(0.0, share_beyond(force, threshold), capped);
-        tip_state.dissipation += lost_now - beyond;
+        tip_state.dissipation += lost_now - beyond - resistance * (after - before);
         tip_state.cap_dissipation += beyond;
         tip_state.membrane_impulse += force * membrane_share(after) * params.dt;
     }

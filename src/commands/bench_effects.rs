@@ -171,6 +171,7 @@ pub fn off_is_absent() -> Result<bool> {
             bore: false,
             slit: false,
             free_path: false,
+            opening: false,
             drawn: true,
             tetrahedra: false,
             laws: BTreeSet::from([law.key]),

@@ -4,8 +4,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::{ContactSums, CpuEngine};
-use crate::engine::elements::{CORNERS, CellForces, CellShape, Elements};
-use crate::material::TangentBound;
+use crate::engine::elements::{CORNERS, CellForces, CellShape};
 use crate::material::kinematics::cofactor;
 use crate::material_point::{Material, PointState, Volumetric};
 use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, mean_place};
@@ -131,12 +130,11 @@ impl CpuEngine {
             elastic += local.0.energy;
         }
         // Cells that the map reaches.
-        let elements = &self.elements;
         let states = &self.state;
         let cells: Vec<_> = opening
             .cells
             .par_iter()
-            .map(|near| near_cell_forces(&model, elements, opening, near, &within(&now, near), &states.displacement))
+            .map(|near| near_cell_forces(&model, opening, near, &within(&now, near), &states.displacement))
             .collect();
         for (near, added) in opening.cells.iter().zip(cells) {
             let Some((forces, derivatives, energy)) = added else { continue };
@@ -223,6 +221,7 @@ impl CpuEngine {
             }
             booked.normal += t * spread + guide;
             booked.friction += t * rubbing;
+            booked.torque += (aside - t * n.behind).cross(guide);
         }
         self.opening.normal = normal;
         self.opening.friction = friction_forces;
@@ -277,8 +276,6 @@ fn point_forces(
     }
     let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
     let mut local = vec![(DVec3::ZERO, 0.0); u.len()];
-    let mut middle = vec![0.0; u.len()];
-    station.centre.iter().for_each(|(p, w)| middle[usize::from(*p)] += w);
     for point in &station.points {
         let (y, gradient) = point.place_and_gradient(&u);
         let map = opening.map.at(section, y, gradient);
@@ -290,11 +287,14 @@ fn point_forces(
         let cof = cofactor(gradient);
         let (by_gradient, by_place) = map.amplification();
         let mut sizes = [(0.0, 0.0); 8];
+        // Rows of the point's own stiffness, with the weight of a corner from that at the middle of the path.
+        let middle = (point.local - map.eta() / point.width).clamp(DVec3::ZERO, DVec3::ONE);
         for c in 0..8 {
             let node = usize::from(point.corners[c]);
             local[node].0 += (d.gradient * point.gradients[c] + d.place * point.weights[c]) * point.volume;
-            let aside = (point.weights[c] - middle[node]).abs();
-            sizes[c] = (by_gradient * point.gradients[c].length() + by_place * aside, (cof * point.gradients[c]).length());
+            let aside = (point.weights[c] - corner_weight(c, middle)).abs();
+            sizes[c] =
+                (by_gradient * point.gradients[c].length() + by_place * aside, (cof * point.gradients[c]).length());
         }
         let (all, all_cof) = sizes.iter().fold((0.0, 0.0), |s, x| (s.0 + x.0, s.1 + x.1));
         for c in 0..8 {
@@ -305,6 +305,11 @@ fn point_forces(
     (sums, local)
 }
 
+/// Weight of a corner at a place of its cell, 0..1 per axis.
+fn corner_weight(corner: usize, local: DVec3) -> f64 {
+    (0..3).map(|a| 0.5 + CORNERS[corner][a] * (local[a] - 0.5)).product()
+}
+
 /// Places of Gauss' rule in a cell, -1..1, are at the corners times this.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
 
@@ -312,7 +317,6 @@ const GAUSS: f64 = 0.577_350_269_189_625_8;
 /// as elsewhere; the map is taken at eight places.
 fn near_cell_forces(
     model: &Model,
-    elements: &Elements,
     opening: &OpeningPlan,
     near: &NearCell,
     section: &Station,
@@ -340,13 +344,17 @@ fn near_cell_forces(
     });
     let tangent = material.tangent_bound(gradient - DMat3::IDENTITY, &PointState::default());
     let (mut straight, mut turned) = (tangent.straight, tangent.turned);
-    for (at, map) in maps.iter().enumerate() {
-        dilation += map.dilation / 8.0;
+    dilation += maps.iter().map(|m| m.dilation).sum::<f64>() / 8.0;
+    let whole = near.is_whole();
+    let middle = opening.map.at(section, y.iter().copied().sum::<DVec3>() / 8.0, gradient);
+    for at in 0..if whole { 1 } else { 8 } {
         // Points carry the rest of what keeps the shape.
-        let volume = part * near.shares[at];
+        let volume = if whole { shape.volume } else { part * near.shares[at] };
         if volume == 0.0 {
             continue;
         }
+        let map = if whole { &middle } else { &maps[at] };
+        let weights = |at: usize| if whole { [0.125; 8] } else { weights(at) };
         let (d, w) = opened(material, map, gradient);
         energy += volume * w;
         for (place, weight) in places.iter_mut().zip(weights(at)) {
@@ -371,13 +379,15 @@ fn near_cell_forces(
         }
         sum.add(&d, part);
     }
-    let opened = TangentBound { straight: straight * grown * grown, turned };
-    let with = elements.stiffness_bound(model, cell, cof * dilation.max(1.0), opened, 0.0);
-    let without = elements.stiffness_bound(model, cell, cof, tangent, 0.0);
-    let mut forces = CellForces::default();
+    // Bound of the stiffness beyond that of the closed cell, where open faces may meet (see Elements::stiffness_bound).
+    let b = 0.25 / model.mesh.block().cell_size(cell);
+    let columns = [cof.x_axis.abs() * b.x, cof.y_axis.abs() * b.y, cof.z_axis.abs() * b.z];
+    let (cof_b, b) = ((columns[0] + columns[1] + columns[2]).length_squared(), b.length_squared());
+    let with = (bulk + turned) * cof_b * dilation.max(1.0).powi(2) + straight * grown * grown * b;
+    let without = (bulk + tangent.turned) * cof_b + tangent.straight * b;
+    let mut forces = CellForces { bound: [8.0 * shape.volume * (with - without).max(0.0); 8], ..CellForces::default() };
     for (i, b) in shape.gradients().iter().enumerate() {
         forces.force[i] = sum.gradient * *b + places[i];
-        forces.bound[i] = (with[i] - without[i]).max(0.0);
     }
     Some((forces, sum, energy))
 }

@@ -23,6 +23,16 @@ pub enum Stage {
     CohesiveForces,
     /// Contact of cone and shaft with the opened path, friction, and tip springs on the nodes.
     NeedleContact,
+    /// Where the sections of an opened path are, and what of them is cut.
+    OpeningStations,
+    /// Forces of the points beside the opened path.
+    OpeningPoints,
+    /// What opening adds to the cells around the path.
+    OpeningCells,
+    /// What the sections of the path do to tissue, needle and tip; friction.
+    OpeningReactions,
+    /// All of it on the nodes.
+    OpeningNodes,
     /// Contact of a sphere or flat punch with the top face.
     IndenterContact,
     /// Gather, loads, damping, central difference, prescribed motion.
@@ -31,6 +41,8 @@ pub enum Stage {
     MeasureCells,
     /// Kinetic energy, speeds, counters of every node (once per frame).
     MeasureNodes,
+    /// Energy that opening adds, and its sums (once per frame).
+    MeasureOpening,
     /// Sums over the contact nodes (once per frame).
     MeasureContact,
     /// Reactions of the six faces (once per frame).
@@ -45,7 +57,7 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 19] = [
+    pub const ALL: [Stage; 25] = [
         Stage::AdvanceTip,
         Stage::SoftenPath,
         Stage::AdvanceFreeTip,
@@ -56,10 +68,16 @@ impl Stage {
         Stage::ElementForces,
         Stage::CohesiveForces,
         Stage::NeedleContact,
+        Stage::OpeningStations,
+        Stage::OpeningPoints,
+        Stage::OpeningCells,
+        Stage::OpeningReactions,
+        Stage::OpeningNodes,
         Stage::IndenterContact,
         Stage::IntegrateNodes,
         Stage::MeasureCells,
         Stage::MeasureNodes,
+        Stage::MeasureOpening,
         Stage::MeasureContact,
         Stage::MeasureFaces,
         Stage::MeasureSeparation,
@@ -80,10 +98,16 @@ impl Stage {
             Stage::ElementForces => "element_forces",
             Stage::CohesiveForces => "cohesive_forces",
             Stage::NeedleContact => "needle_contact",
+            Stage::OpeningStations => "opening_stations",
+            Stage::OpeningPoints => "opening_points",
+            Stage::OpeningCells => "opening_cells",
+            Stage::OpeningReactions => "opening_reactions",
+            Stage::OpeningNodes => "opening_nodes",
             Stage::IndenterContact => "indenter_contact",
             Stage::IntegrateNodes => "integrate_nodes",
             Stage::MeasureCells => "measure_cells",
             Stage::MeasureNodes => "measure_nodes",
+            Stage::MeasureOpening => "measure_opening",
             Stage::MeasureContact => "measure_contact",
             Stage::MeasureFaces => "measure_faces",
             Stage::MeasureSeparation => "measure_separation",
@@ -114,6 +138,7 @@ impl Stage {
             self,
             Stage::MeasureCells
                 | Stage::MeasureNodes
+                | Stage::MeasureOpening
                 | Stage::MeasureContact
                 | Stage::MeasureFaces
                 | Stage::MeasureSeparation

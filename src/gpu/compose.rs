@@ -42,12 +42,13 @@ pub const PARAMS: [(&str, &[&str]); 3] = [
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 16] = [
+pub const SCENE_DEFINES: [&str; 17] = [
     "TIED",
     "INNER_BOUND",
     "SLIT",
     "BORE",
     "FREE_PATH",
+    "OPENING",
     "STEP_INPUT",
     "LOADED_FACES",
     "DRIVEN_FACES",

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::arrays::{CONTACT_PARTS, FACE_PARTS, SEPARATION_PARTS, free_cell_count};
+use super::arrays::{CONTACT_PARTS, FACE_PARTS, SEPARATION_PARTS, free_cell_count, opening_counts};
 use super::compose::Defines;
 use super::kernel::MeshNumbers;
 use super::layout::Layout;
@@ -27,6 +27,8 @@ pub struct Features {
     pub slit: bool,
     /// The path of the needle is found while the tip moves.
     pub free_path: bool,
+    /// The tissue beside the path is carried by points.
+    pub opening: bool,
     /// A window draws the fields.
     pub drawn: bool,
     /// Keys of the elastic laws that occur.
@@ -43,6 +45,7 @@ impl Features {
             bore: model.has_surface(|s| matches!(s, ContactSurface::OuterWall | ContactSurface::Bore)),
             slit: model.has_surface(|s| matches!(s, ContactSurface::Slit { .. })),
             free_path: model.puncture.as_ref().is_some_and(|p| p.free.is_some()),
+            opening: model.opening().is_some(),
             drawn: false,
             laws: model.materials.iter().map(|m| m.law.isochoric.key()).collect(),
         }
@@ -75,6 +78,7 @@ pub fn defines(effects: &EffectSet, features: &Features) -> Defines {
     define("BORE", features.bore && separates);
     define("SLIT", features.slit && separates);
     define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
+    define("OPENING", features.opening && effects.puncture.is_some() && !features.tetrahedra);
     // The bulk stiffness of a cell is not that of all others.
     define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || effects.damage.is_some()));
     define("HISTORY", effects.plasticity.is_some() || effects.viscoelastic.is_some() || effects.damage.is_some());
@@ -97,11 +101,17 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     let cohesive = block && effects.cohesive.is_some();
     let wanted = |stage: &Stage| match stage {
         // Where faces separate no cell is softened, but a core is severed.
-        Stage::SoftenPath => puncture && (!cohesive || features.bore) && !features.free_path,
+        Stage::SoftenPath => puncture && !features.opening && (!cohesive || features.bore) && !features.free_path,
         Stage::CohesiveForces | Stage::MeasureSeparation => cohesive,
         Stage::AdvanceTip => puncture && !features.free_path,
         Stage::AdvanceFreeTip | Stage::SoftenFreePath => puncture && features.free_path,
         Stage::NeedleContact => puncture,
+        Stage::OpeningStations
+        | Stage::OpeningPoints
+        | Stage::OpeningCells
+        | Stage::OpeningReactions
+        | Stage::OpeningNodes
+        | Stage::MeasureOpening => puncture && features.opening,
         Stage::IndenterContact => indentation,
         Stage::MeasureContact => puncture || indentation,
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
@@ -129,6 +139,11 @@ pub fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u3
         Stage::MeasureDilatation | Stage::TetrahedronForces => model.mesh.cell_count() as u32,
         Stage::AveragePressure => model.mesh.node_count() as u32,
         Stage::ElementForces => layout.strips().columns * layout.strips().count,
+        Stage::OpeningStations | Stage::OpeningReactions => 64,
+        Stage::OpeningPoints => opening_counts(model, layout)[0],
+        Stage::OpeningCells => opening_counts(model, layout)[1],
+        Stage::OpeningNodes => opening_counts(model, layout)[2],
+        Stage::MeasureOpening => 128,
         Stage::NeedleContact | Stage::IndenterContact => model.contact_nodes.len() as u32,
         Stage::IntegrateNodes => model.mesh.node_count() as u32,
         Stage::MeasureCells | Stage::MeasureNodes => measure_threads,

@@ -219,6 +219,73 @@ shared_structs! {
         _pad0: u32,
         _pad1: u32,
     }
+    /// shaders/effects/opening.wgsl
+    struct OpeningParams {
+        direction: [f32; 4],
+        entry: [f32; 4],
+        numbers: [f32; 4],
+        friction: [f32; 4],
+        counts: [u32; 4],
+        averaged: [u32; 4],
+    }
+    /// shaders/effects/opening.wgsl
+    struct OpeningStation {
+        depth: [f32; 4],
+        lists: [u32; 4],
+        centre: [f32; 4],
+        centre_rate: [f32; 4],
+        place: [f32; 4],
+        rubbing: [f32; 4],
+        by_centre: [f32; 4],
+        by_rate: [f32; 4],
+        along: [f32; 4],
+        across: [f32; 4],
+    }
+    /// shaders/effects/opening.wgsl
+    struct OpeningEntry {
+        index: u32,
+        first: f32,
+        second: f32,
+        _pad: f32,
+    }
+    /// shaders/effects/opening.wgsl
+    struct OpeningSum {
+        by_centre: [f32; 4],
+        by_rate: [f32; 4],
+    }
+    /// shaders/effects/opening.wgsl
+    struct OpeningRecord {
+        impulse: [f32; 4],
+        angular_impulse: [f32; 4],
+        parts: [f32; 4],
+        now: [f32; 4],
+    }
+    /// shaders/shared/opening_cluster.wgsl
+    struct OpeningCluster {
+        cell: [u32; 4],
+        points: [u32; 4],
+        low: [f32; 4],
+        width: [f32; 4],
+    }
+    /// shaders/shared/opening_cell.wgsl
+    struct OpeningCell {
+        cell: [u32; 4],
+        stations: [u32; 4],
+        low: [f32; 4],
+        width: [f32; 4],
+        lower: [f32; 4],
+        upper: [f32; 4],
+    }
+    /// shaders/stages/measure_opening.wgsl
+    struct OpeningTotals {
+        record: OpeningRecord,
+        elastic: [[f32; 4]; 32],
+    }
+    /// shaders/stages/opening_nodes.wgsl
+    struct OpeningNode {
+        numbers: [u32; 4],
+        more: [u32; 4],
+    }
     /// shaders/shared/tied_nodes.wgsl
     struct TiedNode {
         copies: [u32; 4],

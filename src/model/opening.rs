@@ -45,8 +45,10 @@ pub struct PathPoint {
     pub gradients: [DVec3; 8],
     /// Rest volume that it stands for [m^3].
     pub volume: f64,
-    /// Rest position [m].
+    /// Rest position [m]; place in the cell, 0..1; edges of the cell [m].
     pub place: DVec3,
+    pub local: DVec3,
+    pub width: DVec3,
 }
 
 /// A section of the path.
@@ -92,6 +94,13 @@ pub struct OpeningPlan {
     pub stick: f64,
     /// Half of the length over which the normal force is averaged for friction, in stations.
     pub averaged: usize,
+}
+
+impl NearCell {
+    /// True where points carry no part of it.
+    pub fn is_whole(&self) -> bool {
+        self.shares == [1.0; 8]
+    }
 }
 
 impl OpeningPlan {
@@ -150,6 +159,8 @@ struct Place {
     corners: [usize; 8],
     weights: [f64; 8],
     gradients: [DVec3; 8],
+    local: DVec3,
+    width: DVec3,
     inside: bool,
 }
 
@@ -166,7 +177,7 @@ fn place_in(mesh: &BlockMesh, x: DVec3) -> Place {
         weights[c] = n[0] * n[1] * n[2];
         gradients[c] = DVec3::from(*signs) / width * DVec3::new(n[1] * n[2], n[2] * n[0], n[0] * n[1]);
     }
-    Place { cell, corners, weights, gradients, inside }
+    Place { cell, corners, weights, gradients, local: exact, width, inside }
 }
 
 impl OpeningPlan {
@@ -244,7 +255,7 @@ fn station(
         let volume = 0.5 * long * w * r * r * std::f64::consts::TAU / angles as f64 * spacing;
         for i in 0..angles {
             let place = at(r, (i as f64 + 0.5) / angles as f64);
-            let Place { cell, corners, weights, gradients, inside } = place_in(mesh, place);
+            let Place { cell, corners, weights, gradients, local, width, inside } = place_in(mesh, place);
             if !inside {
                 continue;
             }
@@ -255,6 +266,8 @@ fn station(
                 gradients,
                 volume,
                 place,
+                local,
+                width,
             });
         }
     }

@@ -167,6 +167,11 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
 }
 
 impl Opening {
+    /// Where the place lies from the middle of the path [m], across it.
+    pub fn eta(&self) -> DVec3 {
+        self.eta
+    }
+
     /// F = grad x, from the gradient F_h that the map was made with.
     pub fn gradient(&self, gradient: DMat3) -> DMat3 {
         let ht_eta = self.lateral.transpose() * self.eta;

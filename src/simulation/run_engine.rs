@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::cpu::CpuEngine;
 use crate::engine::Engine;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{Gpu, GpuEngine};
 use crate::model::Model;
 
@@ -23,11 +23,6 @@ impl RunEngine {
     /// As [`GpuEngine::new`].
     pub fn new(model: &Arc<Model>, device: Option<&Gpu>, dt: f64, most_steps: usize, drawn: bool) -> Result<Self> {
         Ok(match device {
-            Some(_) if model.opening().is_some() => {
-                return Err(Error::Device(
-                    "the scheme `opening` of the effect puncture runs on the CPU engine only: use --engine cpu".into(),
-                ));
-            }
             Some(gpu) => {
                 let engine = GpuEngine::for_purpose(model.clone(), gpu.clone(), dt, most_steps, drawn)?;
                 RunEngine::Gpu(Box::new(engine))

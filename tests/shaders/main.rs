@@ -27,6 +27,7 @@ fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
         regions: false,
         tetrahedra: false,
         free_path: false,
+        opening: false,
         drawn: true,
         bore: false,
         slit: false,

@@ -8,6 +8,7 @@ mod contact;
 mod drawn;
 mod material;
 mod mesh;
+mod opening;
 mod own;
 mod puncture;
 mod sums;
@@ -19,6 +20,7 @@ use crate::engine::{FrameSums, State};
 use crate::model::Model;
 
 pub use mesh::{STEP_INPUT, STEP_STRIDE, centre_line, displacement, step_input};
+pub use opening::opening_counts;
 pub use puncture::free_cell_count;
 pub use sums::{CONTACT_PARTS, FACE_PARTS, SEPARATION_PARTS};
 
@@ -144,12 +146,13 @@ impl Array {
 
 /// All arrays; what they tell of a frame is summed up in this order.
 pub fn all() -> impl Iterator<Item = &'static Array> {
-    let owners: [&[Array]; 8] = [
+    let owners: [&[Array]; 9] = [
         mesh::ARRAYS,
         material::ARRAYS,
         own::ARRAYS,
         contact::ARRAYS,
         puncture::ARRAYS,
+        opening::ARRAYS,
         cohesive::ARRAYS,
         sums::ARRAYS,
         drawn::ARRAYS,

@@ -1,0 +1,205 @@
+// Scheme `opening` of the effect puncture: the map that opens a path of no width. Equations: src/needle/opening.rs.
+// Lengths across the path are in needle radii R here, so that all numbers are near 1.
+#import shared/params
+#import shared/kinematics
+
+struct OpeningParams {
+    // Direction of the needle and of the path; w: R [m].
+    direction: vec4<f32>,
+    // Where the path enters [m]; w: length of the tip [m].
+    entry: vec4<f32>,
+    // Distance of stations [m], stiffness that holds the path on the needle per station [N/m], s0 in R^2; w unused.
+    numbers: vec4<f32>,
+    // Coefficient of friction, stiffness of the stick spring per station [N/m], length over which the coefficient grows [m]; w unused.
+    friction: vec4<f32>,
+    // Stations, clusters, cells, nodes.
+    counts: vec4<u32>,
+    // Half of the stations over which the normal force is averaged; the others unused.
+    averaged: vec4<u32>,
+}
+
+// A section of the path. The first three are known before the run.
+struct OpeningStation {
+    // Material coordinate Z [m], and that from which it counts as cut; z, w unused.
+    depth: vec4<f32>,
+    // Entries of the means over nodes: first, end; entries of the slots that tell of it: first, end.
+    lists: vec4<u32>,
+    // Displacement of the middle of the path, across it [m]; w: radius rc [m].
+    centre: vec4<f32>,
+    // Their rates with Z.
+    centre_rate: vec4<f32>,
+    // Distance behind the tip [m], part that is cut, its rate [1/m], slope of the radius.
+    place: vec4<f32>,
+    // Radius where all is cut [m], speed of the section along the needle [m/s], stretch of the stick spring [m]; w unused.
+    rubbing: vec4<f32>,
+    // Derivatives of the energy: by the centre [N] and by rc [N]; by the rates of both [J].
+    by_centre: vec4<f32>,
+    by_rate: vec4<f32>,
+    // Force along the needle [N] on the section, bound of its stiffness, that of the middle; w unused.
+    along: vec4<f32>,
+    // Force across the needle on the middle of the path [N]; w unused.
+    across: vec4<f32>,
+}
+
+// Place in a list, and two weights.
+struct OpeningEntry {
+    index: u32,
+    first: f32,
+    second: f32,
+    _pad: f32,
+}
+
+// What a cluster of points or a cell tells of the stations: derivatives of its energy by centre and rc, and by their rates.
+struct OpeningSum {
+    by_centre: vec4<f32>,
+    by_rate: vec4<f32>,
+}
+
+// What the scheme has summed in this frame, and what it holds.
+struct OpeningRecord {
+    // Impulse on the tissue [N s]; w: work of the tool in the last step with the velocity ahead [J].
+    impulse: vec4<f32>,
+    // Angular impulse about the tip [N m s]; w unused.
+    angular_impulse: vec4<f32>,
+    // Impulse along the needle of spreading and of friction [N s], work of the tool [J], dissipated by friction [J].
+    parts: vec4<f32>,
+    // Force that opening takes per advance of the tip [N], energy in guide and stick springs [J]; z, w unused.
+    now: vec4<f32>,
+}
+
+@group(0) @binding(7) var<uniform> opening: OpeningParams;
+
+// The path at one place, across it in R.
+struct PathSection {
+    centre_rate: vec3<f32>,
+    radius: f32,
+    radius_rate: f32,
+}
+
+struct OpenedPlace {
+    eta: vec3<f32>,
+    // g, dg/ds, d^2g/ds^2; dg/drc, and its derivatives by s and rc.
+    g: f32,
+    g1: f32,
+    g2: f32,
+    gr: f32,
+    gr1: f32,
+    grr: f32,
+    radius_rate: f32,
+    H: mat3x3<f32>,
+}
+
+struct OpeningDerivatives {
+    gradient: mat3x3<f32>,
+    // By y across the path [1/m], by c_Z, by rc [1/m] and rc_Z, all of an energy per volume.
+    place: vec3<f32>,
+    centre_rate: vec3<f32>,
+    radius: f32,
+    radius_rate: f32,
+}
+
+fn across(v: vec3<f32>) -> vec3<f32> {
+    return v - opening.direction.xyz * dot(v, opening.direction.xyz);
+}
+
+// w and its first and second derivative by s.
+fn fade(s: f32) -> vec3<f32> {
+    let rho = sqrt(s);
+    let x = clamp((rho - 2.0) * 0.25, 0.0, 1.0);
+    let value = 1.0 - x * x * x * (10.0 - x * (15.0 - 6.0 * x));
+    let slope = -7.5 * x * x * (1.0 - x) * (1.0 - x);
+    let curvature = -3.75 * x * (1.0 - x) * (1.0 - 2.0 * x);
+    let inverse = 1.0 / max(s, 1.0);
+    let first = 0.5 * slope * sqrt(inverse);
+    return vec3<f32>(value, first, (0.25 * curvature - 0.5 * first) * inverse);
+}
+
+// v = w/(s + s0) and its derivatives.
+fn fade_over_area(s: f32, w: vec3<f32>) -> vec3<f32> {
+    let a = 1.0 / (s + opening.numbers.z);
+    let v = w.x * a;
+    let v1 = (w.y - v) * a;
+    return vec3<f32>(v, v1, (w.z - 2.0 * v1) * a);
+}
+
+// The map at eta [R] with the gradient F_h of y.
+fn opened_place(section: PathSection, eta: vec3<f32>, gradient: mat3x3<f32>) -> OpenedPlace {
+    let s = dot(eta, eta);
+    let v = fade_over_area(s, fade(s));
+    let rc = section.radius;
+    let g = sqrt(1.0 + rc * rc * v.x);
+    var out: OpenedPlace;
+    out.eta = eta;
+    out.g = g;
+    out.g1 = rc * rc * v.y / (2.0 * g);
+    out.gr = rc * v.x / g;
+    out.g2 = rc * rc * v.z / (2.0 * g) - out.g1 * out.g1 / g;
+    out.gr1 = rc * v.y / g - out.gr * out.g1 / g;
+    out.grr = v.x / g - out.gr * out.gr / g;
+    out.radius_rate = section.radius_rate;
+    let t = opening.direction.xyz;
+    out.H = mat3x3<f32>(
+        across(gradient[0]) - section.centre_rate * t.x,
+        across(gradient[1]) - section.centre_rate * t.y,
+        across(gradient[2]) - section.centre_rate * t.z,
+    );
+    return out;
+}
+
+// det grad x / det F_h, and its derivatives by s and rc.
+fn dilation(radius: f32, s: f32) -> vec3<f32> {
+    let w = fade(s);
+    let s0 = opening.numbers.z;
+    let part = s / (s + s0);
+    // d(s v)/ds and d^2(s v)/ds^2, without the difference of large numbers near the path.
+    let first = w.y * part + w.x * s0 / ((s + s0) * (s + s0));
+    let second = w.z * part + 2.0 * w.y * s0 / ((s + s0) * (s + s0)) - 2.0 * w.x * s0 / ((s + s0) * (s + s0) * (s + s0));
+    return vec3<f32>(1.0 + radius * radius * first, radius * radius * second, 2.0 * radius * first);
+}
+
+// a b^T.
+fn outer(a: vec3<f32>, b: vec3<f32>) -> mat3x3<f32> {
+    return mat3x3<f32>(a * b.x, a * b.y, a * b.z);
+}
+
+// F = grad x.
+fn opened_gradient(place: OpenedPlace, gradient: mat3x3<f32>) -> mat3x3<f32> {
+    let turned = transpose(place.H) * place.eta;
+    let row = turned * (2.0 * place.g1) + opening.direction.xyz * (place.gr * place.radius_rate);
+    return gradient + place.H * (place.g - 1.0) + outer(place.eta, row);
+}
+
+// Derivatives of an energy, from its derivative P by F.
+fn pull_back(place: OpenedPlace, P: mat3x3<f32>) -> OpeningDerivatives {
+    let eta = place.eta;
+    let t = opening.direction.xyz;
+    let h_eta = transpose(place.H) * eta;
+    let p_eta = transpose(P) * eta;
+    let h_p = double_dot(place.H, P);
+    let stretched = dot(p_eta, h_eta);
+    let sheared = dot(p_eta, t);
+    let by_H = P * (place.g - 1.0) + outer(eta, p_eta * (2.0 * place.g1));
+    let lateral = mat3x3<f32>(across(by_H[0]), across(by_H[1]), across(by_H[2]));
+    let rcz = place.radius_rate;
+    let inverse = 1.0 / opening.direction.w;
+    var out: OpeningDerivatives;
+    out.gradient = P + lateral;
+    out.place = across(
+        eta * (2.0 * place.g1 * h_p + 4.0 * place.g2 * stretched + 2.0 * place.gr1 * rcz * sheared)
+            + (P * h_eta + place.H * p_eta) * (2.0 * place.g1) + (P * t) * (place.gr * rcz)
+    ) * inverse;
+    out.centre_rate = -(lateral * t);
+    out.radius = (place.gr * h_p + 2.0 * place.gr1 * stretched + place.grr * rcz * sheared) * inverse;
+    out.radius_rate = place.gr * sheared;
+    return out;
+}
+
+// By how much a change of F_h grows in F at most, and by how much one of eta does [1/m].
+fn amplification(place: OpenedPlace) -> vec2<f32> {
+    let s = dot(place.eta, place.eta);
+    let size = sqrt(double_dot(place.H, place.H));
+    let radial = abs(place.g + 2.0 * place.g1 * s);
+    let by_place = size * (6.0 * abs(place.g1) * sqrt(s) + 4.0 * abs(place.g2) * s * sqrt(s))
+        + abs(place.radius_rate) * (place.gr + 2.0 * abs(place.gr1) * s);
+    return vec2<f32>(max(max(place.g, radial), 1.0), by_place / opening.direction.w);
+}

@@ -1,0 +1,51 @@
+// What opening adds at a place of the tissue: law and fibres of the opened gradient less those of the closed one.
+#import shared/elastic
+#import effects/opening
+#ifdef FIBRES
+#import effects/fibres
+#endif
+
+struct OpenedStress {
+    derivatives: OpeningDerivatives,
+    // Bounds of the tangent modulus: beside |N|^2, and beside |cof F N|^2 [Pa].
+    tangent: f32,
+    turned_tangent: f32,
+}
+
+// F - I.
+fn strain_of(F: mat3x3<f32>) -> mat3x3<f32> {
+    return mat3x3<f32>(
+        F[0] - vec3<f32>(1.0, 0.0, 0.0),
+        F[1] - vec3<f32>(0.0, 1.0, 0.0),
+        F[2] - vec3<f32>(0.0, 0.0, 1.0),
+    );
+}
+
+// `H`: F_h - I of the closed path.
+fn opened_stress(material: u32, place: OpenedPlace, H: mat3x3<f32>) -> OpenedStress {
+    let open = strain_of(opened_gradient(place, deformation_gradient(H)));
+    var stress = isochoric_stress(materials[material], open);
+    var closed = isochoric_stress(materials[material], H);
+#ifdef FIBRES
+    let fibre = fibre_stress(material, open, stress.cof, stress.dj);
+    stress.P += fibre.P;
+    stress.tangent += fibre.tangent;
+    closed.P += fibre_stress(material, H, closed.cof, closed.dj).P;
+#endif
+    var out: OpenedStress;
+    out.derivatives = pull_back(place, stress.P);
+    out.derivatives.gradient -= closed.P;
+    out.tangent = stress.tangent;
+    out.turned_tangent = stress.turned_tangent;
+    return out;
+}
+
+// Energy per volume [J/m^3].
+fn opened_energy(material: u32, place: OpenedPlace, H: mat3x3<f32>) -> f32 {
+    let open = strain_of(opened_gradient(place, deformation_gradient(H)));
+    var energy = isochoric_energy(materials[material], open) - isochoric_energy(materials[material], H);
+#ifdef FIBRES
+    energy += fibre_energy(material, open, jacobian_minus_one(open)) - fibre_energy(material, H, jacobian_minus_one(H));
+#endif
+    return energy;
+}

@@ -1,0 +1,120 @@
+// Stage opening_reactions: what the sections of the path do to their tissue, to the needle and to the tip; friction.
+// One workgroup. Equations: CpuEngine::station_reactions.
+#import shared/params
+#import shared/step_input
+#import effects/opening
+
+@group(1) @binding(12) var<storage, read> path_entries: array<OpeningEntry>;
+@group(3) @binding(20) var<storage, read_write> path_stations: array<OpeningStation>;
+@group(3) @binding(22) var<storage, read> opening_sums: array<OpeningSum>;
+@group(3) @binding(23) var<storage, read_write> opening_record: OpeningRecord;
+
+// Per thread: forces along and across, and what else the record sums.
+var<workgroup> parts: array<vec4<f32>, 64>;
+var<workgroup> lateral: array<vec4<f32>, 64>;
+var<workgroup> torque: array<vec4<f32>, 64>;
+
+// Part of a station that is on the shaft.
+fn on_shaft(i: u32) -> f32 {
+    let place = path_stations[i].place;
+    return select(0.0, place.y, place.x >= opening.entry.w);
+}
+
+@compute @workgroup_size(64)
+fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
+    let t = opening.direction.xyz;
+    let count = opening.counts.x;
+    let spacing = opening.numbers.x;
+    for (var i = lane; i < count; i += 64u) {
+        let lists = path_stations[i].lists;
+        var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+        for (var e = lists.z; e < lists.w; e++) {
+            let entry = path_entries[e];
+            let told = opening_sums[entry.index];
+            sum.by_centre += told.by_centre * entry.first;
+            sum.by_rate += told.by_rate * entry.first;
+        }
+        path_stations[i].by_centre = sum.by_centre;
+        path_stations[i].by_rate = sum.by_rate;
+    }
+    storageBarrier();
+    // along: spreading, friction, friction work, energy in springs; lateral: force across, resistance of the tip.
+    var along = vec4<f32>(0.0);
+    var aside = vec4<f32>(0.0);
+    var turning = vec3<f32>(0.0);
+    for (var i = lane; i < count; i += 64u) {
+        let now = path_stations[i];
+        // By the centre and by rc with all that follows from them.
+        var by = now.by_centre;
+        let last = count - 1u;
+        let previous = max(i, 1u) - 1u;
+        let next = min(i + 1u, last);
+        // The rate of station k has the weight 1/(distance of its neighbours) at the one behind it, and its negative before it.
+        if (i > 0u) {
+            by += path_stations[previous].by_rate / (spacing * f32(i - (max(previous, 1u) - 1u)));
+        }
+        if (i < last) {
+            by -= path_stations[next].by_rate / (spacing * f32(min(next + 1u, last) - i));
+        }
+        // Stations at the ends are their own neighbours.
+        if (i == 0u) {
+            by -= now.by_rate / spacing;
+        }
+        if (i == last) {
+            by += now.by_rate / spacing;
+        }
+        let by_centre = across(by.xyz);
+        var normal = 0.0;
+        var weight = 0.0;
+        let reach = opening.averaged.x;
+        for (var j = max(i, reach) - reach; j <= min(i + reach, last); j++) {
+            let on = on_shaft(j);
+            normal += on * path_stations[j].by_centre.w;
+            weight += on;
+        }
+        normal = select(0.0, normal / weight, weight > 0.0);
+        let held = opening.numbers.y * now.centre.w / opening.direction.w;
+        let offset = across(opening.entry.xyz + now.centre.xyz - step_input.tip.xyz);
+        let guide = offset * -held;
+        let spread = by.w * now.place.w * now.place.y;
+        var stick = now.rubbing.z;
+        var rubbing = 0.0;
+        var bound = 0.0;
+#ifdef FRICTION
+        let part = clamp((now.place.x - opening.entry.w) / opening.friction.z, 0.0, 1.0) * now.place.y;
+        let limit = opening.friction.x * max(normal, 0.0) * part;
+        let kt = opening.friction.y;
+        let trial = stick + (now.rubbing.y - dot(step_input.velocity.xyz, t)) * params.dt;
+        let allowed = limit / kt;
+        let stretch = select(0.0, clamp(trial, -allowed, allowed), limit > 0.0);
+        rubbing = -kt * stretch;
+        along += vec4<f32>(0.0, 0.0, 0.5 * kt * (stick + stretch) * (trial - stretch), 0.5 * kt * stretch * stretch);
+        stick = stretch;
+        bound = 2.0 * kt;
+#endif
+        along += vec4<f32>(spread, rubbing, 0.0, 0.5 * held * dot(offset, offset));
+        aside += vec4<f32>(guide, by.w * now.rubbing.x * now.place.z);
+        turning += cross(offset - t * now.place.x, guide);
+        path_stations[i].rubbing.z = stick;
+        path_stations[i].along = vec4<f32>(spread + rubbing, bound, 2.0 * held, 0.0);
+        path_stations[i].across = vec4<f32>(guide - by_centre, 0.0);
+    }
+    parts[lane] = along;
+    lateral[lane] = aside;
+    torque[lane] = vec4<f32>(turning, 0.0);
+    workgroupBarrier();
+    if (lane == 0u) {
+        for (var i = 1u; i < 64u; i++) {
+            along += parts[i];
+            aside += lateral[i];
+            turning += torque[i].xyz;
+        }
+        let dt = params.dt;
+        let total = t * (along.x + along.y) + aside.xyz;
+        let impulse = opening_record.impulse.xyz + total * dt;
+        opening_record.impulse = vec4<f32>(impulse, dot(total, step_input.velocity_ahead.xyz) * dt);
+        opening_record.angular_impulse += vec4<f32>(turning * dt, 0.0);
+        opening_record.parts += vec4<f32>(along.x * dt, along.y * dt, dot(total, step_input.velocity.xyz) * dt, along.z);
+        opening_record.now = vec4<f32>(aside.w, along.w, 0.0, 0.0);
+    }
+}
