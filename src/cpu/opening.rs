@@ -10,7 +10,7 @@ use crate::material_point::{Material, PointState, Volumetric};
 use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, mean_place};
 use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
-use crate::needle::opening::{Derivatives, Opening, Station};
+use crate::needle::opening::{Derivatives, Opening, Station, outer};
 
 /// What is derived of one station: of the energy E.
 #[derive(Debug, Clone, Copy, Default)]
@@ -332,35 +332,34 @@ fn near_cell_forces(
     let y: [DVec3; 8] = std::array::from_fn(|i| model.mesh.rest_position(nodes[i]) + u[i]);
     let gradient = DMat3::IDENTITY + shape.displacement_gradient(&u);
     let material = model.material(cell);
-    let (mut sum, mut places, mut energy) = (Derivatives::ZERO, [DVec3::ZERO; 8], 0.0);
+    let (mut sum, mut energy) = (Derivatives::ZERO, 0.0);
     let (mut dilation, mut grown) = (0.0, 1.0f64);
     let part = shape.volume / 8.0;
-    let weights = |at: usize| -> [f64; 8] {
-        std::array::from_fn(|i| (0..3).map(|a| 0.5 * (1.0 + GAUSS * CORNERS[at][a] * CORNERS[i][a])).product())
+    // y is linear in the cell, as its gradient is one: a force at a place is one on the middle and one on the gradient.
+    let middle = y.iter().copied().sum::<DVec3>() / 8.0;
+    let width = model.mesh.block().cell_size(cell);
+    let offset = |at: usize| DVec3::from(CORNERS[at]) * (0.5 * GAUSS) * width;
+    let map = |offset: DVec3| opening.map.at(section, middle + gradient * offset, gradient);
+    let add = |sum: &mut Derivatives, d: &Derivatives, offset: DVec3, by: f64| {
+        sum.add(d, by);
+        sum.gradient += outer(d.place * by, offset);
     };
-    let maps: [_; 8] = std::array::from_fn(|at| {
-        let place = weights(at).iter().zip(y).map(|(w, y)| y * *w).sum();
-        opening.map.at(section, place, gradient)
-    });
+    let maps: [_; 8] = std::array::from_fn(|at| map(offset(at)));
     let tangent = material.tangent_bound(gradient - DMat3::IDENTITY, &PointState::default());
     let (mut straight, mut turned) = (tangent.straight, tangent.turned);
     dilation += maps.iter().map(|m| m.dilation).sum::<f64>() / 8.0;
     let whole = near.is_whole();
-    let middle = opening.map.at(section, y.iter().copied().sum::<DVec3>() / 8.0, gradient);
+    let in_the_middle = map(DVec3::ZERO);
     for at in 0..if whole { 1 } else { 8 } {
         // Points carry the rest of what keeps the shape.
         let volume = if whole { shape.volume } else { part * near.shares[at] };
         if volume == 0.0 {
             continue;
         }
-        let map = if whole { &middle } else { &maps[at] };
-        let weights = |at: usize| if whole { [0.125; 8] } else { weights(at) };
+        let (map, offset) = if whole { (&in_the_middle, DVec3::ZERO) } else { (&maps[at], offset(at)) };
         let (d, w) = opened(material, map, gradient);
         energy += volume * w;
-        for (place, weight) in places.iter_mut().zip(weights(at)) {
-            *place += d.place * (weight * volume);
-        }
-        sum.add(&d, volume);
+        add(&mut sum, &d, offset, volume);
         let tangent = material.tangent_bound(map.gradient(gradient) - DMat3::IDENTITY, &PointState::default());
         let (by_gradient, by_place) = map.amplification();
         grown = grown.max(by_gradient + by_place * shape.edge());
@@ -373,11 +372,7 @@ fn near_cell_forces(
     energy += shape.volume * 0.5 * bulk * (open * open - closed * closed);
     sum.gradient += cof * (bulk * (open * dilation - closed) * shape.volume);
     for (at, map) in maps.iter().enumerate() {
-        let d = map.pull_back_dilation(bulk * open * j);
-        for (place, weight) in places.iter_mut().zip(weights(at)) {
-            *place += d.place * (weight * part);
-        }
-        sum.add(&d, part);
+        add(&mut sum, &map.pull_back_dilation(bulk * open * j), offset(at), part);
     }
     // Bound of the stiffness beyond that of the closed cell, where open faces may meet (see Elements::stiffness_bound).
     let b = 0.25 / model.mesh.block().cell_size(cell);
@@ -387,7 +382,7 @@ fn near_cell_forces(
     let without = (bulk + tangent.turned) * cof_b + tangent.straight * b;
     let mut forces = CellForces { bound: [8.0 * shape.volume * (with - without).max(0.0); 8], ..CellForces::default() };
     for (i, b) in shape.gradients().iter().enumerate() {
-        forces.force[i] = sum.gradient * *b + places[i];
+        forces.force[i] = sum.gradient * *b + sum.place / 8.0;
     }
     Some((forces, sum, energy))
 }

@@ -20,6 +20,9 @@ const NEAR: [f64; 2] = [1.2, 2.4];
 /// Radii of the points of a station: nodes of Gauss' rule in the logarithm of the radius.
 const RADII: usize = 8;
 
+/// Fewest points of a ring.
+const LEAST_ANGLES: f64 = 8.0;
+
 /// How far the stations go beyond the deepest place of the tip, in needle radii.
 const BEYOND: f64 = 1.5;
 
@@ -186,16 +189,14 @@ impl OpeningPlan {
         let shaft = input.needle.radius;
         let spacing = SPACING * shaft;
         let near = (2.0 * input.cell_size).clamp(NEAR[0] * shaft, NEAR[1] * shaft);
-        let angles = 4 * (24.0f64.max(4.0 * std::f64::consts::PI * near / input.cell_size) / 4.0).ceil() as usize;
         let direction = input.path.direction;
         // An oblique path reaches the surface at one side before its axis does.
         let tilt = direction.truncate().length() / -direction.z;
         let first = -(near * tilt / spacing).ceil() as i32;
         let end = (input.deepest + BEYOND * shaft).min(input.exit);
         let count = (end / spacing).floor().max(2.0) as i32;
-        let stations: Vec<OpeningStation> = (first..count)
-            .map(|i| station(mesh, input, (f64::from(i) + 0.5) * spacing, spacing, near, angles))
-            .collect();
+        let stations: Vec<OpeningStation> =
+            (first..count).map(|i| station(mesh, input, (f64::from(i) + 0.5) * spacing, spacing, near)).collect();
         // A volume at the wall of the hole grows by R^2 s0/a^4: by a thousandth.
         let least = 0.03 * stations.iter().map(|s| s.hole).fold(f64::INFINITY, f64::min).powi(2) / shaft;
         let average = (1.45 * shaft).max(1.5 * input.cell_size);
@@ -214,14 +215,7 @@ impl OpeningPlan {
     }
 }
 
-fn station(
-    mesh: &BlockMesh,
-    input: &OpeningInput,
-    depth: f64,
-    spacing: f64,
-    near: f64,
-    angles: usize,
-) -> OpeningStation {
+fn station(mesh: &BlockMesh, input: &OpeningInput, depth: f64, spacing: f64, near: f64) -> OpeningStation {
     let PlannedPath { entry, direction, .. } = *input.path;
     let (e1, e2) = lateral_axes(direction);
     let hole = (input.hole)(depth).min(0.9 * near);
@@ -249,9 +243,11 @@ fn station(
     let shaft = input.needle.radius;
     let disc = mean(&[0.125, 0.375, 0.625, 0.875].map(|part: f64| shaft * part.sqrt()), 8);
     let long = (near / hole).ln();
-    let mut points = Vec::with_capacity(RADII * angles);
+    let mut points = Vec::new();
     for (x, w) in GAUSS.iter().flat_map(|(x, w)| [(-x, *w), (*x, *w)]) {
         let r = hole * (0.5 * long * (x + 1.0)).exp();
+        // At least twice in every cell that a ring runs through.
+        let angles = 4 * (LEAST_ANGLES.max(4.0 * std::f64::consts::PI * r / input.cell_size) / 4.0).ceil() as usize;
         let volume = 0.5 * long * w * r * r * std::f64::consts::TAU / angles as f64 * spacing;
         for i in 0..angles {
             let place = at(r, (i as f64 + 0.5) / angles as f64);

@@ -162,7 +162,7 @@ impl OpeningMap {
 }
 
 /// a b^T.
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
+pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
