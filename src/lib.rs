@@ -8,7 +8,7 @@
 //! Reading order, which is also the straight line that data takes:
 //! [`scene`] -> [`mesh`], [`effects`], [`separation`] -> [`model`] -> [`engine`] (the contract) -> [`cpu`] and [`gpu`], which do not know
 //! each other -> [`observables`] -> [`simulation`] (a run) -> [`output`] and [`render`]. Below stand [`material`] and [`needle`], laws and the
-//! tool. [`stability`] runs that line on the hard cases, [`study`] many times over, [`training`] scores what a trainee did, [`haptic`]
+//! tool, and [`penetration`], what follows from both. [`stability`] runs that line on the hard cases, [`study`] many times over, [`training`] scores what a trainee did, [`haptic`]
 //! gives the forces to a device at 1 kHz. [`untrusted`] lists the readers of files, [`docs`] renders the parts of `docs/` that follow from
 //! tables. `docs/architecture.md` has the floors that these modules stand on; `tests/architecture.rs` holds them.
 //! The modules of the facade carry `#![warn(missing_docs)]`.
@@ -37,6 +37,7 @@ pub mod model;
 pub mod needle;
 pub mod observables;
 pub mod output;
+pub mod penetration;
 pub mod process;
 pub mod reading;
 pub mod render;

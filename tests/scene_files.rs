@@ -600,6 +600,8 @@ fn the_schema_describes_every_table() {
         "neo_hookean",
         "mu_kpa",
         "cutting_energy_j_m2",
+        "toughness_j_m2",
+        "tear_stretch",
         "fracture_energy_j_m2",
         "cylinder_mm",
         "mesh_tag",
@@ -930,6 +932,8 @@ poisson_ratio = 0.47
 plasticity = { yield_stress_kpa = 9.0, hardening_kpa = 0.0 }
 viscoelastic = { g = [0.3], tau_s = [2.0] }
 cutting = { cutting_energy_j_m2 = 100.0 }
+toughness_j_m2 = 90.0
+tear_stretch = 2.5
 
 [[material]]
 name = "brittle gel"
@@ -946,6 +950,7 @@ fn a_library_of_ones_own() {
     assert_eq!((gel.name.as_str(), gel.law.isochoric.key()), ("gel", "ogden"));
     assert_eq!(gel.source, "own measurement");
     assert_eq!(gel.viscoelastic.unwrap().terms[0].time, 2.0);
+    assert_eq!((gel.toughness, gel.tear_stretch), (Some(90.0), Some(2.5)));
     assert!((gel.plasticity.unwrap().yield_stress - 9e3).abs() < 1e-9);
     let refused = |material: &str, library: &str| {
         load_text(&scene(material), &[("mine.toml", library)]).expect_err("must be refused")
@@ -959,7 +964,7 @@ fn a_library_of_ones_own() {
         ("alpha = 9.0", "alhpa = 9.0", 7, "did you mean `alpha`?"),
         ("yield_stress_kpa = 9.0", "yield_stress_kpa = 0.0", 9, "leaves no elastic stage"),
         ("tau_s = [2.0]", "tau_s = []", 10, "1 shares and 0 times"),
-        ("\"brittle gel\"", "\"gel\"", 14, "empty or taken"),
+        ("\"brittle gel\"", "\"gel\"", 16, "empty or taken"),
         ("poisson_ratio = 0.47", "poisson_ratio = nan", 8, "not a finite number"),
         ("mu_kpa = 4.0", "mu_kpa = ", 6, "not TOML"),
     ] {
@@ -1334,6 +1339,141 @@ fn tip_forces_of_materials() {
     let scene = own("preset = \"skin\"\ncutting_force_n = 0.7");
     assert!((scene.material.cutting.unwrap().puncture_force - 1.4).abs() < 1e-9);
     assert!(scene.notices.join(" ").contains("replace those of [puncture]"), "{:?}", scene.notices);
+}
+
+#[test]
+fn toughness_of_materials() {
+    let own = |text: &str| {
+        let material = load_block("", &format!("[material]\n{text}\n")).unwrap().material;
+        (material.toughness, material.tear_stretch)
+    };
+    assert_eq!(own("preset = \"across-fibre\""), (Some(164.0), None));
+    assert_eq!(own("preset = \"along-fibre\"\ntoughness_j_m2 = 80\ntear_stretch = 3"), (Some(80.0), Some(3.0)));
+    assert_eq!(own("preset = \"fat\""), (None, None));
+    assert_eq!(own("youngs_modulus_kpa = 20\npoisson_ratio = 0.45\ntoughness_j_m2 = 200"), (Some(200.0), None));
+    let preset = stylet::TissueMaterial::preset("across-fibre").unwrap();
+    assert_eq!(preset.toughness, Some(164.0));
+    let region =
+        "[[region]]\nname = \"a\"\nlayer_mm = [0, 2]\nmaterial = { preset = \"fat\", toughness_j_m2 = 50.0 }\n";
+    assert_eq!(load_block("", &format!("{MATERIAL}{region}")).unwrap().regions[0].material.toughness, Some(50.0));
+    for (key, value, range) in [
+        ("toughness_j_m2", "0", "greater than 0"),
+        ("toughness_j_m2", "2e6", "1000000"),
+        ("tear_stretch", "1.0", "1.01"),
+        ("tear_stretch", "-2.0", "1.01"),
+    ] {
+        let text = format!("[material]\npreset = \"fat\"\n{key} = {value}\n");
+        assert_block_refused("", &text, key, &[range]);
+    }
+    let nan = load_block("", "[material]\npreset = \"fat\"\ntoughness_j_m2 = nan\n").unwrap_err();
+    assert!(nan.contains("not a finite number"), "{nan}");
+}
+
+/// The main scene with the scheme `opening`, `material` in its table and nothing calibrated.
+fn opening_scene(material: &str, text: &str) -> Result<Scene, String> {
+    let whole = std::fs::read_to_string(main_scene()).unwrap();
+    let kept = |line: &&str| !line.starts_with("puncture_force_n") && !line.starts_with("cutting_force_n");
+    let whole: String = whole.lines().filter(kept).map(|line| format!("{line}\n")).collect();
+    let whole = whole.replacen("preset = \"across-fibre\"", material, 1);
+    load_text(&whole.replacen("[puncture]\n", &format!("[puncture]\nscheme = \"opening\"\n{text}"), 1), &[])
+}
+
+#[test]
+fn the_scheme_opening_takes_its_numbers_from_the_toughness() {
+    let segment = |scene: &Scene| {
+        let model = stylet::model::Model::new(scene.clone(), stylet::mesh::Mesh::of_scene(scene));
+        model.puncture.as_ref().unwrap().segments[0]
+    };
+    let scene = opening_scene("preset = \"across-fibre\"", "").unwrap();
+    let Some(stylet::needle::Tool::Needle(needle)) = &scene.tool else { panic!("no needle") };
+    let steady = scene.material.steady(needle).unwrap().unwrap();
+    let own = segment(&scene);
+    assert_eq!(own.hole, steady.hole_radius);
+    assert_eq!(own.transition_length, steady.crack_half_length);
+    assert_eq!(own.cutting.puncture_force, steady.puncture_force);
+    assert_eq!(own.cutting.cutting_force, steady.cutting_force);
+    assert!((own.hole - 0.089e-3).abs() < 1e-6 && (own.cutting.cutting_force - 0.0595).abs() < 5e-4, "{own:?}");
+    // What somebody writes counts more: force by force in [puncture], both in a material; what a preset proposes does not.
+    let stated = segment(&opening_scene("preset = \"across-fibre\"", "cutting_force_n = 0.25\n").unwrap());
+    assert_eq!((stated.cutting.puncture_force, stated.cutting.cutting_force), (steady.puncture_force, 0.25));
+    let of_material = segment(&opening_scene("preset = \"across-fibre\"\npuncture_force_n = 1.0", "").unwrap());
+    assert_eq!((of_material.cutting.puncture_force, of_material.hole), (1.0, steady.hole_radius));
+    let skin = segment(&opening_scene("preset = \"skin\"\ntoughness_j_m2 = 1136", "").unwrap());
+    assert!(skin.cutting.cutting_force < 0.4 && skin.cutting.puncture_force > 1.3, "{skin:?}");
+    // The scheme ring does not look at it.
+    let with = segment(&needle_scene(("", ""), ""));
+    let without =
+        segment(&needle_scene(("preset = \"across-fibre\"", "preset = \"across-fibre\"\ntoughness_j_m2 = 900"), ""));
+    assert_eq!(with, without);
+    assert_eq!((with.cutting.puncture_force, with.cutting.cutting_force), (0.6, 0.3));
+    assert!((with.transition_length - 0.5e-3).abs() < 1e-12);
+}
+
+#[test]
+fn the_scheme_opening_is_refused_without_a_toughness() {
+    for (material, line, expected) in [
+        ("preset = \"fat\"", "[material]", "and the tissue has none"),
+        ("preset = \"fat\"\ntoughness_j_m2 = 0.01", "toughness_j_m2", "computed from 0.06"),
+        (
+            "law = \"ogden\"\nmu_kpa = 1.0\nalpha = 9.0\npoisson_ratio = 0.47\ntoughness_j_m2 = 5000",
+            "toughness_j_m2",
+            "computed up to 1",
+        ),
+    ] {
+        let message = opening_scene(material, "").unwrap_err();
+        assert!(message.contains(expected) && message.contains("scheme ring") && message.contains(line), "{message}");
+        assert!(message.contains("scene.toml:1") && message.contains("= way out: "), "{message}");
+    }
+    let layer = "[[region]]\nname = \"pad\"\nlayer_mm = [0, 3]\nmaterial = { preset = \"fat\" }\n";
+    let message = opening_scene(&format!("preset = \"across-fibre\"\n{layer}"), "").unwrap_err();
+    assert!(
+        message.contains("region `pad` has none") && message.contains("region.0.material.toughness_j_m2"),
+        "{message}"
+    );
+}
+
+#[test]
+fn check_tells_what_toughness_and_law_say() {
+    let told = |scene: &Scene| stylet::commands::check_penetration::describe(scene).join("\n");
+    let main = told(&Scene::load(&main_scene(), &[]).unwrap());
+    for expected in [
+        "J_c/(mu R) = 7.27",
+        "slit a* = 0.178",
+        "radius 0.088",
+        "F_tip = U + 2 a J_c = 0.13",
+        "= 0.188",
+        "mu_f N = 0.3 x N = 0.115",
+        "puncture force (n + 1) F_tip = 0.56",
+        "the run takes 0.6 N (calibrated)",
+        "the run takes 0.3 N (calibrated)",
+        "n = 2 for a cone",
+        "at 12 mm: F_tip + mu_f N (depth - tip of 2.541 mm) = 1.28",
+        "wall stretch R over radius of that hole = 9.28",
+        "tear_stretch says when",
+    ] {
+        assert!(main.contains(expected), "no `{expected}` in\n{main}");
+    }
+    let opening = told(&opening_scene("preset = \"across-fibre\"\ntear_stretch = 2.0", "").unwrap());
+    for expected in
+        ["slit a = pi R/(2 lambda_u) = 0.648", "tears: the slit", "the run takes this", "F_tip = U + 2 a J_c = 0.062"]
+    {
+        assert!(opening.contains(expected), "no `{expected}` in\n{opening}");
+    }
+    // Layers: skin and fat have no toughness, muscle has.
+    let layers = told(&Scene::load(&repository().join("scenes/layers.toml"), &[]).unwrap());
+    for expected in ["toughness not known: no prediction", "through all layers: no prediction"] {
+        assert!(layers.contains(expected), "no `{expected}` in\n{layers}");
+    }
+    let pad =
+        "[[region]]\nname = \"pad\"\nlayer_mm = [0, 3]\nmaterial = { preset = \"fat\", toughness_j_m2 = 100.0 }\n";
+    let padded = told(&needle_scene(("", ""), pad));
+    assert!(padded.contains("through all layers at 12 mm: "), "{padded}");
+    assert!(padded.contains("the run takes 0.2 N (calibrated, of this material)"), "{padded}");
+    let unknown = told(&needle_scene(("preset = \"across-fibre\"", "preset = \"muscle-60kpa\""), ""));
+    assert!(unknown.contains("no toughness is known") && unknown.lines().count() == 1, "{unknown}");
+    // No needle, no word.
+    let sphere = Scene::load(&repository().join("scenes/effects/indentation.toml"), &[]).unwrap();
+    assert!(told(&sphere).is_empty());
 }
 
 #[test]

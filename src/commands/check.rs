@@ -5,9 +5,10 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::SceneArgs;
+use super::{SceneArgs, check_penetration};
 use crate::effects::own::Chosen;
 use crate::effects::parameter::COUNT;
+use crate::effects::puncture::SchemeWord;
 use crate::effects::{Effect, EffectSet, Numbers, TissueMaterial, damage, fibres, plasticity, viscoelastic};
 use crate::ending;
 use crate::engine::stable_dt::power_iteration;
@@ -113,6 +114,9 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         line(format!("  {:<13}{}; cost: {}", effect.key, effect.summary, effect.cost));
         line(format!("  {:<13}{}", "", describe_parameters(effect, &scene.numbers())));
     }
+    for text in check_penetration::describe(scene) {
+        line(text);
+    }
     describe_run(&mut simulation, &mut line)?;
     line("ok".into());
     Ok(out.trim_end().into())
@@ -142,12 +146,15 @@ fn describe_material(material: &TissueMaterial, effects: &EffectSet) -> Vec<Stri
         material.viscoelastic.as_ref().filter(|_| effects.viscoelastic.is_some()).map(describe_viscoelastic),
         material.damage.filter(|_| effects.damage.is_some()).map(|p| describe_damage(&p)),
         material.cutting.filter(|_| effects.puncture.is_some()).map(|c| {
-            format!("puncture {} N, cutting {} N", four_digits(c.puncture_force), four_digits(c.cutting_force))
+            let [puncture, cutting] = [c.puncture_force, c.cutting_force].map(four_digits);
+            format!("puncture {puncture} N, cutting {cutting} N (calibrated)")
         }),
         material
             .membrane_energy
             .filter(|_| effects.puncture.is_some())
             .map(|w| format!("membrane, {} mJ", four_digits(w * 1e3))),
+        material.toughness.map(|j| format!("toughness {} J/m^2", four_digits(j))),
+        material.tear_stretch.map(|stretch| format!("tears at stretch {}", four_digits(stretch))),
     ];
     let of_own = |chosen: &Chosen| format!("{} {}", chosen.effect.effect.key, chosen.describe());
     let own: Vec<String> = own.into_iter().flatten().chain(material.own.iter().map(of_own)).collect();
@@ -294,10 +301,19 @@ fn describe_parameters(effect: &Effect, numbers: &Numbers) -> String {
         "viscoelastic" => effects.viscoelastic.as_ref().map(describe_viscoelastic),
         "damage" => effects.damage.map(|p| describe_damage(&p)),
         "puncture" => effects.puncture.map(|p| {
+            let stated = |value: f64, stated: bool| match (stated, p.scheme) {
+                (true, _) => format!("{} N (calibrated)", four_digits(value)),
+                (false, SchemeWord::Ring) => format!("{} N", four_digits(value)),
+                (false, SchemeWord::Opening) => "from the toughness".into(),
+            };
+            let puncture = stated(p.puncture_force, p.puncture_stated);
+            let cutting = stated(p.cutting_force, p.cutting_stated);
+            if p.scheme == SchemeWord::Opening {
+                let stiffness = four_digits(p.tip_stiffness * 1e-3);
+                return format!("scheme opening, puncture {puncture}, cutting {cutting}, tip stiffness {stiffness} N/mm");
+            }
             format!(
-                "puncture {} N, cutting {} N, transition {} mm, tip stiffness {} N/mm, softened radius {} mm, ring {} mm",
-                four_digits(p.puncture_force),
-                four_digits(p.cutting_force),
+                "puncture {puncture}, cutting {cutting}, transition {} mm, tip stiffness {} N/mm, softened radius {} mm, ring {} mm",
                 four_digits(p.transition_length * 1e3),
                 four_digits(p.tip_stiffness * 1e-3),
                 four_digits(p.softened_radius * 1e3),

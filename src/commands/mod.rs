@@ -4,6 +4,7 @@ pub mod advise;
 pub mod bench;
 pub mod bench_effects;
 pub mod check;
+pub mod check_penetration;
 pub mod compare_adapters;
 pub mod fit;
 pub mod fit_args;

@@ -19,6 +19,9 @@ pub mod puncture;
 pub mod viscoelastic;
 
 use crate::material::ElasticLaw;
+use crate::needle::NeedleShape;
+use crate::penetration::steady::Resistance;
+use crate::penetration::{Steady, Unsolved};
 
 /// Effects of the program that have the form of [`own`]: law, memory, energy, column and numbers stand in one file, the WGSL in another,
 /// and this line is all that names them. For what acts in a cell and needs no other effect's state.
@@ -113,6 +116,10 @@ pub struct TissueMaterial {
     pub cutting: Option<puncture::Cutting>,
     /// A membrane: energy that puncturing this layer takes beyond cutting through it [J].
     pub membrane_energy: Option<f64>,
+    /// Toughness J_c [J/m^2], counted over a slit of width 2a.
+    pub toughness: Option<f64>,
+    /// Stretch at which it tears; `None`: it holds any.
+    pub tear_stretch: Option<f64>,
 }
 
 impl TissueMaterial {
@@ -130,7 +137,15 @@ impl TissueMaterial {
             own: Vec::new(),
             cutting: None,
             membrane_energy: None,
+            toughness: None,
+            tear_stretch: None,
         }
+    }
+
+    /// What follows from the law and the toughness for a needle; `None`: the toughness is not known.
+    pub fn steady(&self, needle: &NeedleShape) -> Option<Result<Steady, Unsolved>> {
+        let resistance = Resistance { toughness: self.toughness?, tear_stretch: self.tear_stretch };
+        Some(Steady::new(&self.law.isochoric, resistance, needle.radius, needle.tip.into()))
     }
 }
 

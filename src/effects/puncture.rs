@@ -42,6 +42,7 @@ use super::parameter::Parameter;
 use super::parameters::parameters;
 use super::{Effect, Kind, Numbers};
 use crate::needle::free_path::{SLACK, SLIP_CAP};
+use crate::penetration::Steady;
 use crate::units::{MILLIMETRE, MILLIMETRE_PER_SECOND, NEWTON, NEWTON_PER_MILLIMETRE, OF_CRITICAL, ONE};
 use crate::within::Within::{Between, NotNegative, Positive};
 
@@ -268,6 +269,10 @@ parameters! {
     key scheme: Option<SchemeWord>;
     /// How the tissue beside the path is carried.
     field scheme: SchemeWord = SchemeWord::Ring;
+    /// The scene states a puncture force: calibrated, where the scheme `opening` would find its own.
+    field puncture_stated: bool = false;
+    /// The scene states a cutting force.
+    field cutting_stated: bool = false;
 
     /// Exponent of the speed of the needle in the tip forces, 0 to 1; default 0: no rate.
     rate_exponent: ONE, NotNegative(1.0) =>
@@ -325,6 +330,15 @@ impl Params {
     pub fn ring_weight(&self, r0: f64) -> f64 {
         let (inner, outer) = (self.softened_radius, self.ring_radius);
         smooth_step((r0 - inner) / inner) * (1.0 - smooth_step((r0 - 0.75 * outer) / (0.25 * outer)))
+    }
+
+    /// Tip forces of a material in the scheme `opening`, where `own` are those that it states: what nobody states follows from its
+    /// toughness.
+    pub fn opening_cutting(&self, own: Option<Cutting>, steady: &Steady) -> Cutting {
+        own.unwrap_or(Cutting {
+            puncture_force: if self.puncture_stated { self.puncture_force } else { steady.puncture_force },
+            cutting_force: if self.cutting_stated { self.cutting_force } else { steady.cutting_force },
+        })
     }
 
     /// Part of its stiffness that a cell with the fraction `inside` of its volume within a0 of the path keeps.

@@ -82,6 +82,11 @@ impl Constant {
         Constant { or_zero: true, ..self }
     }
 
+    /// True for a stress, false for a number without a unit.
+    pub fn is_stress(&self) -> bool {
+        self.si != 1.0
+    }
+
     /// A value in SI units in those of the key.
     pub fn shown(&self, value: f64) -> f64 {
         value * (1.0 / self.si)

@@ -23,6 +23,10 @@ pub const ANCHOR_COUNT: usize = 19;
 /// Most tip springs: those of a cutting ring.
 pub const LARGEST_ANCHOR_COUNT: usize = 24;
 
+/// Rest radius of the hole over that of the needle in a material of unknown toughness: scene files are refused for it, a program that
+/// builds its scene is not.
+const UNKNOWN_HOLE: f64 = 0.1;
+
 /// Distance of the tip springs of a cutting ring from its edge, on either side [m].
 const CUTTING_RING: f64 = 0.2e-3;
 
@@ -167,7 +171,7 @@ impl Model {
         let contact_stiffness = self.contact_stiffness(params.contact_stiffness_factor);
         let face_mass = 0.5 * self.scaled_density() * h.powi(3);
         self.puncture = Some(PuncturePlan {
-            segments: path_segments(&self.scene, &params, &path, exit),
+            segments: path_segments(&self.scene, &params, &needle, &path, exit),
             exit,
             anchors: tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
             cells,
@@ -242,7 +246,13 @@ impl Model {
 
 /// Stretches of the path with their own tip forces, from the materials that its axis passes through on its way to the
 /// bottom at `exit` [m].
-fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, exit: f64) -> Vec<PathSegment> {
+fn path_segments(
+    scene: &Scene,
+    params: &puncture::Params,
+    needle: &NeedleShape,
+    path: &PlannedPath,
+    exit: f64,
+) -> Vec<PathSegment> {
     const STEP: f64 = 2.0e-5;
     let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
     let mut starts: Vec<(f64, Option<usize>)> = Vec::new();
@@ -255,6 +265,7 @@ fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, e
             starts.push((a, region));
         }
     }
+    let opening = params.scheme == SchemeWord::Opening;
     let ends = starts.iter().skip(1).map(|s| s.0).chain([exit]);
     starts
         .iter()
@@ -264,17 +275,20 @@ fn path_segments(scene: &Scene, params: &puncture::Params, path: &PlannedPath, e
             let material = region.map_or(&scene.material, |r| &scene.regions[r].material);
             let mut cutting = material.cutting.unwrap_or(own);
             let mut transition_length = params.transition_length;
+            let mut hole = UNKNOWN_HOLE * needle.radius;
+            if let Some(Ok(steady)) = opening.then(|| material.steady(needle)).flatten() {
+                cutting = params.opening_cutting(material.cutting, &steady);
+                hole = steady.hole_radius;
+                if material.membrane_energy.is_none() {
+                    // The crack forms over its own length, which is not finer than the tip advances.
+                    transition_length = steady.crack_half_length.max(puncture::LARGEST_ADVANCE);
+                }
+            }
             if let Some(energy) = material.membrane_energy {
                 transition_length = transition_length.min(end - start);
                 cutting = cutting.of_membrane(energy, transition_length);
             }
-            PathSegment {
-                start,
-                cutting,
-                transition_length,
-                membrane: material.membrane_energy.is_some(),
-                hole: 0.083e-3,
-            }
+            PathSegment { start, cutting, transition_length, membrane: material.membrane_energy.is_some(), hole }
         })
         .collect()
 }

@@ -37,6 +37,8 @@ impl TissueMaterial {
             fibres: point.fibres,
             viscoelastic: point.viscoelastic,
             damage: point.damage,
+            toughness: preset.toughness,
+            tear_stretch: preset.tear_stretch,
             ..TissueMaterial::new(&preset.name, &preset.source, preset.law, preset.density)
         })
     }

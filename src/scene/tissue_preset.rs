@@ -23,4 +23,8 @@ pub struct TissuePreset {
     pub damage: Option<DamageTable>,
     /// Tip forces as written: a cutting energy becomes a force with the needle of the scene.
     pub cutting: Option<CuttingTable>,
+    /// Toughness J_c [J/m^2], counted over a slit of width 2a.
+    pub toughness: Option<f64>,
+    /// Stretch at which it tears.
+    pub tear_stretch: Option<f64>,
 }

@@ -16,5 +16,7 @@ mod material_point;
 mod needle_beam;
 #[path = "../own_effect/main.rs"]
 mod own_effect;
+#[path = "../penetration.rs"]
+mod penetration;
 #[path = "../tets/main.rs"]
 mod tets;

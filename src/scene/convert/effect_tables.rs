@@ -2,7 +2,8 @@
 //! tissue.
 
 use super::super::file::*;
-use super::{Check, MM, Within};
+use super::parameters::all_materials;
+use super::{Check, MM, Region, Within};
 use crate::effects::cohesive::AXES;
 use crate::effects::parameters::Table;
 use crate::effects::puncture::{PathWord, SchemeWord};
@@ -60,6 +61,8 @@ impl Check<'_> {
         let mut params = self.table("puncture", t);
         params.always_free = t.path == Some(PathWord::Free);
         params.scheme = t.scheme.unwrap_or(SchemeWord::Ring);
+        params.puncture_stated = t.puncture_force_n.is_some();
+        params.cutting_stated = t.cutting_force_n.is_some();
         if params.softened_radius >= params.ring_radius {
             let key = if t.softened_radius_mm.is_some() { "softened_radius_mm" } else { "ring_radius_mm" };
             self.problems.report(
@@ -109,6 +112,49 @@ impl Check<'_> {
                 "a solid cone on one straight path through elastic tissue",
                 "leave the key out for the scheme ring",
             );
+        }
+    }
+
+    /// The scheme `opening` takes its numbers from the toughness of every material.
+    pub(super) fn opening_toughness(
+        &mut self,
+        effects: &EffectSet,
+        tool: Option<&Tool>,
+        own: &TissueMaterial,
+        regions: &[Region],
+        file: &SceneFile,
+    ) {
+        let Some(Tool::Needle(needle)) = tool else { return };
+        if !self.problems.is_empty() || effects.puncture.is_none_or(|p| p.scheme != SchemeWord::Opening) {
+            return;
+        }
+        for (index, material) in all_materials(own, regions) {
+            let (at, table) = match index {
+                None => ("material".into(), &file.material),
+                Some(i) => (format!("region.{i}.material"), &file.region[i].material),
+            };
+            let whose = index.map_or("the tissue".into(), |i| format!("region `{}`", regions[i].name));
+            match material.steady(needle) {
+                Some(Ok(_)) => {}
+                None => self.problems.report(
+                    &at,
+                    format!("the scheme opening takes its forces from the toughness, and {whose} has none"),
+                    "no toughness_j_m2",
+                    format!(
+                        "write {at}.toughness_j_m2, e.g. 164 (bovine liver under needles), or leave puncture.scheme out for the \
+                         scheme ring"
+                    ),
+                ),
+                Some(Err(error)) => {
+                    let key = if table.toughness_j_m2.is_some() { ".toughness_j_m2" } else { "" };
+                    self.problems.report(
+                        &format!("{at}{key}"),
+                        format!("the toughness of {whose} gives the scheme opening no forces: {error}"),
+                        "no answer",
+                        "write a toughness_j_m2 in the range that is named, or leave puncture.scheme out for the scheme ring",
+                    );
+                }
+            }
         }
     }
 

@@ -43,6 +43,8 @@ impl Check<'_> {
             poisson_ratio: entry.poisson_ratio,
             youngs_modulus_kpa: entry.youngs_modulus_kpa,
             c10_share: entry.c10_share,
+            toughness_j_m2: entry.toughness_j_m2,
+            tear_stretch: entry.tear_stretch,
             ..MaterialTable::default()
         }
         .with_constants(&entry.constants());
@@ -64,6 +66,8 @@ impl Check<'_> {
             viscoelastic: entry.viscoelastic.clone(),
             damage: entry.damage.clone(),
             cutting: (cutting != CuttingTable::default()).then_some(cutting),
+            toughness: entry.toughness_j_m2,
+            tear_stretch: entry.tear_stretch,
         })
     }
 }

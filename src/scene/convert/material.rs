@@ -49,7 +49,8 @@ impl Check<'_> {
             let Some(law) = self.law(at, table) else { return (placeholder, None) };
             let written: Vec<&str> = table.constants().iter().filter_map(|(k, v)| v.map(|_| *k)).collect();
             let origin = if written.is_empty() { "E and nu".into() } else { written.join(", ").replace("_kpa", "") };
-            let material = TissueMaterial::new("constants", format!("{origin} of the scene file"), law, density);
+            let mut material = TissueMaterial::new("constants", format!("{origin} of the scene file"), law, density);
+            (material.toughness, material.tear_stretch) = (table.toughness_j_m2, table.tear_stretch);
             if in_range {
                 self.verdict(at, table, &material, cell_size);
             }
@@ -82,7 +83,9 @@ impl Check<'_> {
         }
         let range = preset.range.as_ref().map(|range| format!("; valid: {range}")).unwrap_or_default();
         let density = if table.density_kg_m3.is_some() { density } else { preset.density };
-        let material = TissueMaterial::new(name, format!("{}{range}", preset.source), law, density);
+        let mut material = TissueMaterial::new(name, format!("{}{range}", preset.source), law, density);
+        material.toughness = table.toughness_j_m2.or(preset.toughness);
+        material.tear_stretch = table.tear_stretch.or(preset.tear_stretch);
         if in_range {
             self.verdict(at, table, &material, cell_size);
         }
@@ -176,6 +179,12 @@ impl Check<'_> {
         }
         if let Some(value) = table.c10_share {
             self.number(&path("c10_share"), value, Within::Between(0.0, 1.0));
+        }
+        if let Some(value) = table.toughness_j_m2 {
+            self.number(&path("toughness_j_m2"), value, Within::Positive(1e6));
+        }
+        if let Some(value) = table.tear_stretch {
+            self.number(&path("tear_stretch"), value, Within::Between(1.01, 100.0));
         }
         if table.bulk_modulus_kpa.is_some() && table.d_per_mpa.is_some() {
             self.problems.report(

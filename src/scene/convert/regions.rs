@@ -8,6 +8,7 @@ use super::super::{Region, RegionShape};
 use super::mesh::list_tags;
 use super::parameters::{all_materials, cutting, damage_limit, preset_cutting, written_cutting};
 use super::{Check, MM, Within};
+use crate::effects::puncture::SchemeWord;
 use crate::effects::{EffectSet, TissueMaterial};
 use crate::mesh::{Mesh, TetMesh, Tissue};
 use crate::needle::Tool;
@@ -305,6 +306,9 @@ impl Check<'_> {
         };
         let scene = effects.puncture.unwrap_or_default();
         let none = CuttingTable::default();
+        // The scheme opening derives what nobody writes, also what a preset would propose.
+        let derived = scene.scheme == SchemeWord::Opening;
+        let proposed = |preset: Option<&TissuePreset>| if derived { none } else { preset_cutting(preset) };
         let written = written_cutting(&file.material);
         self.cutting_table("material", &written);
         let in_puncture =
@@ -320,7 +324,7 @@ impl Check<'_> {
             // What the scene writes counts more than what a preset proposes.
             None
         } else {
-            cutting(&preset_cutting(own_preset.as_ref()), diameter, &scene)
+            cutting(&proposed(own_preset.as_ref()), diameter, &scene)
         };
         for (index, (region, table)) in regions.iter_mut().zip(&file.region).enumerate() {
             let beside = CuttingTable {
@@ -341,7 +345,7 @@ impl Check<'_> {
             }
             let written = if beside != none { beside } else { inside };
             any |= written != none;
-            let chosen = if written != none { written } else { preset_cutting(presets[index].as_ref()) };
+            let chosen = if written != none { written } else { proposed(presets[index].as_ref()) };
             region.material.cutting = cutting(&chosen, diameter, &scene);
             if let Some(membrane) = &table.membrane {
                 any = true;

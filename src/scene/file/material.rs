@@ -103,6 +103,10 @@ pub struct MaterialTable {
     pub cutting_force_n: Option<f64>,
     /// Cutting energy per area G_c instead of the cutting force, which is G_c times the needle diameter [J/m^2].
     pub cutting_energy_j_m2: Option<f64>,
+    /// Toughness J_c of this material [J/m^2], counted over a slit of width 2a, not over the diameter of the needle.
+    pub toughness_j_m2: Option<f64>,
+    /// Stretch at which it tears, greater than 1: a slit is at least so wide that its wall stretches no more.
+    pub tear_stretch: Option<f64>,
 }
 }
 
@@ -205,6 +209,8 @@ pub struct LibraryMaterial {
     pub viscoelastic: Option<ViscoelasticTable>,
     pub damage: Option<DamageTable>,
     pub cutting: Option<CuttingTable>,
+    pub toughness_j_m2: Option<f64>,
+    pub tear_stretch: Option<f64>,
 }
 }
 
