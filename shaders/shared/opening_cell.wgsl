@@ -6,9 +6,9 @@ struct OpeningCell {
     cell: vec4<u32>,
     // First station in it and their number; 1 where points carry no part of it; w unused.
     stations: vec4<u32>,
-    // Low corner of the cell from the entry of the path [m]; its edges [m]. w unused.
-    low: vec4<f32>,
-    width: vec4<f32>,
+    // Middle of the cell from the entry of the path [m]; one over its edges [1/m]. w unused.
+    middle: vec4<f32>,
+    inverse: vec4<f32>,
     // Parts of its octants that points do not carry, in the order of the corners.
     lower: vec4<f32>,
     upper: vec4<f32>,
@@ -33,30 +33,10 @@ fn mean_of_stations(first: u32, count: u32) -> OpeningMean {
     return OpeningMean(mean.middle * by, mean.rate * by);
 }
 
-// Gradient of y less the identity at the middle of a cell.
-fn middle_gradient(corners: CornerDisplacements, width: vec3<f32>) -> mat3x3<f32> {
-    var H = mat3x3<f32>(vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0));
-    for (var c = 0u; c < 8u; c++) {
-        let b = corner_weight(c, vec3<f32>(0.5), width).gradient;
-        let u = corners.from_first[c];
-        H += mat3x3<f32>(u * b.x, u * b.y, u * b.z);
-    }
-    return H;
-}
-
-// Place of Gauss' rule in octant `at`, 0..1; the middle of the cell beyond the eight.
+// Place of Gauss' rule in octant `at` from the middle of the cell, -1/2..1/2; the middle beyond the eight.
 fn gauss_place(at: u32) -> vec3<f32> {
-    let upper = vec3<f32>(vec3<u32>(at & 1u, (at >> 1u) & 1u, at >> 2u)) - 0.5;
-    return select(vec3<f32>(0.5) + upper * 0.57735027, vec3<f32>(0.5), at > 7u);
-}
-
-// y at a place of the cell, from the middle of the path [m]; `origin`: the first corner.
-fn place_in_cell(corners: CornerDisplacements, origin: vec3<f32>, local: vec3<f32>, width: vec3<f32>) -> vec3<f32> {
-    var y = origin + local * width;
-    for (var c = 0u; c < 8u; c++) {
-        y += corners.from_first[c] * corner_weight(c, local, width).value;
-    }
-    return y;
+    let signs = vec3<f32>(vec3<u32>(at & 1u, (at >> 1u) & 1u, at >> 2u)) * 2.0 - 1.0;
+    return select(signs * 0.28867513, vec3<f32>(0.0), at > 7u);
 }
 
 fn share_of(cell: OpeningCell, at: u32) -> f32 {

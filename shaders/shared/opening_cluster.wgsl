@@ -7,44 +7,76 @@ struct OpeningCluster {
     cell: vec4<u32>,
     // First point, end, station; w unused.
     points: vec4<u32>,
-    // Low corner of the cell from the entry of the path [m]; its edges [m]. w unused.
-    low: vec4<f32>,
-    width: vec4<f32>,
+    // Middle of the cell from the entry of the path [m]; one over its edges [1/m]. w unused.
+    middle: vec4<f32>,
+    inverse: vec4<f32>,
 }
 
 @group(1) @binding(10) var<storage, read> path_clusters: array<OpeningCluster>;
-// Place in the cell, 0..1; w: rest volume [m^3].
+// Place in the cell from its middle, -1/2..1/2; w: rest volume [m^3].
 @group(1) @binding(11) var<storage, read> path_points: array<vec4<f32>>;
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
-// Corners of a cell: displacement of the first one [m] and of all from it.
-struct CornerDisplacements {
-    first: vec3<f32>,
-    from_first: array<vec3<f32>, 8>,
+// Displacement in a cell as `mean + p.x x + p.y y + p.z z + p.x p.y xy + p.y p.z yz + p.z p.x zx + p.x p.y p.z xyz`, with the place p from
+// the middle, -1/2..1/2; forces on the same.
+struct CellModes {
+    mean: vec3<f32>,
+    x: vec3<f32>,
+    y: vec3<f32>,
+    z: vec3<f32>,
+    xy: vec3<f32>,
+    yz: vec3<f32>,
+    zx: vec3<f32>,
+    xyz: vec3<f32>,
 }
 
-fn corner_displacements(cell: vec3<u32>) -> CornerDisplacements {
-    var out: CornerDisplacements;
+fn cell_modes(cell: vec3<u32>) -> CellModes {
     // In integers: differences stay exact.
-    let origin = node_displacement[(cell.z * NODES_Y + cell.y) * NODES_X + cell.x].xyz;
-    out.first = vec3<f32>(origin) * DISPLACEMENT_UNIT;
+    let first = (cell.z * NODES_Y + cell.y) * NODES_X + cell.x;
+    let origin = node_displacement[first].xyz;
+    var m: CellModes;
     for (var corner = 0u; corner < 8u; corner++) {
-        let at = cell + vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
-        let node = (at.z * NODES_Y + at.y) * NODES_X + at.x;
-        out.from_first[corner] = vec3<f32>(node_displacement[node].xyz - origin) * DISPLACEMENT_UNIT;
+        let bit = vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
+        let node = first + (bit.z * NODES_Y + bit.y) * NODES_X + bit.x;
+        let u = vec3<f32>(node_displacement[node].xyz - origin) * DISPLACEMENT_UNIT;
+        let s = vec3<f32>(bit) * 2.0 - 1.0;
+        m.mean += u * 0.125;
+        m.x += u * (0.25 * s.x);
+        m.y += u * (0.25 * s.y);
+        m.z += u * (0.25 * s.z);
+        m.xy += u * (0.5 * s.x * s.y);
+        m.yz += u * (0.5 * s.y * s.z);
+        m.zx += u * (0.5 * s.z * s.x);
+        m.xyz += u * (s.x * s.y * s.z);
     }
-    return out;
+    m.mean += vec3<f32>(origin) * DISPLACEMENT_UNIT;
+    return m;
 }
 
-// Weight of a corner at a place of the cell, and its gradient [1/m].
-struct CornerWeight {
-    value: f32,
-    gradient: vec3<f32>,
+fn displacement_at(m: CellModes, p: vec3<f32>) -> vec3<f32> {
+    return m.mean + m.x * p.x + m.y * p.y + m.z * p.z
+        + m.xy * (p.x * p.y) + m.yz * (p.y * p.z) + m.zx * (p.z * p.x) + m.xyz * (p.x * p.y * p.z);
 }
 
-fn corner_weight(corner: u32, local: vec3<f32>, width: vec3<f32>) -> CornerWeight {
-    let upper = vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u) == vec3<u32>(1u);
-    let n = select(1.0 - local, local, upper);
-    let d = select(-1.0 / width, 1.0 / width, upper);
-    return CornerWeight(n.x * n.y * n.z, d * vec3<f32>(n.y * n.z, n.z * n.x, n.x * n.y));
+// H = F_h - I at a place.
+fn strain_at(m: CellModes, p: vec3<f32>, inverse: vec3<f32>) -> mat3x3<f32> {
+    return mat3x3<f32>(
+        (m.x + m.xy * p.y + m.zx * p.z + m.xyz * (p.y * p.z)) * inverse.x,
+        (m.y + m.yz * p.z + m.xy * p.x + m.xyz * (p.z * p.x)) * inverse.y,
+        (m.z + m.zx * p.x + m.yz * p.y + m.xyz * (p.x * p.y)) * inverse.z,
+    );
+}
+
+// Force on a corner from those on the modes.
+fn force_on_corner(m: CellModes, corner: u32) -> vec3<f32> {
+    let s = vec3<f32>(vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u)) * 2.0 - 1.0;
+    return m.mean * 0.125 + (m.x * s.x + m.y * s.y + m.z * s.z) * 0.25
+        + (m.xy * (s.x * s.y) + m.yz * (s.y * s.z) + m.zx * (s.z * s.x)) * 0.5 + m.xyz * (s.x * s.y * s.z);
+}
+
+// Bound of the square of the spectral norm: largest sum of a column times that of a row.
+fn squared_norm_bound(m: mat3x3<f32>) -> f32 {
+    let columns = vec3<f32>(dot(abs(m[0]), vec3<f32>(1.0)), dot(abs(m[1]), vec3<f32>(1.0)), dot(abs(m[2]), vec3<f32>(1.0)));
+    let rows = abs(m[0]) + abs(m[1]) + abs(m[2]);
+    return max(columns.x, max(columns.y, columns.z)) * max(rows.x, max(rows.y, rows.z));
 }

@@ -14,25 +14,33 @@ fn opening_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         return;
     }
     let cell = near_cells[index];
-    let width = cell.width.xyz;
+    let inverse = cell.inverse.xyz;
     let mean = mean_of_stations(cell.stations.x, cell.stations.y);
     let scale = 1.0 / opening.direction.w;
     let section = PathSection(mean.rate.xyz, mean.middle.w * scale, mean.rate.w);
     let material = materials[cell.cell.w];
-    var force: array<vec4<f32>, 8>;
+    var f: CellModes;
     var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+    var bound = 0.0;
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
     for (var once = select(1u, 0u, mean.middle.w > 0.0); once == 0u; once++) {
-        let corners = corner_displacements(cell.cell.xyz);
-        let origin = cell.low.xyz + corners.first - mean.middle.xyz;
-        let H = middle_gradient(corners, width);
+        let modes = cell_modes(cell.cell.xyz);
+        let H = strain_at(modes, vec3<f32>(0.0), inverse);
         let gradient = deformation_gradient(H);
         let cof = cofactor(gradient);
+        let width = 1.0 / inverse;
         let volume = width.x * width.y * width.z;
+        // y is linear in the cell, as its gradient is one: a force at a place is one on the middle and one on the gradient.
+        let middle = across(cell.middle.xyz + modes.mean - mean.middle.xyz) * scale;
+        let lateral = mat3x3<f32>(
+            across(gradient[0]) * (width.x * scale),
+            across(gradient[1]) * (width.y * scale),
+            across(gradient[2]) * (width.z * scale),
+        );
         // The volume is the cell's.
         var dilated = 0.0;
         for (var at = 0u; at < 8u; at++) {
-            let eta = across(place_in_cell(corners, origin, gauss_place(at), width)) * scale;
+            let eta = middle + lateral * gauss_place(at);
             dilated += 0.125 * (dilation(section.radius, dot(eta, eta)).x - 1.0);
         }
         let dj = jacobian_minus_one(H);
@@ -40,54 +48,51 @@ fn opening_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         let open = dj + J * dilated;
         var by_gradient = cof * (material.bulk_modulus * (open * (1.0 + dilated) - dj) * volume);
         let by_dilation = material.bulk_modulus * open * J * volume * 0.125;
+        var by_middle = vec3<f32>(0.0);
         for (var at = 0u; at < 8u; at++) {
-            let local = gauss_place(at);
-            let eta = across(place_in_cell(corners, origin, local, width)) * scale;
+            let p = gauss_place(at);
+            let eta = middle + lateral * p;
             let rate = dilation(section.radius, dot(eta, eta)) * by_dilation;
             let by_place = eta * (2.0 * rate.y * scale);
-            for (var c = 0u; c < 8u; c++) {
-                force[c] += vec4<f32>(by_place * corner_weight(c, local, width).value, 0.0);
-            }
+            by_middle += by_place;
+            by_gradient += outer(by_place, p * width);
             sum.by_centre += vec4<f32>(-by_place, rate.z * scale);
         }
         // What keeps the shape, where points do not carry it: in the middle of a cell without points.
         let closed = isochoric_stress(material, H);
         var tangent = vec2<f32>(closed.tangent, closed.turned_tangent);
         var grown = 1.0;
+        let size = pow(volume, 0.33333333);
         let whole = cell.stations.z == 1u;
         for (var at = select(0u, 8u, whole); at < select(8u, 9u, whole); at++) {
-            let local = gauss_place(at);
-            let place = opened_place(section, across(place_in_cell(corners, origin, local, width)) * scale, gradient);
+            let p = gauss_place(at);
+            let place = opened_place(section, middle + lateral * p, gradient);
             let part = select(0.125 * volume * share_of(cell, at), volume, whole);
             let now = opened_stress(cell.cell.w, place, H);
-            let d = now.derivatives;
-            by_gradient += d.gradient * part;
-            for (var c = 0u; c < 8u; c++) {
-                force[c] += vec4<f32>(d.place * (part * corner_weight(c, local, width).value), 0.0);
-            }
-            sum.by_centre += vec4<f32>(-d.place, d.radius) * part;
-            sum.by_rate += vec4<f32>(d.centre_rate, d.radius_rate) * part;
+            let by_place = now.derivatives.place * part;
+            by_middle += by_place;
+            by_gradient += now.derivatives.gradient * part + outer(by_place, p * width);
+            sum.by_centre += vec4<f32>(-by_place, now.derivatives.radius * part);
+            sum.by_rate += vec4<f32>(now.derivatives.centre_rate, now.derivatives.radius_rate) * part;
             let growth = amplification(place);
-            let size = pow(volume, 0.33333333);
             grown = max(grown, select(1.0, growth.x + growth.y * size, part > 0.0));
             tangent = max(tangent, select(vec2<f32>(0.0), vec2<f32>(now.tangent, now.turned_tangent), part > 0.0));
         }
-        // Bound of the stiffness beyond that of the closed cell, in a cell where open faces may meet.
-        let b = 0.5 / width;
-        let most = 8.0 * volume;
-        let cof_b = dot(abs(cof[0]) * b.x + abs(cof[1]) * b.y + abs(cof[2]) * b.z, abs(cof[0]) * b.x + abs(cof[1]) * b.y + abs(cof[2]) * b.z);
-        let with_opening = (material.bulk_modulus + tangent.y) * cof_b * pow(max(1.0 + dilated, 1.0), 2.0)
-            + tangent.x * grown * grown * dot(b, b);
-        let without = (material.bulk_modulus + closed.turned_tangent) * cof_b + closed.tangent * dot(b, b);
-        let bound = most * 0.25 * max(with_opening - without, 0.0);
-        for (var c = 0u; c < 8u; c++) {
-            let weight = corner_weight(c, vec3<f32>(0.5), width);
-            force[c] = vec4<f32>(force[c].xyz + by_gradient * weight.gradient, bound);
-        }
+        // Bound of the stiffness beyond that of the closed cell, where open faces may meet.
+        let b = dot(inverse, inverse) * 0.0625;
+        let cof_b = squared_norm_bound(cof) * b;
+        let most = max(1.0 + dilated, 1.0);
+        let with_opening = (material.bulk_modulus + tangent.y) * cof_b * most * most + tangent.x * grown * grown * b;
+        let without = (material.bulk_modulus + closed.turned_tangent) * cof_b + closed.tangent * b;
+        bound = 8.0 * volume * max(with_opening - without, 0.0);
+        f.mean = by_middle;
+        f.x = by_gradient[0] * inverse.x;
+        f.y = by_gradient[1] * inverse.y;
+        f.z = by_gradient[2] * inverse.z;
     }
     let slot = opening.counts.y + index;
     for (var c = 0u; c < 8u; c++) {
-        opening_corners[8u * slot + c] = force[c];
+        opening_corners[8u * slot + c] = vec4<f32>(force_on_corner(f, c), bound);
     }
     opening_sums[slot] = sum;
 }

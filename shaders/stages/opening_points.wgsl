@@ -16,54 +16,58 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     }
     let cluster = path_clusters[index];
     let station = path_stations[cluster.points.z];
+    let inverse = cluster.inverse.xyz;
     let scale = 1.0 / opening.direction.w;
     let section = PathSection(station.centre_rate.xyz, station.centre.w * scale, station.centre_rate.w);
-    var force: array<vec4<f32>, 8>;
+    var f: CellModes;
+    // Of the corners below, and of those above.
+    var lower = vec4<f32>(0.0);
+    var upper = vec4<f32>(0.0);
     var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
     // What is not opened is as its cells have it: no point at all.
     let end = select(cluster.points.x, cluster.points.y, station.centre.w > 0.0);
-    let corners = corner_displacements(cluster.cell.xyz);
-    // The first corner, from the middle of the path.
-    let origin = cluster.low.xyz + corners.first - station.centre.xyz;
-    for (var p = cluster.points.x; p < end; p++) {
-        let point = path_points[p];
-        let local = point.xyz;
-        var H = mat3x3<f32>(vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0));
-        var y = origin + local * cluster.width.xyz;
-        for (var c = 0u; c < 8u; c++) {
-            let weight = corner_weight(c, local, cluster.width.xyz);
-            let u = corners.from_first[c];
-            y += u * weight.value;
-            H += mat3x3<f32>(u * weight.gradient.x, u * weight.gradient.y, u * weight.gradient.z);
-        }
+    let modes = cell_modes(cluster.cell.xyz);
+    // The middle of the cell, from the middle of the path.
+    let origin = cluster.middle.xyz - station.centre.xyz;
+    for (var i = cluster.points.x; i < end; i++) {
+        let point = path_points[i];
+        let p = point.xyz;
+        let H = strain_at(modes, p, inverse);
+        let y = origin + p / inverse + displacement_at(modes, p);
         let place = opened_place(section, across(y) * scale, deformation_gradient(H));
         let now = opened_stress(cluster.cell.w, place, H);
-        let d = now.derivatives;
-        let cof = cofactor(deformation_gradient(H));
-        let grown = amplification(place);
-        // Bound of the stiffness: rows of the point's own, with the weight of a corner from that at the middle of the path.
-        var sizes: array<vec2<f32>, 8>;
-        var all = vec2<f32>(0.0);
-        let aside = clamp(local - across(y) / cluster.width.xyz, vec3<f32>(0.0), vec3<f32>(1.0));
-        for (var c = 0u; c < 8u; c++) {
-            let weight = corner_weight(c, local, cluster.width.xyz);
-            let middle = corner_weight(c, aside, cluster.width.xyz);
-            let size = vec2<f32>(
-                grown.x * length(weight.gradient) + grown.y * abs(weight.value - middle.value),
-                length(cof * weight.gradient),
-            );
-            sizes[c] = size;
-            all += size;
-            force[c] += vec4<f32>((d.gradient * weight.gradient + d.place * weight.value) * point.w, 0.0);
-        }
-        for (var c = 0u; c < 8u; c++) {
-            force[c].w += point.w * (now.tangent * sizes[c].x * all.x + now.turned_tangent * sizes[c].y * all.y);
-        }
-        sum.by_centre += vec4<f32>(-d.place, d.radius) * point.w;
-        sum.by_rate += vec4<f32>(d.centre_rate, d.radius_rate) * point.w;
+        let by_place = now.derivatives.place * point.w;
+        let x = now.derivatives.gradient[0] * (inverse.x * point.w);
+        let y_ = now.derivatives.gradient[1] * (inverse.y * point.w);
+        let z = now.derivatives.gradient[2] * (inverse.z * point.w);
+        f.mean += by_place;
+        f.x += by_place * p.x + x;
+        f.y += by_place * p.y + y_;
+        f.z += by_place * p.z + z;
+        f.xy += by_place * (p.x * p.y) + x * p.y + y_ * p.x;
+        f.yz += by_place * (p.y * p.z) + y_ * p.z + z * p.y;
+        f.zx += by_place * (p.z * p.x) + z * p.x + x * p.z;
+        f.xyz += by_place * (p.x * p.y * p.z) + x * (p.y * p.z) + y_ * (p.z * p.x) + z * (p.x * p.y);
+        // Bound of the stiffness: rows of the point's own.
+        let growth = amplification(place);
+        let grown = growth.x + growth.y * length(place.eta) * opening.direction.w;
+        let stiffness = point.w * (now.tangent * grown * grown
+            + now.turned_tangent * squared_norm_bound(cofactor(deformation_gradient(H))));
+        let nx = vec4<f32>(0.5 - p.x, 0.5 + p.x, 0.5 - p.x, 0.5 + p.x);
+        let ny = vec4<f32>(0.5 - p.y, 0.5 - p.y, 0.5 + p.y, 0.5 + p.y);
+        let flat = (nx * nx) * (inverse.y * inverse.y) + (ny * ny) * (inverse.x * inverse.x);
+        let steep = (nx * ny) * (nx * ny) * (inverse.z * inverse.z);
+        let below = sqrt(flat * ((0.5 - p.z) * (0.5 - p.z)) + steep);
+        let above = sqrt(flat * ((0.5 + p.z) * (0.5 + p.z)) + steep);
+        let all = stiffness * dot(below + above, vec4<f32>(1.0));
+        lower += below * all;
+        upper += above * all;
+        sum.by_centre += vec4<f32>(-now.derivatives.place, now.derivatives.radius) * point.w;
+        sum.by_rate += vec4<f32>(now.derivatives.centre_rate, now.derivatives.radius_rate) * point.w;
     }
-    for (var c = 0u; c < 8u; c++) {
-        opening_corners[8u * index + c] = force[c];
+    for (var c = 0u; c < 4u; c++) {
+        opening_corners[8u * index + c] = vec4<f32>(force_on_corner(f, c), lower[c]);
+        opening_corners[8u * index + c + 4u] = vec4<f32>(force_on_corner(f, c + 4u), upper[c]);
     }
     opening_sums[index] = sum;
 }

@@ -6,9 +6,8 @@ use super::CpuEngine;
 use crate::effects::puncture::{
     advance_limit, bounded_stretch, retreat, share_beyond, slip_limit, sway_beyond, tip_advance,
 };
-use crate::engine::elements::CORNERS;
 use crate::material::kinematics::cofactor;
-use crate::mesh::BlockMesh;
+use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
 use crate::needle::free_path::{FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SOFTENING_RATE, TURNING, anchor_offset};
 use crate::needle::{ToolPose, lateral_axes};

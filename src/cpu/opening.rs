@@ -4,9 +4,10 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::{ContactSums, CpuEngine};
-use crate::engine::elements::{CORNERS, CellForces, CellShape};
+use crate::engine::elements::{CellForces, CellShape};
 use crate::material::kinematics::cofactor;
 use crate::material_point::{Material, PointState, Volumetric};
+use crate::mesh::CORNERS;
 use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, mean_place};
 use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
@@ -284,30 +285,28 @@ fn point_forces(
         sums.energy += point.volume * energy;
         sums.add(&d, point.volume);
         let tangent = material.tangent_bound(map.gradient(gradient) - DMat3::IDENTITY, &PointState::default());
-        let cof = cofactor(gradient);
+        // Rows of the point's own stiffness.
         let (by_gradient, by_place) = map.amplification();
-        let mut sizes = [(0.0, 0.0); 8];
-        // Rows of the point's own stiffness, with the weight of a corner from that at the middle of the path.
-        let middle = (point.local - map.eta() / point.width).clamp(DVec3::ZERO, DVec3::ONE);
-        for c in 0..8 {
-            let node = usize::from(point.corners[c]);
-            local[node].0 += (d.gradient * point.gradients[c] + d.place * point.weights[c]) * point.volume;
-            let aside = (point.weights[c] - corner_weight(c, middle)).abs();
-            sizes[c] =
-                (by_gradient * point.gradients[c].length() + by_place * aside, (cof * point.gradients[c]).length());
-        }
-        let (all, all_cof) = sizes.iter().fold((0.0, 0.0), |s, x| (s.0 + x.0, s.1 + x.1));
-        for c in 0..8 {
-            let bound = tangent.straight * sizes[c].0 * all + tangent.turned * sizes[c].1 * all_cof;
-            local[usize::from(point.corners[c])].1 += point.volume * bound;
+        let grown = by_gradient + by_place * map.eta().length();
+        let stiffness = tangent.straight * grown * grown + tangent.turned * squared_norm_bound(cofactor(gradient));
+        let sizes = point.gradients.map(|g| g.length());
+        let bound = point.volume * stiffness * sizes.iter().sum::<f64>();
+        for (c, node) in point.corners.iter().enumerate() {
+            let out = &mut local[usize::from(*node)];
+            out.0 += (d.gradient * point.gradients[c] + d.place * point.weights[c]) * point.volume;
+            out.1 += bound * sizes[c];
         }
     }
     (sums, local)
 }
 
-/// Weight of a corner at a place of its cell, 0..1 per axis.
-fn corner_weight(corner: usize, local: DVec3) -> f64 {
-    (0..3).map(|a| 0.5 + CORNERS[corner][a] * (local[a] - 0.5)).product()
+/// Bound of the square of the spectral norm: largest sum of a column times that of a row.
+fn squared_norm_bound(m: DMat3) -> f64 {
+    let sums = |m: DMat3| {
+        let column = |c: DVec3| c.abs().element_sum();
+        column(m.x_axis).max(column(m.y_axis)).max(column(m.z_axis))
+    };
+    sums(m) * sums(m.transpose())
 }
 
 /// Places of Gauss' rule in a cell, -1..1, are at the corners times this.
@@ -376,8 +375,8 @@ fn near_cell_forces(
     }
     // Bound of the stiffness beyond that of the closed cell, where open faces may meet (see Elements::stiffness_bound).
     let b = 0.25 / model.mesh.block().cell_size(cell);
-    let columns = [cof.x_axis.abs() * b.x, cof.y_axis.abs() * b.y, cof.z_axis.abs() * b.z];
-    let (cof_b, b) = ((columns[0] + columns[1] + columns[2]).length_squared(), b.length_squared());
+    let b = b.length_squared();
+    let cof_b = squared_norm_bound(cof) * b;
     let with = (bulk + turned) * cof_b * dilation.max(1.0).powi(2) + straight * grown * grown * b;
     let without = (bulk + tangent.turned) * cof_b + tangent.straight * b;
     let mut forces = CellForces { bound: [8.0 * shape.volume * (with - without).max(0.0); 8], ..CellForces::default() };

@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::CpuEngine;
 use crate::effects::adhesion::{self, Bond};
 use crate::effects::puncture::{self, advance_limit, bounded_stretch, tip_advance};
-use crate::engine::elements::{CORNERS, CellStates};
-use crate::mesh::BlockMesh;
+use crate::engine::elements::CellStates;
+use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::PuncturePlan;
 use crate::needle::ToolPose;
 

@@ -7,23 +7,11 @@ use crate::material::TangentBound;
 use crate::material::kinematics::{J_CONTINUATION, cofactor, jacobian_minus_one};
 use crate::material_point::{Material, PointState, Surroundings, Volumetric};
 use crate::mesh::tets::TetMesh;
-use crate::mesh::{BlockMesh, CellNodes, Mesh};
+use crate::mesh::{BlockMesh, CORNERS, CellNodes, Mesh};
 use crate::model::Model;
 
 /// Hourglass coefficient of a linear elastic cube, [Joldes2008] via physics of the one-point hexahedron.
 pub const HOURGLASS_MODULUS: f64 = 3.11;
-
-/// Corner signs (xi, eta, zeta) in the node order of `BlockMesh::cell_nodes`.
-pub const CORNERS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
 
 /// The four hourglass base vectors at a corner: eta zeta, zeta xi, xi eta, xi eta zeta.
 fn hourglass_signs([x, y, z]: [f64; 3]) -> [f64; 4] {

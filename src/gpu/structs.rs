@@ -264,15 +264,15 @@ shared_structs! {
     struct OpeningCluster {
         cell: [u32; 4],
         points: [u32; 4],
-        low: [f32; 4],
-        width: [f32; 4],
+        middle: [f32; 4],
+        inverse: [f32; 4],
     }
     /// shaders/shared/opening_cell.wgsl
     struct OpeningCell {
         cell: [u32; 4],
         stations: [u32; 4],
-        low: [f32; 4],
-        width: [f32; 4],
+        middle: [f32; 4],
+        inverse: [f32; 4],
         lower: [f32; 4],
         upper: [f32; 4],
     }

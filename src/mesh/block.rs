@@ -13,6 +13,18 @@ use glam::{DVec2, DVec3};
 
 use crate::needle::Motion;
 
+/// Corner signs (xi, eta, zeta) in the node order of `BlockMesh::cell_nodes`.
+pub const CORNERS: [[f64; 3]; 8] = [
+    [-1.0, -1.0, -1.0],
+    [1.0, -1.0, -1.0],
+    [1.0, 1.0, -1.0],
+    [-1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [1.0, -1.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+];
+
 /// The tissue block: `-size.x/2..size.x/2`, `-size.y/2..size.y/2`, `-size.z..0` [m]; the top face is z = 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tissue {

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
 
-use crate::engine::elements::CORNERS;
-use crate::mesh::BlockMesh;
+use crate::mesh::{BlockMesh, CORNERS};
 use crate::needle::lateral_axes;
 use crate::needle::opening::OpeningMap;
 use crate::needle::{NeedleShape, PlannedPath};
@@ -48,10 +47,9 @@ pub struct PathPoint {
     pub gradients: [DVec3; 8],
     /// Rest volume that it stands for [m^3].
     pub volume: f64,
-    /// Rest position [m]; place in the cell, 0..1; edges of the cell [m].
+    /// Rest position [m], and place in the cell, 0..1.
     pub place: DVec3,
     pub local: DVec3,
-    pub width: DVec3,
 }
 
 /// A section of the path.
@@ -163,7 +161,6 @@ struct Place {
     weights: [f64; 8],
     gradients: [DVec3; 8],
     local: DVec3,
-    width: DVec3,
     inside: bool,
 }
 
@@ -180,7 +177,7 @@ fn place_in(mesh: &BlockMesh, x: DVec3) -> Place {
         weights[c] = n[0] * n[1] * n[2];
         gradients[c] = DVec3::from(*signs) / width * DVec3::new(n[1] * n[2], n[2] * n[0], n[0] * n[1]);
     }
-    Place { cell, corners, weights, gradients, local: exact, width, inside }
+    Place { cell, corners, weights, gradients, local: exact, inside }
 }
 
 impl OpeningPlan {
@@ -251,7 +248,7 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, depth: f64, spacing: f64, nea
         let volume = 0.5 * long * w * r * r * std::f64::consts::TAU / angles as f64 * spacing;
         for i in 0..angles {
             let place = at(r, (i as f64 + 0.5) / angles as f64);
-            let Place { cell, corners, weights, gradients, local, width, inside } = place_in(mesh, place);
+            let Place { cell, corners, weights, gradients, local, inside } = place_in(mesh, place);
             if !inside {
                 continue;
             }
@@ -263,7 +260,6 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, depth: f64, spacing: f64, nea
                 volume,
                 place,
                 local,
-                width,
             });
         }
     }

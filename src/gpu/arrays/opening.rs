@@ -10,9 +10,8 @@ use super::super::structs::{
     OpeningTotals,
 };
 use super::{Array, Source, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
-use crate::engine::elements::CORNERS;
 use crate::gpu::layout::Layout;
-use crate::mesh::BlockMesh;
+use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::Model;
 use crate::model::opening::OpeningPlan;
 
@@ -126,11 +125,11 @@ fn tables(source: &Source) -> Tables {
     tables_of(source.model, source.layout)
 }
 
-/// Low corner of a cell from the entry of the path, its edges and its place in the grid with its material.
+/// Place of a cell in the grid with its material, its middle from the entry of the path, one over its edges.
 fn cell_of(model: &Model, mesh: &BlockMesh, entry: DVec3, cell: usize) -> ([u32; 4], [f32; 4], [f32; 4]) {
     let [i, j, k] = mesh.cell_coordinates(cell).map(|c| c as u32);
-    let low = mesh.rest_position(mesh.cell_nodes(cell)[0]) - entry;
-    ([i, j, k, model.material_index(cell) as u32], vec4(low), vec4(mesh.cell_size(cell)))
+    let middle = model.mesh.cell_centre(cell) - entry;
+    ([i, j, k, model.material_index(cell) as u32], vec4(middle), vec4(1.0 / mesh.cell_size(cell)))
 }
 
 fn tables_of(model: &Model, layout: &Layout) -> Tables {
@@ -149,30 +148,29 @@ fn tables_of(model: &Model, layout: &Layout) -> Tables {
         }
     };
     for (station, cell, points) in clusters_of(opening) {
-        let (place, low, width) = cell_of(model, mesh, entry, cell as usize);
+        let (place, middle, inverse) = cell_of(model, mesh, entry, cell as usize);
         let first = tables.points.len() as u32;
         for index in points {
             let point = &opening.stations[station].points[index];
-            let local =
-                (point.place - mesh.rest_position(mesh.cell_nodes(cell as usize)[0])) / mesh.cell_size(cell as usize);
+            let local = point.local - 0.5;
             tables.points.push([local.x as f32, local.y as f32, local.z as f32, point.volume as f32]);
         }
         let end = tables.points.len() as u32;
-        tables.clusters.push(OpeningCluster { cell: place, points: [first, end, station as u32, 0], low, width });
+        tables.clusters.push(OpeningCluster { cell: place, points: [first, end, station as u32, 0], middle, inverse });
         told[station].push((slot, 1.0));
         corners_of(cell as usize, slot);
         slot += 1;
     }
     for near in &opening.cells {
-        let (place, low, width) = cell_of(model, mesh, entry, near.cell as usize);
+        let (place, middle, inverse) = cell_of(model, mesh, entry, near.cell as usize);
         let mut shares = [0.0; 8];
         CORNERS.iter().zip(near.shares).for_each(|(signs, share)| shares[bits(*signs)] = share as f32);
         let (first, count) = (u32::from(near.first), u32::from(near.count));
         tables.cells.push(OpeningCell {
             cell: place,
             stations: [first, count, u32::from(near.is_whole()), 0],
-            low,
-            width,
+            middle,
+            inverse,
             lower: [shares[0], shares[1], shares[2], shares[3]],
             upper: [shares[4], shares[5], shares[6], shares[7]],
         });
