@@ -194,12 +194,20 @@ fn pull_back(place: OpenedPlace, P: mat3x3<f32>) -> OpeningDerivatives {
     return out;
 }
 
-// By how much a change of F_h grows in F at most, and by how much one of eta does [1/m].
+// Bound of the square of the spectral norm: largest sum of a column times that of a row.
+fn squared_norm_bound(m: mat3x3<f32>) -> f32 {
+    let columns = vec3<f32>(dot(abs(m[0]), vec3<f32>(1.0)), dot(abs(m[1]), vec3<f32>(1.0)), dot(abs(m[2]), vec3<f32>(1.0)));
+    let rows = abs(m[0]) + abs(m[1]) + abs(m[2]);
+    return max(columns.x, max(columns.y, columns.z)) * max(rows.x, max(rows.y, rows.z));
+}
+
+// By how much a change of F_h grows in F at most, and by how much one of eta does [1/m]: Opening::amplification.
 fn amplification(place: OpenedPlace) -> vec2<f32> {
     let s = dot(place.eta, place.eta);
-    let size = sqrt(double_dot(place.H, place.H));
-    let radial = abs(place.g + 2.0 * place.g1 * s);
-    let by_place = size * (6.0 * abs(place.g1) * sqrt(s) + 4.0 * abs(place.g2) * s * sqrt(s))
+    let rho = sqrt(s);
+    let along = abs(place.g + 2.0 * place.g1 * s);
+    let third = max(abs(6.0 * place.g1 * rho + 4.0 * place.g2 * rho * s), 2.0 * abs(place.g1) * rho);
+    let by_place = sqrt(squared_norm_bound(place.H)) * third
         + abs(place.radius_rate) * (place.gr + 2.0 * abs(place.gr1) * s);
-    return vec2<f32>(max(max(place.g, radial), 1.0), by_place / opening.direction.w);
+    return vec2<f32>(max(max(place.g, along), 1.0), by_place / opening.direction.w);
 }

@@ -73,10 +73,3 @@ fn force_on_corner(m: CellModes, corner: u32) -> vec3<f32> {
     return m.mean * 0.125 + (m.x * s.x + m.y * s.y + m.z * s.z) * 0.25
         + (m.xy * (s.x * s.y) + m.yz * (s.y * s.z) + m.zx * (s.z * s.x)) * 0.5 + m.xyz * (s.x * s.y * s.z);
 }
-
-// Bound of the square of the spectral norm: largest sum of a column times that of a row.
-fn squared_norm_bound(m: mat3x3<f32>) -> f32 {
-    let columns = vec3<f32>(dot(abs(m[0]), vec3<f32>(1.0)), dot(abs(m[1]), vec3<f32>(1.0)), dot(abs(m[2]), vec3<f32>(1.0)));
-    let rows = abs(m[0]) + abs(m[1]) + abs(m[2]);
-    return max(columns.x, max(columns.y, columns.z)) * max(rows.x, max(rows.y, rows.z));
-}

@@ -11,7 +11,7 @@ use crate::mesh::CORNERS;
 use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, mean_place};
 use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
-use crate::needle::opening::{Derivatives, Opening, Station, outer};
+use crate::needle::opening::{Derivatives, Opening, Station, outer, squared_norm_bound};
 
 /// What is derived of one station: of the energy E.
 #[derive(Debug, Clone, Copy, Default)]
@@ -298,15 +298,6 @@ fn point_forces(
         }
     }
     (sums, local)
-}
-
-/// Bound of the square of the spectral norm: largest sum of a column times that of a row.
-fn squared_norm_bound(m: DMat3) -> f64 {
-    let sums = |m: DMat3| {
-        let column = |c: DVec3| c.abs().element_sum();
-        column(m.x_axis).max(column(m.y_axis)).max(column(m.z_axis))
-    };
-    sums(m) * sums(m.transpose())
 }
 
 /// Places of Gauss' rule in a cell, -1..1, are at the corners times this.
