@@ -12,6 +12,7 @@ mod indentation;
 mod laws;
 mod mass_scaling;
 mod mooney_rivlin;
+mod opening;
 mod plasticity;
 mod puncture;
 mod viscoelastic;
