@@ -338,15 +338,17 @@ fn near_cell_forces(
     let tangent = material.tangent_bound(gradient - DMat3::IDENTITY, &PointState::default());
     let (mut straight, mut turned) = (tangent.straight, tangent.turned);
     dilation += maps.iter().map(|m| m.dilation).sum::<f64>() / 8.0;
-    let whole = near.is_whole();
-    let in_the_middle = map(DVec3::ZERO);
-    for at in 0..if whole { 1 } else { 8 } {
-        // Points carry the rest of what keeps the shape.
-        let volume = if whole { shape.volume } else { part * near.shares[at] };
+    // Points carry the rest of what keeps the shape; a cell without points is taken in its middle.
+    let in_the_middle = [map(DVec3::ZERO)];
+    let taken = if near.is_whole() { &in_the_middle[..] } else { &maps[..] };
+    for (at, map) in taken.iter().enumerate() {
+        let (volume, offset) = match near.is_whole() {
+            true => (shape.volume, DVec3::ZERO),
+            false => (part * near.shares[at], offset(at)),
+        };
         if volume == 0.0 {
             continue;
         }
-        let (map, offset) = if whole { (&in_the_middle, DVec3::ZERO) } else { (&maps[at], offset(at)) };
         let (d, w) = opened(material, map, gradient);
         energy += volume * w;
         add(&mut sum, &d, offset, volume);

@@ -131,8 +131,8 @@ impl Cutting {
 }
 
 /// Largest puncture force over the section of the needle that tissue bears, as part of Young's modulus E: a sharp needle enters at
-/// `3 pi mu R^2 (1 + ln(1.37 J_c/(mu R)))` [Shergold2004, Fregonese2021], which is `1 + ln(1.37 J_c/(mu R))` of E = 3 mu over the section.
-/// The toughest and softest pair of the data, 550 J/m^2 at 6.6 kPa under a 16G needle, has J_c/(mu R) = 101 and 5.9; 7 belongs to 300.
+/// `3 pi mu R^2 (1 + ln(1.27 J_c/(mu R)))` [Shergold2004, Fregonese2021], which is `1 + ln(1.27 J_c/(mu R))` of E = 3 mu over the section.
+/// The toughest and softest pair of the data, 550 J/m^2 at 6.6 kPa under a 16G needle, has J_c/(mu R) = 101 and 5.9; 7 belongs to 316.
 pub const MOST_PRESSURE_OVER_YOUNG: f64 = 7.0;
 
 /// The same as part of the bulk modulus K: `K/2 (J - 1)^2` bears no pressure beyond K, and the dimple before the puncture spreads the

@@ -1,5 +1,5 @@
 //! What the scheme `opening` of the effect `puncture` prepares: stations along the planned path, the points that carry the tissue beside
-//! it, and the cells around it. Equations: src/needle/opening.rs and docs/effects/opening.md.
+//! it, and the cells around it. Equations: src/needle/opening.rs and docs/opening.md.
 
 use std::collections::BTreeMap;
 

@@ -13,7 +13,7 @@
 //! F = grad x = F_h + (g - 1) H + 2 g' eta (H^T eta)^T + g_rc rc_Z eta t0^T,   g' = dg/ds,  g_rc = dg/drc
 //! ```
 //! For an energy per volume with `P = dW/dF` the derivatives of W follow: with respect to F_h, eta, c_Z, rc and rc_Z ([`Opening::pull_back`]).
-//! `s0`: a few micrometres squared, since no direction leads away from the middle of the path. Source: this project (docs/effects/opening.md).
+//! `s0`: a few micrometres squared, since no direction leads away from the middle of the path. Source: this project (docs/opening.md).
 
 use glam::{DMat3, DVec3};
 
