@@ -67,7 +67,7 @@ struct OpeningRecord {
     now: vec4<f32>,
 }
 
-@group(0) @binding(7) var<uniform> opening: OpeningParams;
+@group(0) @binding(16) var<uniform> opening: OpeningParams;
 
 // The path at one place, across it in R.
 struct PathSection {

@@ -14,7 +14,7 @@ struct OpeningCell {
     upper: vec4<f32>,
 }
 
-@group(1) @binding(13) var<storage, read> near_cells: array<OpeningCell>;
+@group(1) @binding(23) var<storage, read> near_cells: array<OpeningCell>;
 @group(3) @binding(20) var<storage, read> path_stations: array<OpeningStation>;
 
 // Mean of the stations in a cell; w of the middle: radius [m].

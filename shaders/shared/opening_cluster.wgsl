@@ -12,9 +12,9 @@ struct OpeningCluster {
     inverse: vec4<f32>,
 }
 
-@group(1) @binding(10) var<storage, read> path_clusters: array<OpeningCluster>;
+@group(1) @binding(20) var<storage, read> path_clusters: array<OpeningCluster>;
 // Place in the cell from its middle, -1/2..1/2; w: rest volume [m^3].
-@group(1) @binding(11) var<storage, read> path_points: array<vec4<f32>>;
+@group(1) @binding(21) var<storage, read> path_points: array<vec4<f32>>;
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
 // Displacement in a cell as `mean + p.x x + p.y y + p.z z + p.x p.y xy + p.y p.z yz + p.z p.x zx + p.x p.y p.z xyz`, with the place p from

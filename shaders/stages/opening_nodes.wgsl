@@ -10,8 +10,8 @@ struct OpeningNode {
     more: vec4<u32>,
 }
 
-@group(1) @binding(12) var<storage, read> path_entries: array<OpeningEntry>;
-@group(1) @binding(14) var<storage, read> path_nodes: array<OpeningNode>;
+@group(1) @binding(22) var<storage, read> path_entries: array<OpeningEntry>;
+@group(1) @binding(24) var<storage, read> path_nodes: array<OpeningNode>;
 @group(3) @binding(20) var<storage, read> path_stations: array<OpeningStation>;
 @group(3) @binding(21) var<storage, read> opening_corners: array<vec4<f32>>;
 

@@ -4,7 +4,7 @@
 #import shared/step_input
 #import effects/opening
 
-@group(1) @binding(12) var<storage, read> path_entries: array<OpeningEntry>;
+@group(1) @binding(22) var<storage, read> path_entries: array<OpeningEntry>;
 @group(3) @binding(20) var<storage, read_write> path_stations: array<OpeningStation>;
 @group(3) @binding(22) var<storage, read> opening_sums: array<OpeningSum>;
 @group(3) @binding(23) var<storage, read_write> opening_record: OpeningRecord;

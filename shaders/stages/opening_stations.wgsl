@@ -7,7 +7,7 @@
 #import effects/opening
 #import shared/tip_read
 
-@group(1) @binding(12) var<storage, read> path_entries: array<OpeningEntry>;
+@group(1) @binding(22) var<storage, read> path_entries: array<OpeningEntry>;
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
 @group(3) @binding(20) var<storage, read_write> path_stations: array<OpeningStation>;

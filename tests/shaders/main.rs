@@ -45,6 +45,8 @@ fn scenes() -> Vec<Features> {
     let mut scenes = vec![scene(false, false), scene(true, false), scene(false, true), scene(true, true)];
     scenes.push(Features { regions: true, ..scene(false, false) });
     scenes.push(Features { free_path: true, ..scene(false, false) });
+    scenes.push(Features { opening: true, ..scene(false, false) });
+    scenes.push(Features { opening: true, regions: true, ..scene(true, true) });
     scenes.push(Features { bore: true, ..scene(false, false) });
     scenes.push(Features { slit: true, ..scene(true, true) });
     scenes.push(Features { free_path: true, regions: true, ..scene(true, true) });
@@ -258,7 +260,11 @@ fn shader_structs() -> BTreeMap<String, ShaderStruct> {
     let free = Features { free_path: true, ..block.clone() };
     let bore = Features { bore: true, ..block.clone() };
     let slit = Features { slit: true, ..block.clone() };
-    for r in [block, free, bore, slit, tetrahedra(true, true)].iter().flat_map(|features| reflected(&every, features)) {
+    let opening = Features { opening: true, ..block.clone() };
+    for r in [block, free, bore, slit, opening, tetrahedra(true, true)]
+        .iter()
+        .flat_map(|features| reflected(&every, features))
+    {
         for (_, ty) in r.module.types.iter() {
             let (naga::TypeInner::Struct { members, span }, Some(name)) = (&ty.inner, &ty.name) else {
                 continue;
@@ -314,6 +320,12 @@ fn host_structs_lie_as_the_shaders_read_them() {
     let host: BTreeSet<&str> = host.into_iter().map(|l| l.0).collect();
     let local = [
         "CellEnergy",
+        "CellModes",
+        "OpenedPlace",
+        "OpenedStress",
+        "OpeningDerivatives",
+        "OpeningMean",
+        "PathSection",
         "IsochoricFactors",
         "Measure",
         "AnchorPlace",
