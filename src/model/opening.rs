@@ -115,9 +115,10 @@ impl OpeningPlan {
         }
     }
 
-    /// Part of a station that a tip at the material coordinate a has cut, and its rate [1/m]. Above the surface as just below it.
+    /// Part of a station that a tip at the material coordinate a has cut, and its rate [1/m]. On an oblique path what lies before the
+    /// surface point of the axis opens as what lies as far behind it.
     pub fn cut(&self, station: &OpeningStation, a: f64) -> (f64, f64) {
-        let part = (a - station.depth.max(0.5 * self.spacing)) / self.spacing + 0.5;
+        let part = (a - station.depth.abs().max(0.5 * self.spacing)) / self.spacing + 0.5;
         (part.clamp(0.0, 1.0), if part > 0.0 && part < 1.0 { 1.0 / self.spacing } else { 0.0 })
     }
 }

@@ -202,7 +202,7 @@ fn tables_of(model: &Model, layout: &Layout) -> Tables {
             _pad: 0.0,
         }));
         let end = tables.entries.len() as u32;
-        let cut_from = station.depth.max(0.5 * opening.spacing);
+        let cut_from = station.depth.abs().max(0.5 * opening.spacing);
         tables.stations.push(OpeningStation {
             depth: [station.depth as f32, cut_from as f32, 0.0, 0.0],
             lists: [first, middle, middle, end],
