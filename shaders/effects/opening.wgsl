@@ -8,7 +8,8 @@ struct OpeningParams {
     direction: vec4<f32>,
     // Where the path enters [m]; w: length of the tip [m].
     entry: vec4<f32>,
-    // Distance of stations [m], stiffness that holds the path on the needle per station [N/m], s0 in R^2; w unused.
+    // Distance of stations [m], stiffness that holds the path on the needle per station [N/m], s0 in R^2, most that the tip advances in a
+    // step [m].
     numbers: vec4<f32>,
     // Coefficient of friction, stiffness of the stick spring per station [N/m], length over which the coefficient grows [m]; w unused.
     friction: vec4<f32>,

@@ -110,7 +110,11 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         let excess = spring * gap - threshold;
         var advance = 0.0;
         if (excess > 0.0) {
-            let cap = advance_limit(before == 0.0, speed * params.dt);
+            var cap = advance_limit(before == 0.0, speed * params.dt);
+#ifdef OPENING
+            // No node can be left inside of the needle: a crack may run as fast as it will.
+            cap = max(opening.numbers.w, LEAST_TRAVELS * speed * params.dt);
+#endif
             let lambda = clamp(stretch / f32(ANCHOR_COUNT), LEAST_STRETCH, MOST_STRETCH);
             advance = min(excess / (puncture.tip_stiffness * lambda), cap);
             capped = advance == cap;

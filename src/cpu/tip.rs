@@ -83,7 +83,10 @@ impl CpuEngine {
         let threshold = plan.threshold(a) * p.rate_factor(speed) + resistance;
         if force > threshold {
             let lambda = anchors.iter().map(|p| p.stretch).sum::<f64>() / count;
-            let cap = advance_limit(a == 0.0, speed * self.dt);
+            let cap = match &plan.opening {
+                Some(opening) => opening.advance_limit(speed * self.dt, self.dt),
+                None => advance_limit(a == 0.0, speed * self.dt),
+            };
             let advance = tip_advance(force, threshold, p.tip_stiffness, bounded_stretch(lambda), cap);
             self.state.tip_coordinate = a + advance;
             let before = anchors;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
 
+use crate::effects::puncture::LEAST_TRAVELS;
 use crate::mesh::{BlockMesh, CORNERS};
 use crate::needle::lateral_axes;
 use crate::needle::opening::OpeningMap;
@@ -21,6 +22,12 @@ const RADII: usize = 8;
 
 /// Fewest points of a ring.
 const LEAST_ANGLES: f64 = 8.0;
+
+/// Most that the tip advances in a step, in distances of stations.
+const ADVANCE: f64 = 0.25;
+
+/// Largest speed of a crack, in speeds of shear waves of the scaled mass.
+const CRACK_SPEED: f64 = 0.2;
 
 /// How far the stations go beyond the deepest place of the tip, in needle radii.
 const BEYOND: f64 = 1.5;
@@ -93,6 +100,8 @@ pub struct OpeningPlan {
     pub guide: f64,
     /// Stiffness of the stick spring of friction per station, before its factor [N/m].
     pub stick: f64,
+    /// Speed of shear waves with the scaled mass [m/s].
+    pub shear_wave_speed: f64,
     /// Half of the length over which the normal force is averaged for friction, in stations.
     pub averaged: usize,
 }
@@ -115,6 +124,13 @@ impl OpeningPlan {
         }
     }
 
+    /// How far the tip may advance in a step of `dt` [s] in which the needle travels `travel` [m]: a crack runs at a fifth of the speed of
+    /// shear waves at most (a faster one lets the tissue snap back beyond the speed limit of the nodes), and stations open one after the
+    /// other. No node can be left inside of the needle here, so the speed of the needle is no limit.
+    pub fn advance_limit(&self, travel: f64, dt: f64) -> f64 {
+        (CRACK_SPEED * self.shear_wave_speed * dt).min(ADVANCE * self.spacing).max(LEAST_TRAVELS * travel)
+    }
+
     /// Part of a station that a tip at the material coordinate a has cut, and its rate [1/m]. On an oblique path what lies before the
     /// surface point of the axis opens as what lies as far behind it.
     pub fn cut(&self, station: &OpeningStation, a: f64) -> (f64, f64) {
@@ -134,6 +150,8 @@ pub struct OpeningInput<'a> {
     /// Shear modulus and p-wave modulus of the tissue [Pa].
     pub shear_modulus: f64,
     pub p_wave_modulus: f64,
+    /// Density with its scaling [kg/m^3].
+    pub density: f64,
     /// Rest radius of the hole at a material coordinate [m].
     pub hole: &'a dyn Fn(f64) -> f64,
 }
@@ -206,6 +224,7 @@ impl OpeningPlan {
             cells: Vec::new(),
             guide: 50.0 * input.shear_modulus * spacing,
             stick: 2.0 * input.p_wave_modulus * spacing,
+            shear_wave_speed: (input.shear_modulus / input.density).sqrt(),
             averaged: ((average / spacing).round() as usize).max(1) / 2,
         };
         plan.cells = near_cells(mesh, input, &plan, near, f64::from(count) * spacing);

@@ -203,6 +203,7 @@ impl Model {
                 cell_size: self.scene.tissue.cell_size,
                 shear_modulus: self.scene.material.law.shear_modulus(),
                 p_wave_modulus: self.scene.material.law.p_wave_modulus(),
+                density: self.scaled_density(),
                 hole: &|depth| plan.segment(depth.max(0.0)).hole,
             },
         );

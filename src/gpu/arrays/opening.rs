@@ -16,7 +16,7 @@ use crate::model::Model;
 use crate::model::opening::OpeningPlan;
 
 pub(super) const ARRAYS: &[Array] = &[
-    Array::constant("opening", |s| bytes_of(&[params(s.model, s.layout)])),
+    Array::constant("opening", |s| bytes_of(&[params(s.model, s.layout, s.dt)])),
     Array::constant("path_clusters", |s| bytes_of(&not_empty(tables(s).clusters))),
     Array::constant("path_points", |s| bytes_of(&not_empty(tables(s).points))),
     Array::constant("near_cells", |s| bytes_of(&not_empty(tables(s).cells))),
@@ -98,11 +98,11 @@ fn slot_count(model: &Model) -> u64 {
 
 /// Clusters, cells and nodes: threads of the stages.
 pub fn opening_counts(model: &Model, layout: &Layout) -> [u32; 3] {
-    let [_, clusters, cells, nodes] = params(model, layout).counts;
+    let [_, clusters, cells, nodes] = params(model, layout, 0.0).counts;
     [clusters, cells, nodes]
 }
 
-fn params(model: &Model, layout: &Layout) -> OpeningParams {
+fn params(model: &Model, layout: &Layout, dt: f64) -> OpeningParams {
     let (Some(opening), Some(plan)) = (model.opening(), &model.puncture) else { return OpeningParams::zeroed() };
     let friction = model.effects.friction.unwrap_or_default();
     let shaft = opening.map.shaft;
@@ -114,7 +114,12 @@ fn params(model: &Model, layout: &Layout) -> OpeningParams {
     OpeningParams {
         direction: [x, y, z, shaft as f32],
         entry: [ex, ey, ez, opening.tip_length as f32],
-        numbers: [opening.spacing as f32, opening.guide as f32, (opening.map.least / (shaft * shaft)) as f32, 0.0],
+        numbers: [
+            opening.spacing as f32,
+            opening.guide as f32,
+            (opening.map.least / (shaft * shaft)) as f32,
+            opening.advance_limit(0.0, dt) as f32,
+        ],
         friction: [friction.coefficient as f32, stick as f32, friction.fade_length.max(1e-9) as f32, 0.0],
         counts: [opening.stations.len(), clusters, opening.cells.len(), nodes].map(|n| n as u32),
         averaged: [opening.averaged as u32, 0, 0, 0],
