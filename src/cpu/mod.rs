@@ -63,7 +63,8 @@ pub struct CpuEngine {
     /// Force across the needle on every anchor of a free tip [N].
     tip_sway: DVec3,
     contact_energy: f64,
-    opening: opening::OpeningState,
+    /// Elastic energy that the scheme `opening` added in the last step [J].
+    opening_elastic: f64,
     /// What the points have dissipated and earlier frames have told.
     booked: FrameEnergies,
     /// Centre-line of a flexible needle in the frame under way.
@@ -88,6 +89,7 @@ impl CpuEngine {
             bond: Bond::default(),
             contact: vec![ContactState::default(); model.contact_nodes.len()],
             stations: vec![0.0; model.opening().map_or(0, |o| o.stations.len())],
+            opening_resistance: 0.0,
             pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
         }
@@ -120,7 +122,7 @@ impl CpuEngine {
             tip_energy: 0.0,
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
-            opening: Default::default(),
+            opening_elastic: 0.0,
             booked: FrameEnergies::default(),
             centre_line: None,
             node_impulse: vec![DVec3::ZERO; model.contact_nodes.len()],
@@ -246,7 +248,7 @@ impl CpuEngine {
         let sums = &mut self.sums;
         sums.energy.elastic = measures.iter().map(|m| m.elastic).sum();
         // Beside what cells hold of a path of no width.
-        sums.energy.elastic += self.opening.elastic;
+        sums.energy.elastic += self.opening_elastic;
         sums.energy.hourglass = measures.iter().map(|m| m.hourglass).sum();
         sums.energy.viscous = measures.iter().map(|m| m.viscous).sum();
         // What deletion has taken out may be turned inside out.

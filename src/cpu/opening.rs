@@ -48,18 +48,6 @@ struct Now {
     slope: f64,
 }
 
-/// Memory of the scheme.
-#[derive(Debug, Clone, Default)]
-pub(super) struct OpeningState {
-    /// Force that opening takes per advance of the tip [N].
-    pub resistance: f64,
-    /// Elastic energy that opening added in the last step [J].
-    pub elastic: f64,
-    /// Normal force of every station in the last step [N], and the friction on it.
-    pub normal: Vec<f64>,
-    pub friction: Vec<f64>,
-}
-
 /// Differences of a quantity along the stations: weights of the neighbours before and behind station `i`.
 fn neighbours(i: usize, count: usize, spacing: f64) -> (usize, usize, f64) {
     let (before, behind) = (i.saturating_sub(1), (i + 1).min(count - 1));
@@ -149,7 +137,7 @@ impl CpuEngine {
                 sums.add(&derivatives, 1.0 / f64::from(near.count));
             }
         }
-        self.opening.elastic = elastic;
+        self.opening_elastic = elastic;
         self.station_reactions(opening, pose, &now, &sums, t);
     }
 
@@ -175,12 +163,11 @@ impl CpuEngine {
             centre[behind] += rate * by;
             centre[before] -= rate * by;
         }
-        self.opening.resistance = now.iter().zip(&radius).map(|(n, r)| r * n.full * n.cut_rate).sum();
+        self.state.opening_resistance = now.iter().zip(&radius).map(|(n, r)| r * n.full * n.cut_rate).sum();
         let normal = averaged_normal(opening, now, sums);
         let velocity = &self.state.velocity;
         let mut stored = 0.0;
         let mut booked = ContactSums::default();
-        let mut friction_forces = vec![0.0; count];
         for (i, station) in opening.stations.iter().enumerate() {
             let n = &now[i];
             let aside = n.section.centre - pose.tip;
@@ -209,7 +196,6 @@ impl CpuEngine {
                     self.added_bound[station.nodes[usize::from(*place)] as usize] += 2.0 * kt * w;
                 }
             }
-            friction_forces[i] = rubbing;
             let along = t * (spread + rubbing);
             for (place, w) in &station.disc {
                 self.external[station.nodes[usize::from(*place)] as usize] += along * *w;
@@ -224,8 +210,6 @@ impl CpuEngine {
             booked.friction += t * rubbing;
             booked.torque += (aside - t * n.behind).cross(guide);
         }
-        self.opening.normal = normal;
-        self.opening.friction = friction_forces;
         self.sums.book(&booked, pose, self.dt);
         self.contact_energy += stored;
     }

@@ -79,7 +79,7 @@ impl CpuEngine {
         let p = &plan.params;
         let speed = pose.velocity.length();
         // The tissue that the tip opens as it advances is strained at once.
-        let resistance = self.opening.resistance;
+        let resistance = self.state.opening_resistance;
         let threshold = plan.threshold(a) * p.rate_factor(speed) + resistance;
         if force > threshold {
             let lambda = anchors.iter().map(|p| p.stretch).sum::<f64>() / count;

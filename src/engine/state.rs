@@ -29,6 +29,8 @@ pub struct State {
     pub contact: Vec<ContactState>,
     /// Stretch of the stick spring of every station of the path along the needle [m]; empty without the scheme `opening`.
     pub stations: Vec<f64>,
+    /// Force that opening took per advance of the tip in the last step, in the scheme `opening` [N].
+    pub opening_resistance: f64,
     /// Damage D of every pair of copies that may separate.
     pub pairs: Vec<f64>,
     /// History per cell; empty without `plasticity` and `viscoelastic`.

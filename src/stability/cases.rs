@@ -277,7 +277,7 @@ pub const CASES: &[Case] = &[
         ],
         parts: &[TOOL],
         spread: None,
-        cure: Cure::Switch { what: "a sixteenth of the step", overrides: &["solver.safety=0.8"] },
+        cure: Cure::Switch { what: "a sixteenth of a step", overrides: &["solver.safety=0.8"] },
     },
     Case {
         name: "step_0_9",

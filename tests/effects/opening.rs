@@ -164,3 +164,36 @@ fn twice_the_size_takes_four_times_the_force() {
     println!("{one:.4} N, {two:.4} N");
     close("four times the force", two, 4.0 * one, 0.01);
 }
+
+#[test]
+fn an_oblique_needle_meets_the_same_force() {
+    let oblique = scene(&[
+        "tissue.size_mm=[26.0,18.0,12.0]",
+        "motion.entry_mm=[-3.0,0.0]",
+        "motion.direction=[0.7071,0.0,-0.7071]",
+        "motion.phase.0.depth_mm=7.0",
+    ]);
+    let expected = predicted(&oblique).tip_force;
+    let frames = frames(oblique, engines_here().pop().unwrap());
+    let force = mean(&frames, 4.5e-3, 6.9e-3, |f| f.force.axial);
+    println!("45 degrees: {force:.4} N, theory {expected:.4} N");
+    close("steady force", force, expected, 0.03);
+}
+
+#[test]
+fn a_track_that_is_there_needs_no_cutting() {
+    let phases = "motion.phase=[{kind=\"insert\", speed_mm_s=4.0, depth_mm=5.0}, {kind=\"withdraw\", speed_mm_s=4.0, depth_mm=1.0}, \
+                  {kind=\"insert\", speed_mm_s=4.0, depth_mm=6.5}]";
+    let scene = scene(&[phases]);
+    let steady = predicted(&scene);
+    let frames = frames(scene, engines_here().pop().unwrap());
+    let again = |from: f64, to: f64, of: &dyn Fn(&FrameRecord) -> f64| {
+        let within: Vec<f64> =
+            frames.iter().filter(|f| f.phase == 2 && f.depth > from && f.depth < to).map(of).collect();
+        within.iter().sum::<f64>() / within.len() as f64
+    };
+    let cutting = again(2.5e-3, 4e-3, &|f| f.force.cutting);
+    println!("in the track {cutting:.5} N, beyond it {:.4} N", again(5.8e-3, 6.4e-3, &|f| f.force.cutting));
+    at_most("cutting in the track, of that of new tissue", cutting.abs() / steady.cutting_force, 0.01);
+    close("cutting beyond it", again(5.8e-3, 6.4e-3, &|f| f.force.cutting), steady.cutting_force, 0.03);
+}
