@@ -644,7 +644,8 @@ fn damaged_checkpoints_are_refused() {
     let path = folder.path().join("checkpoint.stylet");
     whole.write(&path).unwrap();
     assert!(RunCheckpoint::read(&path).is_ok());
-    let bytes = std::fs::read(&path).unwrap();
+    let whole_bytes = std::fs::read(&path).unwrap();
+    let bytes = whole_bytes.clone();
     let mut random = Random(7);
     let mut refused = 0;
     for _ in 0..500 {
@@ -662,9 +663,13 @@ fn damaged_checkpoints_are_refused() {
                 assert_eq!(error.exit_code(), 2);
                 refused += 1;
             }
-            // A flipped bit that zlib does not use, such as the level in its header, changes nothing.
-            Ok(found) => assert_eq!(found.simulation.frames, 1),
+            // A flipped bit that changes nothing, such as the level in the header, or a distance in a row of zeros: the same to the last bit.
+            Ok(found) => {
+                let again = folder.path().join("again.stylet");
+                found.write(&again).unwrap();
+                assert!(std::fs::read(&again).unwrap() == whole_bytes, "another content was read");
+            }
         }
     }
-    assert!(refused > 490, "{refused} of 500");
+    assert!(refused > 450, "{refused} of 500");
 }
