@@ -141,7 +141,11 @@ fn in_scene(material: &TissueMaterial, params: &Params) -> [String; 2] {
         (false, true) => "the run takes this".into(),
         (false, false) => said(value, "calibrated, default"),
     };
-    [of(params.puncture_force, params.puncture_stated), of(params.cutting_force, params.cutting_stated)]
+    let mut puncture = of(params.puncture_force, params.puncture_stated);
+    if opening && !params.puncture_stated {
+        puncture += " at the surface; in an inner layer the crack is there already";
+    }
+    [puncture, of(params.cutting_force, params.cutting_stated)]
 }
 
 /// What the wall of the slit has to hold.

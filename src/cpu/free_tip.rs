@@ -7,7 +7,7 @@ use crate::effects::puncture::{
     advance_limit, bounded_stretch, retreat, share_beyond, slip_limit, sway_beyond, tip_advance,
 };
 use crate::material::kinematics::cofactor;
-use crate::mesh::{BlockMesh, CORNERS};
+use crate::mesh::{BlockMesh, trilinear};
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
 use crate::needle::free_path::{FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SOFTENING_RATE, TURNING, anchor_offset};
 use crate::needle::{ToolPose, lateral_axes};
@@ -55,13 +55,11 @@ fn within_block(mesh: &BlockMesh, x: DVec3) -> DVec3 {
 fn material_place(mesh: &BlockMesh, u: &[DVec3], x: DVec3) -> MaterialPlace {
     let (cell, local, width) = grid_place(mesh, x);
     let nodes = mesh.cell_nodes(mesh.cell_index(cell[0], cell[1], cell[2]));
-    let (mut weights, mut position, mut gradient) = ([0.0; 8], x, DMat3::IDENTITY);
-    for (i, signs) in CORNERS.iter().enumerate() {
-        let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (local[a] - 0.5));
-        let rate = DVec3::from(*signs) / width * DVec3::new(n[1] * n[2], n[2] * n[0], n[0] * n[1]);
-        weights[i] = n[0] * n[1] * n[2];
-        let u = u[nodes[i]];
-        position += u * weights[i];
+    let (weights, rates) = trilinear(local, width);
+    let (mut position, mut gradient) = (x, DMat3::IDENTITY);
+    for ((node, weight), rate) in nodes.iter().zip(weights).zip(rates) {
+        let u = u[*node];
+        position += u * weight;
         gradient += DMat3::from_cols(u * rate.x, u * rate.y, u * rate.z);
     }
     MaterialPlace { nodes, weights, position, gradient }

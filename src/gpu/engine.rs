@@ -95,7 +95,8 @@ impl GpuEngine {
         let defines = defines(&model.effects, &features);
         let measure_threads = measure_threads(&model);
         let numbers = mesh_numbers(&model, &layout, measure_threads);
-        let source = Source { model: &model, layout: &layout, dt, measure_threads, max_steps };
+        let source =
+            Source { model: &model, layout: &layout, dt, measure_threads, max_steps, opening: Default::default() };
         // Composing, validating and compiling go side by side: they are most of the time to the first step.
         let compiled = stages(&model.effects, &features)
             .into_par_iter()
@@ -279,6 +280,7 @@ impl GpuEngine {
             dt: self.dt,
             measure_threads: measure_threads(&self.model),
             max_steps: self.max_steps,
+            opening: Default::default(),
         }
     }
 
@@ -555,7 +557,8 @@ impl Engine for GpuEngine {
         }
         let mut writes = Vec::new();
         let (layout, max_steps) = (&self.layout, self.max_steps);
-        let source = Source { model: &model, layout, dt, measure_threads: measured, max_steps };
+        let source =
+            Source { model: &model, layout, dt, measure_threads: measured, max_steps, opening: Default::default() };
         for array in arrays::all() {
             let Some(buffer) = self.buffers.get(array.name) else { continue };
             let state = self.kept.contains(&array.name) && array.life != Life::Told;

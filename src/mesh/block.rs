@@ -25,6 +25,17 @@ pub const CORNERS: [[f64; 3]; 8] = [
     [-1.0, 1.0, 1.0],
 ];
 
+/// Weights of the corners at a place of a cell, 0..1 per axis, and their gradients [1/m]; `width`: edges of the cell [m].
+pub fn trilinear(local: DVec3, width: DVec3) -> ([f64; 8], [DVec3; 8]) {
+    let (mut weights, mut gradients) = ([0.0; 8], [DVec3::ZERO; 8]);
+    for (c, signs) in CORNERS.iter().enumerate() {
+        let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (local[a] - 0.5));
+        weights[c] = n[0] * n[1] * n[2];
+        gradients[c] = DVec3::from(*signs) / width * DVec3::new(n[1] * n[2], n[2] * n[0], n[0] * n[1]);
+    }
+    (weights, gradients)
+}
+
 /// The tissue block: `-size.x/2..size.x/2`, `-size.y/2..size.y/2`, `-size.z..0` [m]; the top face is z = 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tissue {

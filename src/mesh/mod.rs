@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use block::{BlockMesh, Bore, CORNERS, Tissue};
+pub use block::{BlockMesh, Bore, CORNERS, Tissue, trilinear};
 pub use tets::TetMesh;
 pub use tissue_point::TissuePoint;
 

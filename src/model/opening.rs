@@ -1,12 +1,12 @@
 //! What the scheme `opening` of the effect `puncture` prepares: stations along the planned path, the points that carry the tissue beside
 //! it, and the cells around it. Equations: src/needle/opening.rs and docs/opening.md.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DMat3, DVec3};
 
 use crate::effects::puncture::LEAST_TRAVELS;
-use crate::mesh::{BlockMesh, CORNERS};
+use crate::mesh::{BlockMesh, CORNERS, trilinear};
 use crate::needle::lateral_axes;
 use crate::needle::opening::OpeningMap;
 use crate::needle::{NeedleShape, PlannedPath};
@@ -74,6 +74,15 @@ pub struct OpeningStation {
     pub hole: f64,
 }
 
+/// Points of one station in one cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cluster {
+    pub station: usize,
+    pub cell: u32,
+    /// Indices into the points of the station.
+    pub points: Vec<usize>,
+}
+
 /// A cell that the map reaches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearCell {
@@ -94,8 +103,12 @@ pub struct OpeningPlan {
     /// Distance between stations [m].
     pub spacing: f64,
     pub stations: Vec<OpeningStation>,
+    /// Largest first: threads of a group wait for each other, so that many of the same size lie side by side.
+    pub clusters: Vec<Cluster>,
     /// Ascending in the cell.
     pub cells: Vec<NearCell>,
+    /// All nodes that points, cells or stations act on.
+    pub nodes: BTreeSet<u32>,
     /// Stiffness that holds the middle of the path on the needle, per station [N/m].
     pub guide: f64,
     /// Stiffness of the stick spring of friction per station, before its factor [N/m].
@@ -190,12 +203,7 @@ fn place_in(mesh: &BlockMesh, x: DVec3) -> Place {
     let width = mesh.cell_size(cell);
     let exact = (x - mesh.rest_position(corners[0])) / width;
     let inside = (exact - at).abs().max_element() < 1e-9;
-    let (mut weights, mut gradients) = ([0.0; 8], [DVec3::ZERO; 8]);
-    for (c, signs) in CORNERS.iter().enumerate() {
-        let n: [f64; 3] = std::array::from_fn(|a| 0.5 + signs[a] * (exact[a] - 0.5));
-        weights[c] = n[0] * n[1] * n[2];
-        gradients[c] = DVec3::from(*signs) / width * DVec3::new(n[1] * n[2], n[2] * n[0], n[0] * n[1]);
-    }
+    let (weights, gradients) = trilinear(exact, width);
     Place { cell, corners, weights, gradients, local: exact, inside }
 }
 
@@ -220,14 +228,19 @@ impl OpeningPlan {
             map: OpeningMap { direction, rest_direction: direction, shaft, least: least * least },
             tip_length: input.needle.tip_length,
             spacing,
+            clusters: clusters_of(&stations),
             stations,
             cells: Vec::new(),
+            nodes: BTreeSet::new(),
             guide: 50.0 * input.shear_modulus * spacing,
             stick: 2.0 * input.p_wave_modulus * spacing,
             shear_wave_speed: (input.shear_modulus / input.density).sqrt(),
             averaged: ((average / spacing).round() as usize).max(1) / 2,
         };
         plan.cells = near_cells(mesh, input, &plan, near, f64::from(count) * spacing);
+        plan.nodes = plan.stations.iter().flat_map(|s| &s.nodes).copied().collect();
+        let corners = plan.cells.iter().flat_map(|near| mesh.cell_nodes(near.cell as usize));
+        plan.nodes.extend(corners.map(|n| n as u32));
         plan
     }
 }
@@ -286,6 +299,19 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, depth: f64, spacing: f64, nea
     OpeningStation { depth, nodes: nodes.list, centre, disc, points, hole }
 }
 
+fn clusters_of(stations: &[OpeningStation]) -> Vec<Cluster> {
+    let mut all: Vec<Cluster> = Vec::new();
+    for (station, s) in stations.iter().enumerate() {
+        let mut by_cell: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (index, point) in s.points.iter().enumerate() {
+            by_cell.entry(point.cell).or_default().push(index);
+        }
+        all.extend(by_cell.into_iter().map(|(cell, points)| Cluster { station, cell, points }));
+    }
+    all.sort_by_key(|c| std::cmp::Reverse(c.points.len()));
+    all
+}
+
 /// Cells that the map reaches, with the part of their volume outside of the zone of points.
 fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: f64, end: f64) -> Vec<NearCell> {
     const SAMPLES: usize = 6;
@@ -307,6 +333,9 @@ fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: 
                 return None;
             }
             let shares = CORNERS.map(|corner| {
+                if r > near + reach {
+                    return 1.0;
+                }
                 let mut outside = 0usize;
                 for n in 0..SAMPLES.pow(3) {
                     let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64 * 0.5;

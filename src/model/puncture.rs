@@ -279,6 +279,10 @@ fn path_segments(
             let mut hole = UNKNOWN_HOLE * needle.radius;
             if let Some(Ok(steady)) = opening.then(|| material.steady(needle)).flatten() {
                 cutting = params.opening_cutting(material.cutting, &steady);
+                // An inner layer meets a crack that is there already and runs on: it is cut, not punctured.
+                if start > 0.0 && material.cutting.is_none() && !params.puncture_stated {
+                    cutting.puncture_force = cutting.cutting_force;
+                }
                 hole = steady.hole_radius;
                 if material.membrane_energy.is_none() {
                     // The crack forms over its own length, which is not finer than the tip advances.

@@ -197,3 +197,27 @@ fn a_track_that_is_there_needs_no_cutting() {
     at_most("cutting in the track, of that of new tissue", cutting.abs() / steady.cutting_force, 0.01);
     close("cutting beyond it", again(5.8e-3, 6.4e-3, &|f| f.force.cutting), steady.cutting_force, 0.03);
 }
+
+#[test]
+fn an_inner_layer_is_cut_by_the_crack_that_is_there() {
+    let deep = "region=[{name=\"deep\", layer_mm=[4.0, 12.0], \
+                material={c10_kpa=5.0, c01_kpa=2.0, poisson_ratio=0.47, toughness_j_m2=300}}]";
+    let scene = scene(&[deep, "motion.phase.0.depth_mm=8.5"]);
+    let frames = frames(scene, engines_here().pop().unwrap());
+    let [above, below] = [(3.2e-3, 3.9e-3), (6.5e-3, 8.4e-3)].map(|(a, b)| mean(&frames, a, b, |f| f.force.cutting));
+    let largest = frames.iter().filter(|f| f.tip_coordinate > 3e-3).map(|f| f.force.cutting).fold(0.0, f64::max);
+    println!("cutting {above:.4} N above, {below:.4} N below, {largest:.4} N at the most between");
+    assert!(largest < 1.05 * above.max(below), "{largest} N at the border");
+}
+
+#[test]
+fn a_law_that_stiffens_meets_the_force_of_its_own_curve() {
+    let material =
+        "material={law=\"yeoh\", c10_kpa=5.0, c20_kpa=2.0, c30_kpa=0.0, poisson_ratio=0.47, toughness_j_m2=164}";
+    let scene = scene(&[material, "motion.phase.0.depth_mm=6.8"]);
+    let expected = predicted(&scene).tip_force;
+    let frames = frames(scene, engines_here().pop().unwrap());
+    let force = mean(&frames, 5e-3, 6.7e-3, |f| f.force.axial);
+    println!("Yeoh: {force:.4} N, theory {expected:.4} N");
+    close("steady force", force, expected, 0.03);
+}

@@ -13,6 +13,8 @@ mod own;
 mod puncture;
 mod sums;
 
+use std::cell::OnceCell;
+
 use glam::DVec3;
 
 use super::layout::Layout;
@@ -72,9 +74,15 @@ pub struct Source<'a> {
     pub measure_threads: u32,
     /// Most steps of a frame.
     pub max_steps: usize,
+    /// Tables of an opened path, made for the first array that asks.
+    pub opening: OnceCell<opening::Tables>,
 }
 
 impl Source<'_> {
+    fn opening(&self) -> &opening::Tables {
+        self.opening.get_or_init(|| opening::tables_of(self.model, self.layout))
+    }
+
     fn nodes(&self) -> u64 {
         self.model.mesh.node_count() as u64
     }

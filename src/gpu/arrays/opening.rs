@@ -9,27 +9,27 @@ use super::super::structs::{
     OpeningCell, OpeningCluster, OpeningEntry, OpeningNode, OpeningParams, OpeningRecord, OpeningStation, OpeningSum,
     OpeningTotals,
 };
-use super::{Array, Source, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
+use super::{Array, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
 use crate::gpu::layout::Layout;
 use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::Model;
-use crate::model::opening::OpeningPlan;
+use crate::model::opening::Cluster;
 
 pub(super) const ARRAYS: &[Array] = &[
-    Array::constant("opening", |s| bytes_of(&[params(s.model, s.layout, s.dt)])),
-    Array::constant("path_clusters", |s| bytes_of(&not_empty(tables(s).clusters))),
-    Array::constant("path_points", |s| bytes_of(&not_empty(tables(s).points))),
-    Array::constant("near_cells", |s| bytes_of(&not_empty(tables(s).cells))),
-    Array::constant("path_entries", |s| bytes_of(&not_empty(tables(s).entries))),
-    Array::constant("path_nodes", |s| bytes_of(&not_empty(tables(s).nodes))),
-    Array::state("path_stations", |s| bytes_of(&not_empty(tables(s).stations))).exchanged(
+    Array::constant("opening", |s| bytes_of(&[params(s.model, s.dt)])),
+    Array::constant("path_clusters", |s| bytes_of(&not_empty(&s.opening().clusters))),
+    Array::constant("path_points", |s| bytes_of(&not_empty(&s.opening().points))),
+    Array::constant("near_cells", |s| bytes_of(&not_empty(&s.opening().cells))),
+    Array::constant("path_entries", |s| bytes_of(&not_empty(&s.opening().entries))),
+    Array::constant("path_nodes", |s| bytes_of(&not_empty(&s.opening().nodes))),
+    Array::state("path_stations", |s| bytes_of(&not_empty(&s.opening().stations))).exchanged(
         |bytes, _, state| state.stations = read_all::<OpeningStation>(bytes).map(|s| s.rubbing[2].into()).collect(),
         |s, state| {
-            let mut stations = tables(s).stations;
+            let mut stations = s.opening().stations.clone();
             for (station, stretch) in stations.iter_mut().zip(&state.stations) {
                 station.rubbing[2] = *stretch as f32;
             }
-            to_bytes(&not_empty(stations))
+            to_bytes(&not_empty(&stations))
         },
     ),
     Array::state("opening_corners", |s| zeros(8 * slot_count(s.model).max(1), 16)),
@@ -57,7 +57,7 @@ fn add_totals(bytes: &[u8], out: &mut Sums) {
 
 /// All tables, which name each other.
 #[derive(Default)]
-struct Tables {
+pub struct Tables {
     stations: Vec<OpeningStation>,
     clusters: Vec<OpeningCluster>,
     points: Vec<[f32; 4]>,
@@ -66,24 +66,8 @@ struct Tables {
     nodes: Vec<OpeningNode>,
 }
 
-fn not_empty<T: Zeroable + Clone>(mut values: Vec<T>) -> Vec<T> {
-    values.resize(values.len().max(1), T::zeroed());
-    values
-}
-
-/// Points of one station in one cell: station, cell, and their indices; many of the same number side by side, since the threads of a
-/// group wait for each other.
-fn clusters_of(opening: &OpeningPlan) -> Vec<(usize, u32, Vec<usize>)> {
-    let mut all: Vec<(usize, u32, Vec<usize>)> = Vec::new();
-    for (station, s) in opening.stations.iter().enumerate() {
-        let mut by_cell: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (index, point) in s.points.iter().enumerate() {
-            by_cell.entry(point.cell).or_default().push(index);
-        }
-        all.extend(by_cell.into_iter().map(|(cell, points)| (station, cell, points)));
-    }
-    all.sort_by_key(|c| std::cmp::Reverse(c.2.len()));
-    all
+fn not_empty<T: Zeroable + Clone>(values: &[T]) -> Vec<T> {
+    if values.is_empty() { vec![T::zeroed()] } else { values.to_vec() }
 }
 
 /// Number of a corner in the shaders: a bit per axis.
@@ -93,24 +77,22 @@ fn bits(signs: [f64; 3]) -> usize {
 
 /// Numbers of clusters and cells.
 fn slot_count(model: &Model) -> u64 {
-    model.opening().map_or(0, |o| (clusters_of(o).len() + o.cells.len()) as u64)
+    model.opening().map_or(0, |o| (o.clusters.len() + o.cells.len()) as u64)
 }
 
 /// Clusters, cells and nodes: threads of the stages.
-pub fn opening_counts(model: &Model, layout: &Layout) -> [u32; 3] {
-    let [_, clusters, cells, nodes] = params(model, layout, 0.0).counts;
-    [clusters, cells, nodes]
+pub fn opening_counts(model: &Model) -> [u32; 3] {
+    model.opening().map_or([0; 3], |o| [o.clusters.len(), o.cells.len(), o.nodes.len()].map(|n| n as u32))
 }
 
-fn params(model: &Model, layout: &Layout, dt: f64) -> OpeningParams {
+fn params(model: &Model, dt: f64) -> OpeningParams {
     let (Some(opening), Some(plan)) = (model.opening(), &model.puncture) else { return OpeningParams::zeroed() };
     let friction = model.effects.friction.unwrap_or_default();
     let shaft = opening.map.shaft;
-    let nodes = tables_of(model, layout).nodes.len();
-    let clusters = clusters_of(opening).len();
     let [x, y, z, _] = vec4(opening.map.direction);
     let [ex, ey, ez, _] = vec4(plan.path.entry);
     let stick = friction.stiffness_ratio * opening.stick;
+    let [clusters, cells, nodes] = opening_counts(model);
     OpeningParams {
         direction: [x, y, z, shaft as f32],
         entry: [ex, ey, ez, opening.tip_length as f32],
@@ -121,13 +103,9 @@ fn params(model: &Model, layout: &Layout, dt: f64) -> OpeningParams {
             opening.advance_limit(0.0, dt) as f32,
         ],
         friction: [friction.coefficient as f32, stick as f32, friction.fade_length.max(1e-9) as f32, 0.0],
-        counts: [opening.stations.len(), clusters, opening.cells.len(), nodes].map(|n| n as u32),
+        counts: [opening.stations.len() as u32, clusters, cells, nodes],
         averaged: [opening.averaged as u32, 0, 0, 0],
     }
-}
-
-fn tables(source: &Source) -> Tables {
-    tables_of(source.model, source.layout)
 }
 
 /// Place of a cell in the grid with its material, its middle from the entry of the path, one over its edges.
@@ -137,7 +115,7 @@ fn cell_of(model: &Model, mesh: &BlockMesh, entry: DVec3, cell: usize) -> ([u32;
     ([i, j, k, model.material_index(cell) as u32], vec4(middle), vec4(1.0 / mesh.cell_size(cell)))
 }
 
-fn tables_of(model: &Model, layout: &Layout) -> Tables {
+pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
     let mut tables = Tables::default();
     let (Some(opening), Some(plan), Some(mesh)) = (model.opening(), &model.puncture, model.mesh.as_block()) else {
         return tables;
@@ -152,11 +130,12 @@ fn tables_of(model: &Model, layout: &Layout) -> Tables {
             corners.entry(*node as u32).or_default().push(8 * slot + bits(signs) as u32);
         }
     };
-    for (station, cell, points) in clusters_of(opening) {
+    for Cluster { station, cell, points } in &opening.clusters {
+        let (station, cell) = (*station, *cell);
         let (place, middle, inverse) = cell_of(model, mesh, entry, cell as usize);
         let first = tables.points.len() as u32;
         for index in points {
-            let point = &opening.stations[station].points[index];
+            let point = &opening.stations[station].points[*index];
             let local = point.local - 0.5;
             tables.points.push([local.x as f32, local.y as f32, local.z as f32, point.volume as f32]);
         }
@@ -214,8 +193,7 @@ fn tables_of(model: &Model, layout: &Layout) -> Tables {
             ..OpeningStation::zeroed()
         });
     }
-    let all: std::collections::BTreeSet<u32> = corners.keys().chain(sections.keys()).copied().collect();
-    for node in all {
+    for node in opening.nodes.iter().copied() {
         let grid = mesh.node_coordinates(node as usize);
         let owned = layout.strips().owned_slot(grid, mesh.cells());
         let first = tables.entries.len() as u32;
