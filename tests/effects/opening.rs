@@ -130,14 +130,15 @@ fn both_engines_give_the_same_force() {
 
 #[test]
 fn a_tougher_tissue_is_cut_narrower_and_holds_the_needle_harder() {
+    // Nearly without change of volume, as the theory has it; at nu 0.473 400 J/m^2 take 4 % less.
     for toughness in ["100", "400"] {
-        let scene = scene(&[&format!("material.toughness_j_m2={toughness}")]);
+        let material = "material={c10_kpa=9.52, c01_kpa=4.14, poisson_ratio=0.49, toughness_j_m2=";
+        let scene = scene(&[&format!("{material}{toughness}}}")]);
         let expected = predicted(&scene).tip_force;
         let frames = frames(scene, engines_here().pop().unwrap());
         let force = mean(&frames, 4e-3, 6.4e-3, |f| f.force.axial);
         println!("{toughness} J/m^2: {force:.4} N, theory {expected:.4} N");
-        // The theory has incompressible tissue; with nu 0.473 the pressure on a hole of R/25 is a tenth lower (on R/5 4 %).
-        close("steady force", force, expected, 0.05);
+        close("steady force", force, expected, 0.03);
     }
 }
 
