@@ -310,7 +310,10 @@ fn describe_parameters(effect: &Effect, numbers: &Numbers) -> String {
             let cutting = stated(p.cutting_force, p.cutting_stated);
             if p.scheme == SchemeWord::Opening {
                 let stiffness = four_digits(p.tip_stiffness * 1e-3);
-                return format!("scheme opening, puncture {puncture}, cutting {cutting}, tip stiffness {stiffness} N/mm");
+                return format!(
+                    "scheme opening (pictures and fields show the closed path), puncture {puncture}, cutting {cutting}, tip stiffness \
+                     {stiffness} N/mm"
+                );
             }
             format!(
                 "puncture {puncture}, cutting {cutting}, transition {} mm, tip stiffness {} N/mm, softened radius {} mm, ring {} mm",

@@ -57,7 +57,8 @@ pub fn snapshot(
         ToolPose { tip: pose.tip - pose.direction * record.needle.retreat, ..pose }
     });
     fields.tool_pose = pose.map(|pose| (pose.tip, pose.direction));
-    let cuts = pose.filter(|_| model.puncture.is_some());
+    // Where the path is opened by a map, the cells are those of the closed one: no tissue is within the needle.
+    let cuts = pose.filter(|_| model.puncture.is_some() && model.opening().is_none());
     fields.cells_in_needle = cuts.map(|pose| cells_in_needle(model, &state, &pose, line.as_ref()));
     let targets = model.scene.targets.iter().zip(&model.targets);
     fields.targets = targets.map(|(target, point)| target.position + point.value(&state.displacement)).collect();
