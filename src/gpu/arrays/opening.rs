@@ -13,7 +13,7 @@ use super::{Array, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
 use crate::gpu::layout::Layout;
 use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::Model;
-use crate::model::opening::Cluster;
+use crate::model::opening::{Cluster, OpeningPlan};
 
 pub(super) const ARRAYS: &[Array] = &[
     Array::constant("opening", |s| bytes_of(&[params(s.model, s.dt)])),
@@ -115,13 +115,24 @@ fn cell_of(model: &Model, mesh: &BlockMesh, entry: DVec3, cell: usize) -> ([u32;
     ([i, j, k, model.material_index(cell) as u32], vec4(middle), vec4(1.0 / mesh.cell_size(cell)))
 }
 
+/// What the slots tell: those of a station with their weights, and the corners of a node.
+struct Told {
+    stations: Vec<Vec<(u32, f32)>>,
+    corners: BTreeMap<u32, Vec<u32>>,
+}
+
 pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
     let mut tables = Tables::default();
     let (Some(opening), Some(plan), Some(mesh)) = (model.opening(), &model.puncture, model.mesh.as_block()) else {
         return tables;
     };
-    let entry = plan.path.entry;
-    // What every slot tells: the slots of a station with their weights, the corners of a node.
+    let told = slots(&mut tables, model, opening, mesh, plan.path.entry);
+    lists(&mut tables, opening, mesh, layout, &told);
+    tables
+}
+
+/// Clusters and cells, one slot each.
+fn slots(tables: &mut Tables, model: &Model, opening: &OpeningPlan, mesh: &BlockMesh, entry: DVec3) -> Told {
     let mut told: Vec<Vec<(u32, f32)>> = vec![Vec::new(); opening.stations.len()];
     let mut corners: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     let mut slot = 0u32;
@@ -164,6 +175,11 @@ pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
         corners_of(near.cell as usize, slot);
         slot += 1;
     }
+    Told { stations: told, corners }
+}
+
+/// Stations and nodes, with the lists of what they are made of.
+fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &Layout, told: &Told) {
     let mut sections: BTreeMap<u32, Vec<(u32, f32, f32)>> = BTreeMap::new();
     for (index, station) in opening.stations.iter().enumerate() {
         let mut weights: BTreeMap<u32, (f32, f32)> = BTreeMap::new();
@@ -179,7 +195,7 @@ pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
             sections.entry(node).or_default().push((index as u32, centre, disc));
         }
         let middle = tables.entries.len() as u32;
-        tables.entries.extend(told[index].iter().map(|(slot, w)| OpeningEntry {
+        tables.entries.extend(told.stations[index].iter().map(|(slot, w)| OpeningEntry {
             index: *slot,
             first: *w,
             second: 0.0,
@@ -197,7 +213,7 @@ pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
         let grid = mesh.node_coordinates(node as usize);
         let owned = layout.strips().owned_slot(grid, mesh.cells());
         let first = tables.entries.len() as u32;
-        let corners = corners.get(&node).into_iter().flatten();
+        let corners = told.corners.get(&node).into_iter().flatten();
         tables.entries.extend(corners.map(|c| OpeningEntry { index: *c, ..OpeningEntry::zeroed() }));
         let middle = tables.entries.len() as u32;
         let sections = sections.get(&node).into_iter().flatten();
@@ -210,5 +226,4 @@ pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
         let end = tables.entries.len() as u32;
         tables.nodes.push(OpeningNode { numbers: [owned, first, middle, middle], more: [end, 0, 0, 0] });
     }
-    tables
 }
