@@ -17,6 +17,10 @@ struct OpeningParams {
     counts: vec4<u32>,
     // Half of the stations over which the normal force is averaged; the others unused.
     averaged: vec4<u32>,
+    // Length over which the surface closes behind a tip that has entered [m]; the others unused.
+    surface: vec4<f32>,
+    // Table of the dimple: root of the force [N^(1/2)], depth u [m], its slope up to the next row, energy V [J].
+    dimple: array<vec4<f32>, 26>,
 }
 
 // A section of the path. The first three are known before the run.
@@ -60,15 +64,28 @@ struct OpeningSum {
 struct OpeningRecord {
     // Impulse on the tissue [N s]; w: work of the tool in the last step with the velocity ahead [J].
     impulse: vec4<f32>,
-    // Angular impulse about the tip [N m s]; w unused.
+    // Angular impulse about the tip [N m s]; w: sum of the normal forces on the shaft times the time [N s].
     angular_impulse: vec4<f32>,
     // Impulse along the needle of spreading and of friction [N s], work of the tool [J], dissipated by friction [J].
     parts: vec4<f32>,
-    // Force that opening takes per advance of the tip [N], energy in guide and stick springs [J]; z, w unused.
+    // Force that opening takes per advance of the tip [N], energy in guide and stick springs [J], force that spreads the path [N]; w unused.
     now: vec4<f32>,
+    // What the tip dissipated beyond what it was told before it advanced [J]; the others unused.
+    late: vec4<f32>,
 }
 
 @group(0) @binding(16) var<uniform> opening: OpeningParams;
+
+// Part p of the dimple that shifts a tip that has cut to the material coordinate a [m], and -p' [1/m].
+fn dimple_part(a: f32) -> f32 {
+    let x = clamp(a / opening.surface.x, 0.0, 1.0);
+    return (1.0 - x * x) * (1.0 - x * x);
+}
+
+fn dimple_closing(a: f32) -> f32 {
+    let x = clamp(a / opening.surface.x, 0.0, 1.0);
+    return 4.0 * x * (1.0 - x * x) / opening.surface.x;
+}
 
 // The path at one place, across it in R.
 struct PathSection {
@@ -103,13 +120,17 @@ fn across(v: vec3<f32>) -> vec3<f32> {
     return v - opening.direction.xyz * dot(v, opening.direction.xyz);
 }
 
+// Radius up to which the hole is exact, and over which it fades from there, in needle radii.
+const EXACT: f32 = 2.0;
+const WIDTH: f32 = 2.0;
+
 // w and its first and second derivative by s.
 fn fade(s: f32) -> vec3<f32> {
     let rho = sqrt(s);
-    let x = clamp((rho - 2.0) * 0.25, 0.0, 1.0);
+    let x = clamp((rho - EXACT) / WIDTH, 0.0, 1.0);
     let value = 1.0 - x * x * x * (10.0 - x * (15.0 - 6.0 * x));
-    let slope = -7.5 * x * x * (1.0 - x) * (1.0 - x);
-    let curvature = -3.75 * x * (1.0 - x) * (1.0 - 2.0 * x);
+    let slope = -30.0 / WIDTH * x * x * (1.0 - x) * (1.0 - x);
+    let curvature = -60.0 / (WIDTH * WIDTH) * x * (1.0 - x) * (1.0 - 2.0 * x);
     let inverse = 1.0 / max(s, 1.0);
     let first = 0.5 * slope * sqrt(inverse);
     return vec3<f32>(value, first, (0.25 * curvature - 0.5 * first) * inverse);

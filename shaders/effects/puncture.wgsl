@@ -89,6 +89,12 @@ struct TipState {
     gap: f32,
     // Dissipated in this frame beyond the threshold, while the cap on the advance holds the force above it [J].
     cap_dissipation: f32,
+    // In the scheme `opening`: depth of the dimple around the tip [m], force of the tip at its bottom [N].
+    dimple: f32,
+    touch_force: f32,
+    // How far it advanced in this step, and how far the dimple shifted the path with it [m].
+    advanced: f32,
+    shifted: f32,
     _pad0: f32,
 }
 
@@ -136,7 +142,11 @@ const ANCHOR_COUNT: u32 = 24u;
 #ifdef SLIT
 const ANCHOR_COUNT: u32 = 18u;
 #else
+#ifdef OPENING
+const ANCHOR_COUNT: u32 = 61u;
+#else
 const ANCHOR_COUNT: u32 = 19u;
+#endif
 #endif
 #endif
 

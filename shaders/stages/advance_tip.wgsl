@@ -10,7 +10,7 @@
 #import effects/adhesion
 #endif
 #ifdef OPENING
-#import effects/opening
+#import shared/tip_contact
 @group(3) @binding(23) var<storage, read> opening_record: OpeningRecord;
 #endif
 
@@ -21,6 +21,14 @@ var<workgroup> stretches: array<f32, ANCHOR_COUNT>;
 var<workgroup> losses: array<f32, ANCHOR_COUNT>;
 var<workgroup> distances: array<f32, ANCHOR_COUNT>;
 var<workgroup> coordinate: f32;
+#ifdef OPENING
+const LANES: u32 = 64u;
+// On all anchors alike; their mean distance before the advance [m].
+var<workgroup> mean_before: f32;
+var<workgroup> touch: SurfaceTouch;
+#else
+const LANES: u32 = 32u;
+#endif
 // Force of tissue that holds on to the tip [N] and the energy stored in it [J].
 var<workgroup> bond_force: f32;
 var<workgroup> bond_energy: f32;
@@ -78,7 +86,7 @@ fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     return place;
 }
 
-@compute @workgroup_size(32)
+@compute @workgroup_size(LANES)
 fn advance_tip(@builtin(local_invocation_index) lane: u32) {
     let anchor = min(lane, ANCHOR_COUNT - 1u);
     let spring = puncture.tip_stiffness / f32(ANCHOR_COUNT);
@@ -88,8 +96,9 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
 #ifdef OPENING
     // The tissue that the tip opens as it advances is strained at once.
     resistance = opening_record.now.x;
+    let spreading = opening_record.now.z;
 #endif
-    let threshold = tip_threshold(before, speed) + resistance;
+    var threshold = tip_threshold(before, speed) + resistance;
     var place = place_anchor(anchor, before);
     if (lane < ANCHOR_COUNT) {
         gaps[lane] = place.gap;
@@ -107,16 +116,28 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
             stretch += stretches[i];
             distance += distances[i];
         }
+#ifdef OPENING
+        let part = dimple_part(before);
+        mean_before = distance / f32(ANCHOR_COUNT);
+        touch = surface_touch(select(0.0, mean_before, before < puncture.exit), part, spreading);
+        threshold += dimple_closing(before) * touch.dimple * spreading;
+        let excess = touch.force - threshold;
+#else
         let excess = spring * gap - threshold;
+#endif
         var advance = 0.0;
         if (excess > 0.0) {
-            var cap = advance_limit(before == 0.0, speed * params.dt);
+            let lambda = clamp(stretch / f32(ANCHOR_COUNT), LEAST_STRETCH, MOST_STRETCH);
 #ifdef OPENING
             // No node can be left inside of the needle: a crack may run as fast as it will.
-            cap = max(opening.numbers.w, LEAST_TRAVELS * speed * params.dt);
-#endif
-            let lambda = clamp(stretch / f32(ANCHOR_COUNT), LEAST_STRETCH, MOST_STRETCH);
+            let cap = max(opening.numbers.w, LEAST_TRAVELS * speed * params.dt);
+            let long = surface_gap(touch.force, part, spreading) - surface_gap(threshold, part, spreading);
+            let closing = dimple_closing(before) * touch.dimple;
+            advance = min(max(long, 0.0) / max(lambda - closing, LEAST_STRETCH), cap);
+#else
+            let cap = advance_limit(before == 0.0, speed * params.dt);
             advance = min(excess / (puncture.tip_stiffness * lambda), cap);
+#endif
             capped = advance == cap;
         }
         coordinate = before + advance;
@@ -141,14 +162,32 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
     }
     workgroupBarrier();
     let after = coordinate;
-    let old_gap = place.gap;
+    let old = place;
     place = place_anchor(anchor, after);
+#ifdef OPENING
     if (lane < ANCHOR_COUNT) {
+        distances[lane] = place.distance;
+    }
+    workgroupBarrier();
+    if (lane == 0u) {
+        var distance = 0.0;
+        for (var i = 0u; i < ANCHOR_COUNT; i++) {
+            distance += distances[i];
+        }
+        touch = surface_touch(select(0.0, distance / f32(ANCHOR_COUNT), after < puncture.exit), dimple_part(after), spreading);
+    }
+    workgroupBarrier();
+#endif
+    if (lane < ANCHOR_COUNT) {
+#ifdef OPENING
+        let force = touch.force / f32(ANCHOR_COUNT);
+#else
         let force = spring * place.gap;
+        // Force after the advance times the loss of stretch (trapezoidal rule of the leapfrog work).
+        losses[lane] = force * (old.gap - place.gap);
+#endif
         gaps[lane] = place.gap;
         distances[lane] = place.distance;
-        // Force after the advance times the loss of stretch (trapezoidal rule of the leapfrog work).
-        losses[lane] = force * (old_gap - place.gap);
         tip_anchor_loads[lane].cell = vec4<u32>(place.cell, 0u);
         tip_anchor_loads[lane].local = vec4<f32>(place.local, 0.0);
         tip_anchor_loads[lane].force = force + bond_force / f32(ANCHOR_COUNT);
@@ -165,6 +204,20 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
             force += spring * gaps[i];
             distance += distances[i];
         }
+#ifdef OPENING
+        // Mean force of both steps times the way, less what is held now.
+        let held = touch_energy(touch);
+        let was = SurfaceTouch(tip_state.touch_force, tip_state.dimple);
+        let shifted = dimple_part(after) * touch.dimple - dimple_part(before) * was.dimple;
+        lost = 0.5 * (was.force + touch.force) * (mean_before - tip_state.gap) + spreading * shifted
+            - (held - touch_energy(was));
+        stored = bond_energy + held;
+        force = touch.force;
+        tip_state.touch_force = touch.force;
+        tip_state.advanced = after - before;
+        tip_state.shifted = select(0.0, shifted, after > before);
+        tip_state.dimple = touch.dimple;
+#endif
         tip_state.coordinate = after;
         tip_state.spring_energy = stored;
         tip_state.gap = distance / f32(ANCHOR_COUNT);

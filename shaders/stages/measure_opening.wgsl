@@ -63,5 +63,6 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
         opening_record.impulse = vec4<f32>(0.0);
         opening_record.angular_impulse = vec4<f32>(0.0);
         opening_record.parts = vec4<f32>(0.0);
+        opening_record.late = vec4<f32>(0.0);
     }
 }

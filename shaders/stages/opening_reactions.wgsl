@@ -2,7 +2,9 @@
 // One workgroup. Equations: CpuEngine::station_reactions.
 #import shared/params
 #import shared/step_input
+#import effects/puncture
 #import effects/opening
+#import shared/tip_read
 
 @group(1) @binding(22) var<storage, read> path_entries: array<OpeningEntry>;
 @group(3) @binding(20) var<storage, read_write> path_stations: array<OpeningStation>;
@@ -42,6 +44,8 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
     var along = vec4<f32>(0.0);
     var aside = vec4<f32>(0.0);
     var turning = vec3<f32>(0.0);
+    // Sum of the normal forces on the shaft.
+    var squeezed = 0.0;
     for (var i = lane; i < count; i += 64u) {
         let now = path_stations[i];
         // By the centre and by rc with all that follows from them.
@@ -80,9 +84,10 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         var stick = now.rubbing.z;
         var rubbing = 0.0;
         var bound = 0.0;
+        let squeeze = max(normal, 0.0) * clamp((now.place.x - opening.entry.w) / opening.friction.z, 0.0, 1.0) * now.place.y;
+        squeezed += squeeze;
 #ifdef FRICTION
-        let part = clamp((now.place.x - opening.entry.w) / opening.friction.z, 0.0, 1.0) * now.place.y;
-        let limit = opening.friction.x * max(normal, 0.0) * part;
+        let limit = opening.friction.x * squeeze;
         let kt = opening.friction.y;
         let trial = stick + (now.rubbing.y - dot(step_input.velocity.xyz, t)) * params.dt;
         let allowed = limit / kt;
@@ -101,20 +106,24 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
     }
     parts[lane] = along;
     lateral[lane] = aside;
-    torque[lane] = vec4<f32>(turning, 0.0);
+    torque[lane] = vec4<f32>(turning, squeezed);
     workgroupBarrier();
     if (lane == 0u) {
         for (var i = 1u; i < 64u; i++) {
             along += parts[i];
             aside += lateral[i];
             turning += torque[i].xyz;
+            squeezed += torque[i].w;
         }
         let dt = params.dt;
         let total = t * (along.x + along.y) + aside.xyz;
         let impulse = opening_record.impulse.xyz + total * dt;
         opening_record.impulse = vec4<f32>(impulse, dot(total, step_input.velocity_ahead.xyz) * dt);
-        opening_record.angular_impulse += vec4<f32>(turning * dt, 0.0);
+        opening_record.angular_impulse += vec4<f32>(turning * dt, squeezed * dt);
         opening_record.parts += vec4<f32>(along.x * dt, along.y * dt, dot(total, step_input.velocity.xyz) * dt, along.z);
-        opening_record.now = vec4<f32>(aside.w, along.w, 0.0, 0.0);
+        // The tip was told what the path took before it advanced: half of what that changed by comes off.
+        let told = opening_record.now;
+        opening_record.late.x += 0.5 * ((along.x - told.z) * tip_state.shifted - (aside.w - told.x) * tip_state.advanced);
+        opening_record.now = vec4<f32>(aside.w, along.w, along.x, 0.0);
     }
 }

@@ -18,6 +18,7 @@ fn opening_stations(@builtin(local_invocation_index) lane: u32) {
     let count = opening.counts.x;
     let spacing = opening.numbers.x;
     let tip_length = opening.entry.w;
+    let shift = dimple_part(tip_state.coordinate) * tip_state.dimple;
     for (var i = lane; i < count; i += 64u) {
         let depth = path_stations[i].depth;
         let lists = path_stations[i].lists;
@@ -31,7 +32,7 @@ fn opening_stations(@builtin(local_invocation_index) lane: u32) {
             moved += dot(u, t) * entry.second;
             speed += dot(node_velocity[entry.index].xyz, t) * entry.second;
         }
-        let behind = step_input.depth - depth.x - moved;
+        let behind = step_input.depth - depth.x - moved - shift;
         let part = (tip_state.coordinate - depth.y) / spacing + 0.5;
         let cut = clamp(part, 0.0, 1.0);
         let rate = select(0.0, 1.0 / spacing, part > 0.0 && part < 1.0);

@@ -5,6 +5,7 @@ use crate::effects::TissueMaterial;
 use crate::effects::puncture::{Cutting, Params, SchemeWord};
 use crate::material::describe_constants;
 use crate::needle::{NeedleShape, TipShape, Tool};
+use crate::penetration::surface::Surface;
 use crate::penetration::{Ring, Steady};
 use crate::scene::Scene;
 use crate::units::four_digits;
@@ -95,6 +96,10 @@ fn describe_one(
             n(slope)
         ),
         format!("puncture force (n + 1) F_tip = {} N, {exponent}; {puncture}", n(steady.puncture_force)),
+        format!(
+            "depth of the tip at that force, on a half space: sqrt(F pi (1 - nu^2)/(2 c E tan(alpha))) = {} mm",
+            mm(Surface::new(&material.law, needle).depth(steady.puncture_force))
+        ),
         format!("cutting force of the tip springs F_tip - U of that hole = {} N; {cutting}", n(steady.cutting_force)),
         format!(
             "at {} mm: F_tip + mu_f N (depth - tip of {} mm) = {} N",

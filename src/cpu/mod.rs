@@ -26,6 +26,7 @@ use crate::material_point::PointState;
 use crate::model::Model;
 use crate::needle::ToolPose;
 use crate::needle::centre_line::CentreLine;
+use crate::needle::tip_contact::Touch;
 use crate::scene::Face;
 
 /// Sums of one contact node over one step.
@@ -63,6 +64,8 @@ pub struct CpuEngine {
     /// Force across the needle on every anchor of a free tip [N].
     tip_sway: DVec3,
     contact_energy: f64,
+    /// In the scheme `opening`: how far the tip advanced in this step, and how far the dimple shifted the path with it [m].
+    advanced: [f64; 2],
     /// Elastic energy that the scheme `opening` added in the last step [J].
     opening_elastic: f64,
     /// What the points have dissipated and earlier frames have told.
@@ -90,6 +93,8 @@ impl CpuEngine {
             contact: vec![ContactState::default(); model.contact_nodes.len()],
             stations: vec![0.0; model.opening().map_or(0, |o| o.stations.len())],
             opening_resistance: 0.0,
+            opening_spreading: 0.0,
+            touch: Touch::default(),
             pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },
         }
@@ -122,6 +127,7 @@ impl CpuEngine {
             tip_energy: 0.0,
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
+            advanced: [0.0; 2],
             opening_elastic: 0.0,
             booked: FrameEnergies::default(),
             centre_line: None,

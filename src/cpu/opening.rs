@@ -73,12 +73,13 @@ impl CpuEngine {
         let mesh = self.model.mesh.block();
         let (u, a) = (&self.state.displacement, self.state.tip_coordinate);
         let t = plan.path.direction;
+        let shift = plan.contact.as_ref().map_or(0.0, |c| c.part(a)) * self.state.touch.dimple;
         let mut now: Vec<Now> = opening
             .stations
             .par_iter()
             .map(|station| {
                 let centre = mean_place(&station.centre, &station.nodes, mesh, u);
-                let behind = (tip - mean_place(&station.disc, &station.nodes, mesh, u)).dot(t);
+                let behind = (tip - mean_place(&station.disc, &station.nodes, mesh, u)).dot(t) - shift;
                 let (full, slope) = opening.radius(behind);
                 let (cut, cut_rate) = opening.cut(station, a);
                 let section = Station { centre, radius: full * cut, ..Station::default() };
@@ -163,11 +164,18 @@ impl CpuEngine {
             centre[behind] += rate * by;
             centre[before] -= rate * by;
         }
+        let old = [self.state.opening_resistance, self.state.opening_spreading];
         self.state.opening_resistance = now.iter().zip(&radius).map(|(n, r)| r * n.full * n.cut_rate).sum();
+        self.state.opening_spreading = now.iter().zip(&radius).map(|(n, r)| r * n.slope * n.cut).sum();
+        // The tip was told what the path took before it advanced: half of what that changed by comes off.
+        let [advance, shift] = self.advanced;
+        self.sums.energy.tip += 0.5 * (self.state.opening_spreading - old[1]) * shift
+            - 0.5 * (self.state.opening_resistance - old[0]) * advance;
         let normal = averaged_normal(opening, now, sums);
         let velocity = &self.state.velocity;
         let mut stored = 0.0;
         let mut booked = ContactSums::default();
+        let friction = model.effects.friction.unwrap_or_default();
         for (i, station) in opening.stations.iter().enumerate() {
             let n = &now[i];
             let aside = n.section.centre - pose.tip;
@@ -181,10 +189,12 @@ impl CpuEngine {
                 station.disc.iter().map(|(p, w)| velocity[station.nodes[usize::from(*p)] as usize] * *w).sum();
             let mut rubbing = 0.0;
             let memory = &mut self.state.stations[i];
-            if let Some(friction) = model.effects.friction {
-                let on_shaft =
-                    crate::effects::friction::part_on_shaft(n.behind, opening.tip_length, friction.fade_length) * n.cut;
-                let limit = friction.coefficient * normal[i].max(0.0) * on_shaft;
+            let on_shaft =
+                crate::effects::friction::part_on_shaft(n.behind, opening.tip_length, friction.fade_length) * n.cut;
+            let squeeze = normal[i].max(0.0) * on_shaft;
+            self.sums.shaft_normal_impulse += squeeze * self.dt;
+            if model.effects.friction.is_some() {
+                let limit = friction.coefficient * squeeze;
                 let kt = friction.stiffness_ratio * opening.stick;
                 let motion = (mean_velocity - pose.velocity).dot(t) * self.dt;
                 let (old, trial) = (*memory, *memory + motion);

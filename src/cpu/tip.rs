@@ -9,6 +9,7 @@ use crate::engine::elements::CellStates;
 use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::PuncturePlan;
 use crate::needle::ToolPose;
+use crate::needle::tip_contact::Touch;
 
 /// An anchor at the material coordinate of the tip.
 struct PlacedAnchor {
@@ -19,6 +20,32 @@ struct PlacedAnchor {
     stretch: f64,
     nodes: [usize; 8],
     weights: [f64; 8],
+}
+
+/// What the tip does to its anchors.
+struct TipLoads {
+    /// Force on all and on each of them [N], and what their springs hold [J].
+    force: f64,
+    each: Vec<f64>,
+    stored: f64,
+    /// In the scheme `opening`, where all carry the same; else each has its own spring.
+    touch: Touch,
+}
+
+impl TipLoads {
+    /// With the tip at `a` [m], the stiffness `spring` per anchor [N/m] and the force that spreads the opened path [N].
+    fn new(plan: &PuncturePlan, spring: f64, anchors: &[PlacedAnchor], a: f64, spreading: f64) -> Self {
+        let Some(contact) = &plan.contact else {
+            let each: Vec<f64> = anchors.iter().map(|p| spring * p.gap).collect();
+            let stored = anchors.iter().map(|p| 0.5 * spring * p.gap * p.gap).sum();
+            return TipLoads { force: each.iter().sum(), each, stored, touch: Touch::default() };
+        };
+        let count = anchors.len() as f64;
+        let gap = anchors.iter().map(|p| p.distance).sum::<f64>() / count;
+        let touch = contact.touch(if a < plan.exit { gap } else { 0.0 }, contact.part(a), spreading);
+        let each = vec![touch.force / count; anchors.len()];
+        TipLoads { force: touch.force, each, stored: contact.stored(touch), touch }
+    }
 }
 
 impl CpuEngine {
@@ -69,49 +96,68 @@ impl CpuEngine {
                 .collect()
         };
         let mean_distance = |anchors: &[PlacedAnchor]| anchors.iter().map(|p| p.distance).sum::<f64>() / count;
+        let spreading = self.state.opening_spreading;
+        let loads = |anchors: &[PlacedAnchor], a: f64| TipLoads::new(plan, spring, anchors, a, spreading);
         let a = self.state.tip_coordinate;
         let mut anchors = place(&self.state.displacement, a);
         let bond_force = match model.effects.adhesion {
             Some(adhesion) => self.advance_bond(&adhesion, mean_distance(&anchors), a > 0.0 && a < plan.exit),
             None => 0.0,
         };
-        let force: f64 = anchors.iter().map(|p| spring * p.gap).sum();
+        let mut now = loads(&anchors, a);
         let p = &plan.params;
         let speed = pose.velocity.length();
         // The tissue that the tip opens as it advances is strained at once.
         let resistance = self.state.opening_resistance;
-        let threshold = plan.threshold(a) * p.rate_factor(speed) + resistance;
-        if force > threshold {
-            let lambda = anchors.iter().map(|p| p.stretch).sum::<f64>() / count;
-            let cap = match &plan.opening {
-                Some(opening) => opening.advance_limit(speed * self.dt, self.dt),
-                None => advance_limit(a == 0.0, speed * self.dt),
+        let closing = plan.contact.as_ref().map_or(0.0, |c| c.closing(a) * now.touch.dimple * spreading);
+        let threshold = plan.threshold(a) * p.rate_factor(speed) + resistance + closing;
+        self.advanced = [0.0; 2];
+        if now.force > threshold {
+            let lambda = bounded_stretch(anchors.iter().map(|p| p.stretch).sum::<f64>() / count);
+            let (advance, cap) = match (&plan.opening, &plan.contact) {
+                (Some(opening), Some(contact)) => {
+                    let cap = opening.advance_limit(speed * self.dt, self.dt);
+                    (contact.advance(now.touch, threshold, a, spreading, lambda, cap), cap)
+                }
+                _ => {
+                    let cap = advance_limit(a == 0.0, speed * self.dt);
+                    (tip_advance(now.force, threshold, p.tip_stiffness, lambda, cap), cap)
+                }
             };
-            let advance = tip_advance(force, threshold, p.tip_stiffness, bounded_stretch(lambda), cap);
             self.state.tip_coordinate = a + advance;
             let before = anchors;
             anchors = place(&self.state.displacement, a + advance);
-            // Force after the advance times the loss of stretch: with the force of the next step this closes the
-            // trapezoidal rule of the leapfrog work; the loss of spring energy would count half a step twice.
-            let lost: f64 = before.iter().zip(&anchors).map(|(b, p)| spring * p.gap * (b.gap - p.gap)).sum();
-            let force = anchors.iter().map(|p| spring * p.gap).sum();
-            let beyond = if advance == cap { puncture::share_beyond(force, threshold) } else { 0.0 };
+            now = loads(&anchors, a + advance);
+            let lost = match &plan.contact {
+                Some(contact) => {
+                    let (old, new) = (self.state.touch, now.touch);
+                    let way = mean_distance(&before) - self.state.bond.gap;
+                    let shift = contact.part(a + advance) * new.dimple - contact.part(a) * old.dimple;
+                    self.advanced = [advance, shift];
+                    contact.dissipated(old, new, way, shift, spreading)
+                }
+                // Force after the advance times the loss of stretch: with the force of the next step this closes the
+                // trapezoidal rule of the leapfrog work; the loss of spring energy would count half a step twice.
+                None => before.iter().zip(&anchors).map(|(b, p)| spring * p.gap * (b.gap - p.gap)).sum(),
+            };
+            let beyond = if advance == cap { puncture::share_beyond(now.force, threshold) } else { 0.0 };
             self.sums.energy.tip += lost * (1.0 - beyond) - resistance * advance;
             self.sums.energy.advance_cap += lost * beyond;
         }
+        self.state.touch = now.touch;
         self.state.bond.gap = mean_distance(&anchors);
         let bond_energy = model.effects.adhesion.map_or(0.0, |p| 0.5 * p.stiffness * self.state.bond.stretch.powi(2));
-        self.tip_energy = anchors.iter().map(|p| 0.5 * spring * p.gap * p.gap).sum::<f64>() + bond_energy;
+        self.tip_energy = now.stored + bond_energy;
         // Contact books the whole force of the anchors as cutting; what is not comes off here.
         let membrane = match plan.segment(self.state.tip_coordinate).membrane {
-            true => anchors.iter().map(|p| spring * p.gap).sum::<f64>() * self.dt,
+            true => now.force * self.dt,
             false => 0.0,
         };
         self.sums.membrane_impulse += membrane;
         self.sums.adhesion_impulse += bond_force * self.dt;
         self.sums.cutting_impulse -= membrane + bond_force * self.dt;
-        self.tip_forces =
-            anchors.into_iter().map(|p| (spring * p.gap + bond_force / count, p.nodes, p.weights)).collect();
+        let each = now.each.into_iter().map(|f| f + bond_force / count);
+        self.tip_forces = anchors.into_iter().zip(each).map(|(p, f)| (f, p.nodes, p.weights)).collect();
     }
 
     /// Moves the bond between tip and tissue by what the tip has moved against its anchors, `distance` on average; returns

@@ -138,6 +138,8 @@ pub struct FrameSums {
     pub shaft_impulse: f64,
     /// Friction [N s].
     pub friction_impulse: f64,
+    /// Normal force of the tissue on the shaft, summed along it, times the time: in the scheme `opening` [N s].
+    pub shaft_normal_impulse: f64,
     /// Whole impulse [N s] and angular impulse about the tip [N m s], world frame.
     pub impulse: DVec3,
     /// About the tip, world frame [N m s].

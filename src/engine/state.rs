@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::effects::adhesion::Bond;
 use crate::material_point::PointState;
 use crate::needle::free_path::FreeTip;
+use crate::needle::tip_contact::Touch;
 
 /// The state that both engines can give and take, in f64 and SI, node order of the mesh.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -31,6 +32,10 @@ pub struct State {
     pub stations: Vec<f64>,
     /// Force that opening took per advance of the tip in the last step, in the scheme `opening` [N].
     pub opening_resistance: f64,
+    /// Force along the needle with which the tip spread the opened path in the last step, in the scheme `opening` [N].
+    pub opening_spreading: f64,
+    /// The tip on the surface, in the scheme `opening`.
+    pub touch: Touch,
     /// Damage D of every pair of copies that may separate.
     pub pairs: Vec<f64>,
     /// History per cell; empty without `plasticity` and `viscoelastic`.

@@ -206,6 +206,10 @@ shared_structs! {
         bond_slid: f32,
         gap: f32,
         cap_dissipation: f32,
+        dimple: f32,
+        touch_force: f32,
+        advanced: f32,
+        shifted: f32,
         _pad0: f32,
     }
     /// shaders/effects/puncture.wgsl
@@ -227,6 +231,8 @@ shared_structs! {
         friction: [f32; 4],
         counts: [u32; 4],
         averaged: [u32; 4],
+        surface: [f32; 4],
+        dimple: [[f32; 4]; 26],
     }
     /// shaders/effects/opening.wgsl
     struct OpeningStation {
@@ -259,6 +265,7 @@ shared_structs! {
         angular_impulse: [f32; 4],
         parts: [f32; 4],
         now: [f32; 4],
+        late: [f32; 4],
     }
     /// shaders/shared/opening_cluster.wgsl
     struct OpeningCluster {

@@ -87,6 +87,7 @@ impl Model {
         let path = PlannedPath { entry: motion.entry, direction: motion.direction };
         self.puncture = Some(PuncturePlan {
             opening: None,
+            contact: None,
             free: Some(FreePlan { low, count, cuttings: cuttings.map(cutting).collect() }),
             segments: vec![PathSegment {
                 start: 0.0,

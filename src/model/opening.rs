@@ -24,10 +24,10 @@ const RADII: usize = 8;
 const LEAST_ANGLES: f64 = 8.0;
 
 /// Most that the tip advances in a step, in distances of stations.
-const ADVANCE: f64 = 0.25;
+const ADVANCE: f64 = 0.5;
 
 /// Largest speed of a crack, in speeds of shear waves of the scaled mass.
-const CRACK_SPEED: f64 = 0.2;
+const CRACK_SPEED: f64 = 0.3;
 
 /// How far the stations go beyond the deepest place of the tip, in needle radii.
 const BEYOND: f64 = 1.5;
@@ -137,7 +137,7 @@ impl OpeningPlan {
         }
     }
 
-    /// How far the tip may advance in a step of `dt` [s] in which the needle travels `travel` [m]: a crack runs at a fifth of the speed of
+    /// How far the tip may advance in a step of `dt` [s] in which the needle travels `travel` [m]: a crack runs at two fifths of the speed of
     /// shear waves at most (a faster one lets the tissue snap back beyond the speed limit of the nodes), and stations open one after the
     /// other. No node can be left inside of the needle here, so the speed of the needle is no limit.
     pub fn advance_limit(&self, travel: f64, dt: f64) -> f64 {

@@ -11,7 +11,9 @@ use crate::effects::puncture::{Cutting, SchemeWord, left_before_exit};
 use crate::mesh::{BlockMesh, Bore};
 use crate::needle::gap::Profile;
 use crate::needle::slit::REFERENCE_EDGE;
+use crate::needle::tip_contact::{DISC, TipContact};
 use crate::needle::{NeedleShape, PlannedPath, Tool, lateral_axes};
+use crate::penetration::surface::Surface;
 use crate::scene::Scene;
 
 /// Most stretches of one path.
@@ -20,8 +22,11 @@ pub const LARGEST_SEGMENT_COUNT: usize = 16;
 /// Number of tip springs of a solid needle on a path without a slit: one on the axis, 6 at R/2, 12 at R.
 pub const ANCHOR_COUNT: usize = 19;
 
-/// Most tip springs: those of a cutting ring.
-pub const LARGEST_ANCHOR_COUNT: usize = 24;
+/// Rings of anchors around the one on the axis, in the scheme `opening`: each has six more than the one within it.
+const RINGS: usize = 4;
+
+/// Most anchors: those of the scheme `opening`.
+pub const LARGEST_ANCHOR_COUNT: usize = 1 + 3 * RINGS * (RINGS + 1);
 
 /// Rest radius of the hole over that of the needle in a material of unknown toughness: scene files are refused for it, a program that
 /// builds its scene is not.
@@ -29,6 +34,9 @@ const UNKNOWN_HOLE: f64 = 0.1;
 
 /// Distance of the tip springs of a cutting ring from its edge, on either side [m].
 const CUTTING_RING: f64 = 0.2e-3;
+
+/// Step along the path in which its materials are told apart [m].
+const SEGMENT_STEP: f64 = 2.0e-5;
 
 /// A cell that the opened path passes through.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,6 +96,8 @@ pub struct PuncturePlan {
     pub free: Option<FreePlan>,
     /// The scheme that carries the tissue beside the path by points.
     pub opening: Option<OpeningPlan>,
+    /// In that scheme the tip on the surface.
+    pub contact: Option<TipContact>,
 }
 
 impl PuncturePlan {
@@ -149,8 +159,14 @@ impl Model {
         };
         let exit = self.scene.tissue.size.z / -path.direction.z;
         let surfaces = self.separated_surfaces(&path);
-        // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the needle radius.
-        let anchor_reach = needle.radius + self.scene.tissue.cell_size * 1.5;
+        let opening = params.scheme == SchemeWord::Opening;
+        let anchors = match opening {
+            true => disc_anchors(&path, &needle),
+            false => tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
+        };
+        // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the outermost anchor.
+        let outermost = if opening { DISC * needle.radius } else { needle.radius };
+        let anchor_reach = outermost + self.scene.tissue.cell_size * 1.5;
         let cohesive = self.cohesion.is_some();
         self.contact_nodes = (0..mesh.node_count())
             .filter_map(|node| {
@@ -173,7 +189,7 @@ impl Model {
         self.puncture = Some(PuncturePlan {
             segments: path_segments(&self.scene, &params, &needle, &path, exit),
             exit,
-            anchors: tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
+            anchors,
             cells,
             contact_stiffness,
             ring_stiffness_per_volume: self.ring_stiffness_per_volume(params.contact_stiffness_factor),
@@ -184,8 +200,9 @@ impl Model {
             path,
             free: None,
             opening: None,
+            contact: None,
         });
-        if params.scheme == SchemeWord::Opening {
+        if opening {
             self.plan_opening();
         }
     }
@@ -207,8 +224,16 @@ impl Model {
                 hole: &|depth| plan.segment(depth.max(0.0)).hole,
             },
         );
-        self.puncture.as_mut().expect("planned above").opening = Some(opening);
+        let below = plan.path.entry + plan.path.direction * SEGMENT_STEP;
+        let region = self.scene.regions.iter().rposition(|r| r.shape.contains(below));
+        let material = region.map_or(&self.scene.material, |r| &self.scene.regions[r].material);
+        let surface = Surface::new(&material.law, &plan.needle);
+        let puncture_force = plan.segments[0].cutting.puncture_force;
+        let contact =
+            TipContact::new(plan.params.tip_stiffness, puncture_force, surface.most_force(), |f| surface.unresolved(f));
         let plan = self.puncture.as_mut().expect("planned above");
+        plan.opening = Some(opening);
+        plan.contact = Some(contact);
         plan.cells.clear();
         self.contact_nodes.iter_mut().for_each(|c| c.pushed = false);
     }
@@ -254,13 +279,12 @@ fn path_segments(
     path: &PlannedPath,
     exit: f64,
 ) -> Vec<PathSegment> {
-    const STEP: f64 = 2.0e-5;
     let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
     let mut starts: Vec<(f64, Option<usize>)> = Vec::new();
-    for i in 0..(exit / STEP).ceil().max(1.0) as usize {
+    for i in 0..(exit / SEGMENT_STEP).ceil().max(1.0) as usize {
         // The surface itself belongs to what lies under it.
-        let a = i as f64 * STEP;
-        let x = path.entry + path.direction * (a + 0.5 * STEP);
+        let a = i as f64 * SEGMENT_STEP;
+        let x = path.entry + path.direction * (a + 0.5 * SEGMENT_STEP);
         let region = scene.regions.iter().rposition(|r| r.shape.contains(x));
         if starts.last().is_none_or(|(_, last)| *last != region) {
             starts.push((a, region));
@@ -317,14 +341,33 @@ fn tip_anchors(path: &PlannedPath, needle: &NeedleShape, cohesive: bool) -> Vec<
             centre.into_iter().chain(ring(6, 0.5 * radius)).chain(ring(12, radius)).collect()
         }
     };
-    offsets
-        .into_iter()
-        .map(|o| {
-            // The line entry + o + t s meets z = 0 at s = -o.z / t.z.
-            let axial_offset = -o.z / path.direction.z;
-            TipAnchor { surface: path.entry + o + path.direction * axial_offset, axial_offset }
+    offsets.into_iter().map(|o| anchor_beside(path, o)).collect()
+}
+
+/// Lines on which the tip acts in the scheme `opening`: each stands for the same part of a disc of the radius [`DISC`] R.
+fn disc_anchors(path: &PlannedPath, needle: &NeedleShape) -> Vec<TipAnchor> {
+    let (e1, e2) = lateral_axes(path.direction);
+    let within = |ring: usize| (1 + 3 * ring * (ring + 1)) as f64;
+    let offsets = (0..=RINGS).flat_map(|ring| {
+        // Half of the area of the ring lies within this radius.
+        let radius = match ring {
+            0 => 0.0,
+            _ => DISC * needle.radius * (0.5 * (within(ring - 1) + within(ring)) / within(RINGS)).sqrt(),
+        };
+        let count = (6 * ring).max(1);
+        (0..count).map(move |i| {
+            let angle = std::f64::consts::TAU * i as f64 / count as f64;
+            (e1 * angle.cos() + e2 * angle.sin()) * radius
         })
-        .collect()
+    });
+    offsets.map(|o| anchor_beside(path, o)).collect()
+}
+
+/// The anchor whose line runs at `offset` [m] from the path.
+fn anchor_beside(path: &PlannedPath, offset: DVec3) -> TipAnchor {
+    // The line entry + offset + t s meets z = 0 at s = -offset.z / t.z.
+    let axial_offset = -offset.z / path.direction.z;
+    TipAnchor { surface: path.entry + offset + path.direction * axial_offset, axial_offset }
 }
 
 /// Cells that lie partly within a0 of the path, with the volume fraction found from 10^3 sample points.

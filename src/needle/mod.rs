@@ -9,6 +9,7 @@ pub mod motion;
 pub mod opening;
 mod shape;
 pub mod slit;
+pub mod tip_contact;
 
 use glam::DVec3;
 

@@ -5,7 +5,7 @@
 //! ```text
 //! eta = (y - c) - t t.(y - c),  s = |eta|^2
 //! x = y + (g - 1) eta,  g^2 = 1 + rc^2 v(s),  v = w(sqrt(s)) / (s + s0)
-//! w = 1 up to 2R, then a quintic to 0 at 6R
+//! w = 1 up to 2R, then a quintic to 0 at 4R
 //! ```
 //! With `w = 1` the map keeps every volume: a hole of no width becomes one of the radius rc. The path at the material coordinate Z has its
 //! centre in c(Z) and its radius in rc(Z), so with `H = P F_h - c_Z t0^T` (P takes out the part along t, F_h = grad y)
@@ -20,7 +20,7 @@ use glam::{DMat3, DVec3};
 /// Radius up to which the hole is exact, and radius beyond which nothing of it is left, in needle radii.
 pub const EXACT: f64 = 2.0;
 /// See [`EXACT`].
-pub const FADED: f64 = 6.0;
+pub const FADED: f64 = 4.0;
 
 /// The path at one material coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

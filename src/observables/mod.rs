@@ -27,6 +27,9 @@ pub struct ForceParts {
     pub friction: f64,
     /// Tissue that sticks to the tip [N].
     pub adhesion: f64,
+    /// Normal force of the tissue on the shaft, summed along it; it is no part of the axial force. Zero but in the scheme `opening` [N].
+    #[serde(default)]
+    pub shaft_normal: f64,
     /// Mass of the needle times the acceleration of its prescribed motion, mean over the length of a frame [N].
     pub inertia: f64,
     /// Lateral force on the tissue, world frame with the axial part removed [N].

@@ -199,6 +199,8 @@ pub static FORCE: LazyLock<Vec<Quantity<FrameRecord>>> = LazyLock::new(|| {
         table.push(at(column, NEWTON_METRE, Largest, torque, |r, n| r.force.torque[n], n));
     }
     table.push(TIP_COORDINATE);
+    let squeezed = "normal force of the tissue on the shaft, summed along it, in the scheme `opening`: times the coefficient it is the friction";
+    table.push(number("shaft_normal_n", NEWTON, Largest, squeezed, |r| r.force.shaft_normal));
     table
 });
 

@@ -50,6 +50,7 @@ impl Recorder {
             tip_spreading: (sums.spreading_impulse - sums.shaft_impulse) / duration,
             shaft_spreading: sums.shaft_impulse / duration,
             friction: sums.friction_impulse / duration,
+            shaft_normal: sums.shaft_normal_impulse / duration,
             adhesion: sums.adhesion_impulse / duration,
             inertia: inertia(model, kinematics, end),
             lateral: force - direction * force.dot(direction),

@@ -10,17 +10,20 @@
 //! of width 2a [J/m^2]. U is homogeneous of degree two in (a, R), so `N R = F_tip + U` at the optimum.
 //!
 //! [`wedged_crack`] solves the slit (a quarter plane of `slit_mesh`), [`wedge_curve`] follows it over all sizes, [`cavity`] has the
-//! round hole and the ring crack in closed integrals, [`steady`] what follows for one material and needle.
+//! round hole and the ring crack in closed integrals, [`steady`] what follows for one material and needle. [`indentation`] is the tip on a
+//! surface that it has not cut, [`surface`] what of it the run takes.
 
 #![warn(missing_docs)]
 
 pub mod cavity;
+pub mod indentation;
 pub mod law;
 pub mod neo_hooke_curve;
 mod quadrature;
 mod skyline;
 pub mod slit_mesh;
 pub mod steady;
+pub mod surface;
 pub mod wedge_curve;
 pub mod wedged_crack;
 

@@ -8,6 +8,8 @@ mod dynamics;
 mod effects;
 #[path = "../fields.rs"]
 mod fields;
+#[path = "../indentation.rs"]
+mod indentation;
 #[path = "../material/main.rs"]
 mod material;
 #[path = "../material_point/main.rs"]

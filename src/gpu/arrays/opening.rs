@@ -34,7 +34,18 @@ pub(super) const ARRAYS: &[Array] = &[
     ),
     Array::state("opening_corners", |s| zeros(8 * slot_count(s.model).max(1), 16)),
     Array::state("opening_sums", |s| zeros(slot_count(s.model).max(1), size_of::<OpeningSum>())),
-    Array::state("opening_record", |_| zeros(1, size_of::<OpeningRecord>())),
+    Array::state("opening_record", |_| zeros(1, size_of::<OpeningRecord>())).exchanged(
+        |bytes, _, state| {
+            for record in read_all::<OpeningRecord>(bytes) {
+                state.opening_resistance = record.now[0].into();
+                state.opening_spreading = record.now[2].into();
+            }
+        },
+        |_, state| {
+            let now = [state.opening_resistance as f32, 0.0, state.opening_spreading as f32, 0.0];
+            to_bytes(&[OpeningRecord { now, ..OpeningRecord::zeroed() }])
+        },
+    ),
     Array::result("opening_totals", |_| zeros(1, size_of::<OpeningTotals>()), add_totals),
 ];
 
@@ -49,8 +60,10 @@ fn add_totals(bytes: &[u8], out: &mut Sums) {
         let [spreading, friction, work, rubbed] = s.record.parts.map(f64::from);
         sums.spreading_impulse += spreading;
         sums.friction_impulse += friction;
+        sums.shaft_normal_impulse += f64::from(s.record.angular_impulse[3]);
         sums.tool_work += work;
         sums.energy.friction += rubbed;
+        sums.energy.tip += f64::from(s.record.late[0]);
         sums.energy.contact_stored += f64::from(s.record.now[1]);
     }
 }
@@ -87,6 +100,7 @@ pub fn opening_counts(model: &Model) -> [u32; 3] {
 
 fn params(model: &Model, dt: f64) -> OpeningParams {
     let (Some(opening), Some(plan)) = (model.opening(), &model.puncture) else { return OpeningParams::zeroed() };
+    let Some(contact) = &plan.contact else { return OpeningParams::zeroed() };
     let friction = model.effects.friction.unwrap_or_default();
     let shaft = opening.map.shaft;
     let [x, y, z, _] = vec4(opening.map.direction);
@@ -105,6 +119,8 @@ fn params(model: &Model, dt: f64) -> OpeningParams {
         friction: [friction.coefficient as f32, stick as f32, friction.fade_length.max(1e-9) as f32, 0.0],
         counts: [opening.stations.len() as u32, clusters, cells, nodes],
         averaged: [opening.averaged as u32, 0, 0, 0],
+        surface: [contact.length as f32, 0.0, 0.0, 0.0],
+        dimple: contact.knots.map(|k| [k.root, k.depth, k.slope, k.stored].map(|x| x as f32)),
     }
 }
 

@@ -9,6 +9,7 @@ use crate::effects::adhesion::Bond;
 use crate::engine::State;
 use crate::model::{FreePlan, LARGEST_ANCHOR_COUNT, LARGEST_SEGMENT_COUNT, Model};
 use crate::needle::free_path as needle;
+use crate::needle::tip_contact::Touch;
 
 pub(super) const ARRAYS: &[Array] = &[
     Array::constant("puncture", |s| bytes_of(&[puncture_params(s.model)])),
@@ -23,6 +24,7 @@ pub(super) const ARRAYS: &[Array] = &[
             for tip in read_all::<TipState>(bytes) {
                 state.tip_coordinate = tip.coordinate.into();
                 state.bond = Bond { stretch: tip.bond_stretch.into(), slid: tip.bond_slid.into(), gap: tip.gap.into() };
+                state.touch = Touch { force: tip.touch_force.into(), dimple: tip.dimple.into() };
             }
         },
         |_, state| {
@@ -31,6 +33,8 @@ pub(super) const ARRAYS: &[Array] = &[
                 bond_stretch: state.bond.stretch as f32,
                 bond_slid: state.bond.slid as f32,
                 gap: state.bond.gap as f32,
+                dimple: state.touch.dimple as f32,
+                touch_force: state.touch.force as f32,
                 ..TipState::zeroed()
             }])
         },

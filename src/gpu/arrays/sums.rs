@@ -115,7 +115,7 @@ fn add_tip(bytes: &[u8], out: &mut Sums) {
     let sums = &mut out.sums;
     for s in read_all::<TipState>(bytes) {
         sums.tip_coordinate = f64::from(s.coordinate);
-        sums.energy.tip = f64::from(s.dissipation);
+        sums.energy.tip += f64::from(s.dissipation);
         sums.energy.advance_cap = f64::from(s.cap_dissipation);
         sums.energy.softening = f64::from(s.softening);
         sums.energy.contact_stored += f64::from(s.spring_energy);
