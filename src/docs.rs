@@ -17,8 +17,10 @@ use crate::observables::quantity::{self, CORE, ENERGY, FORCE, Quantity};
 use crate::output::folder::{CORE_TABLE, ENERGY_TABLE, FORCE_TABLE, SAMPLE_TABLE, TARGET_TABLE};
 use crate::output::sample::SAMPLE;
 use crate::output::target::TARGETS;
+use crate::predictions::rows::triple;
+use crate::predictions::{self, Row, Totals};
 use crate::scene::file::SceneFile;
-use crate::units::four_digits;
+use crate::units::{four_digits, three_digits};
 use crate::verdict::{BOUNDS, Bound};
 use crate::{Error, Result};
 
@@ -51,6 +53,8 @@ pub fn parts(root: &Path) -> Result<Vec<Part>> {
         Part::new("stages.md", "stages", stage_tables()),
         Part::new("files.md", "columns", columns()),
         Part::new("laws.md", "laws", law_table()),
+        Part::new("predictions.md", "result", prediction_totals()),
+        Part::new("predictions.md", "table", prediction_table()),
     ];
     for (file, rows) in run_tables() {
         parts.push(Part::new("files.md", file, meanings(rows)));
@@ -104,6 +108,29 @@ fn law_table() -> String {
         [code(law.key), format!("`{}` [{}]", law.energy, law.source), constants, law.stable.into()]
     };
     table(["`law`", "`W_iso`", "constants in a scene", "stable for every deformation where"], LAWS.iter().map(row))
+}
+
+fn prediction_totals() -> String {
+    let rows = predictions::rows(predictions::built_in());
+    Totals::of(&rows).sentences().iter().map(|sentence| format!("- {sentence}\n")).collect()
+}
+
+fn prediction_table() -> String {
+    let rows = predictions::rows(predictions::built_in());
+    let row = |row: &Row| {
+        let e = row.experiment;
+        [
+            e.id.clone(),
+            format!("{} [{}]", e.quantity.name(), e.quantity.unit().0),
+            row.band_in_words(),
+            triple(e.measured.values),
+            row.ratio().map_or("-".into(), three_digits),
+            row.verdict(),
+        ]
+    };
+    let heads =
+        ["experiment", "quantity", "predicted: low, best, high", "measured", "best / measured", "measured lies"];
+    table(heads, rows.iter().map(row))
 }
 
 fn head(effect: &Effect) -> String {

@@ -38,6 +38,7 @@ pub mod needle;
 pub mod observables;
 pub mod output;
 pub mod penetration;
+pub mod predictions;
 pub mod process;
 pub mod reading;
 pub mod render;

@@ -48,7 +48,7 @@ enum Command {
     Bench(BenchArgs),
     /// Fit the elastic laws to measured curves of stress against stretch
     Fit(FitArgs),
-    /// Run the scenes of a publication and put its numbers beside ours, as one HTML page
+    /// Put the numbers of a publication beside ours, or published needle forces beside the theory, as one HTML page
     Report(ReportArgs),
     /// Run the hard cases of scenes/hard: which survive, which are caught, which are refused
     Stability(StabilityArgs),

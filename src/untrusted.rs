@@ -43,6 +43,7 @@ pub const READERS: &[Reader] = &[
     Reader { name: "scene", read: scene, memory: (GRID_LINES, 1024) },
     Reader { name: "overrides", read: overrides, memory: (GRID_LINES, 1024) },
     Reader { name: "materials", read: materials, memory: (FEW, 256) },
+    Reader { name: "predictions", read: predictions, memory: (FEW, 256) },
     Reader { name: "gmsh", read: gmsh, memory: (FEW, 128) },
     // Arrays of XML may be compressed; what they unpack to must agree with the counts of the file. A .vtk file may hold XML, too.
     Reader { name: "vtk", read: vtk, memory: (FEW, UNPACKED) },
@@ -114,6 +115,10 @@ fn overrides(bytes: &[u8]) -> Result<()> {
     const SCENE: &str = include_str!("../scenes/muscle_biopsy.toml");
     let overrides: Vec<String> = text(bytes)?.lines().map(str::to_string).collect();
     Scene::parse(&place("scene.toml"), SCENE, &overrides).map(drop)
+}
+
+fn predictions(bytes: &[u8]) -> Result<()> {
+    crate::predictions::file::parse(&place("predictions.toml"), text(bytes)?).map(drop).map_err(Error::Scene)
 }
 
 fn materials(bytes: &[u8]) -> Result<()> {

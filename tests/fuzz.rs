@@ -326,6 +326,7 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
             b"effects=[\"puncture\"]\nmotion.phase.3={kind=\"hold\",duration_s=1}".to_vec(),
         ],
         "materials" => vec![std::fs::read(repository().join("assets/materials.toml")).unwrap()],
+        "predictions" => vec![std::fs::read(repository().join("assets/predictions.toml")).unwrap()],
         "gmsh" => files("tests/meshes", "msh"),
         "vtk" => files("tests/meshes", "vtk"),
         "vtu" => files("tests/meshes", "vtu"),

@@ -12,6 +12,7 @@ pub mod material;
 pub mod prepare;
 pub mod replay;
 pub mod report;
+pub mod report_predictions;
 pub mod run;
 pub mod stability;
 pub mod study;

@@ -1,4 +1,5 @@
-//! `stylet report`: runs the scenes of a publication and writes one page with its numbers beside ours.
+//! `stylet report`: runs the scenes of a publication and writes one page with its numbers beside ours. `report predictions`, which runs
+//! nothing, is in `report_predictions.rs`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +10,7 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 
 use super::run::{self, RunArgs};
-use super::{ended_between_runs, until_ended};
+use super::{ended_between_runs, report_predictions, until_ended};
 use crate::error::{Error, Result};
 use crate::output::Status;
 use crate::output::report::CaseResults;
@@ -19,15 +20,18 @@ use crate::scene::Scene;
 use crate::simulation::EngineChoice;
 use crate::whole_file;
 
+/// The report that runs nothing.
+pub const PREDICTIONS: &str = "predictions";
+
 /// Names of the reports.
-pub const NAMES: [&str; 1] = ["lv2022"];
+pub const NAMES: [&str; 2] = ["lv2022", PREDICTIONS];
 
 /// Written beside the folders of the runs: what has been computed from which scene.
 const LEDGER: &str = "report.json";
 
 #[derive(Debug, Clone, Default, Args)]
 pub struct ReportArgs {
-    /// Which report: lv2022
+    /// Which report: lv2022 (runs of the paper's cases) or predictions (published needle forces beside the theory)
     pub name: String,
     /// Folder of the runs and of the page [default: out/report_<NAME>, with --quick out/report_<NAME>_quick]
     #[arg(long)]
@@ -44,6 +48,9 @@ pub struct ReportArgs {
     /// Folder of the scenes [default: scenes/<NAME>]
     #[arg(long)]
     pub scenes: Option<PathBuf>,
+    /// File of experiments for predictions [default: the built-in assets/predictions.toml]
+    #[arg(long, value_name = "FILE")]
+    pub data: Option<PathBuf>,
     /// Compute everything again, and replace what the folder holds
     #[arg(long)]
     pub force: bool,
@@ -116,6 +123,15 @@ pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<ReportOutco
         return Err(Error::input(
             format!("there is no report `{}`", args.name),
             format!("write one of: {}", NAMES.join(", ")),
+        ));
+    }
+    if args.name == PREDICTIONS {
+        return report_predictions::report(args);
+    }
+    if args.data.is_some() {
+        return Err(Error::input(
+            format!("--data is of no use for the report {}", args.name),
+            format!("leave it out, or write stylet report {PREDICTIONS}"),
         ));
     }
     let planned = plan(args)?;

@@ -151,6 +151,7 @@ impl LogPlot {
             };
         }
         let mut written: Vec<(i32, i32, i32)> = Vec::new();
+        let places: Vec<(i32, i32)> = self.points.iter().map(|point| chart.backend_coord(&point.at)).collect();
         for point in &self.points {
             let radius = fine(if point.strong { 6 } else { 4 });
             let edge = BLACK.stroke_width(fine(1));
@@ -168,16 +169,22 @@ impl LogPlot {
                 }
             }
             if let Some(text) = &point.text {
-                let left = point.at.0 < (x_low * x_high).sqrt();
-                let (anchor, shift) = if left { (HPos::Left, 9) } else { (HPos::Right, -9) };
-                // Where it would stand on another text it stays away.
+                // Towards the middle, or on the other side where another point is; where it would stand on another text it stays away.
+                let inward = point.at.0 < (x_low * x_high).sqrt();
                 let (x, y) = chart.backend_coord(&point.at);
                 let width = LETTER * fine(text.chars().count() as u32) as i32;
-                let begin = if left { x } else { x - width };
-                if written
-                    .iter()
-                    .any(|(a, b, row)| begin < *b && begin + width > *a && (y - row).abs() < ROW * FINER as i32)
-                {
+                let row = ROW * FINER as i32;
+                let begin = |left: bool| if left { x } else { x - width };
+                let is_free = |left: bool| {
+                    let (begin, end) = if left { (x, x + width + row) } else { (x - width - row, x) };
+                    !places
+                        .iter()
+                        .any(|p| *p != (x, y) && p.0 > begin && p.0 < end && p.1 > y - row * 3 / 2 && p.1 < y + row / 2)
+                };
+                let left = if is_free(inward) || !is_free(!inward) { inward } else { !inward };
+                let (anchor, shift) = if left { (HPos::Left, 9) } else { (HPos::Right, -9) };
+                let begin = begin(left);
+                if written.iter().any(|(a, b, r)| begin < *b && begin + width > *a && (y - r).abs() < row) {
                     continue;
                 }
                 written.push((begin, begin + width, y));

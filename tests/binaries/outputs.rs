@@ -4,6 +4,8 @@
 mod common;
 #[path = "../outputs.rs"]
 mod outputs;
+#[path = "../predictions.rs"]
+mod predictions;
 #[path = "../report.rs"]
 mod report;
 #[path = "../target.rs"]

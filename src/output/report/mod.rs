@@ -1,6 +1,7 @@
 //! Reports: finished runs beside the numbers of a publication, as one page.
 
 pub mod lv2022;
+pub mod predictions;
 mod words;
 
 use std::collections::BTreeMap;
