@@ -117,7 +117,9 @@ impl CpuEngine {
             let (advance, cap) = match (&plan.opening, &plan.contact) {
                 (Some(opening), Some(contact)) => {
                     let cap = opening.advance_limit(speed * self.dt, self.dt);
-                    (contact.advance(now.touch, threshold, a, spreading, lambda, cap), cap)
+                    let excess = contact.excess(now.force, threshold, contact.part(a), spreading);
+                    let shortened = (lambda - contact.closing(a) * now.touch.dimple).max(puncture::LEAST_STRETCH);
+                    ((excess / shortened).max(0.0).min(cap), cap)
                 }
                 _ => {
                     let cap = advance_limit(a == 0.0, speed * self.dt);

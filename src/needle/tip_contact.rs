@@ -19,8 +19,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effects::puncture::LEAST_STRETCH;
-
 /// Rest radius of the disc, in needle radii: a smaller one is not resolved by cells of 1 mm, and sinks without bound where F reaches the
 /// shear modulus times its area.
 pub const DISC: f64 = 3.0;
@@ -152,11 +150,10 @@ impl TipContact {
         0.5 * (old.force + new.force) * way + spreading * shift - (self.stored(new) - self.stored(old))
     }
 
-    /// How far a tip at the coordinate a [m] advances [m] against the threshold F_c [N]: as far as its gap is too long, at most `cap`.
-    pub fn advance(&self, touch: Touch, threshold: f64, a: f64, spreading: f64, lambda: f64, cap: f64) -> f64 {
-        let part = self.part(a);
-        let excess = self.gap(touch.force, part, spreading) - self.gap(threshold, part, spreading);
-        (excess / (lambda - self.closing(a) * touch.dimple).max(LEAST_STRETCH)).max(0.0).min(cap)
+    /// By how much the gap of the tip with the part p is longer under the force F than under the threshold F_c [N]: what an advance has to
+    /// shorten it by [m].
+    pub fn excess(&self, force: f64, threshold: f64, part: f64, spreading: f64) -> f64 {
+        self.gap(force, part, spreading) - self.gap(threshold, part, spreading)
     }
 }
 
