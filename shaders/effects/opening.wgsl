@@ -17,7 +17,7 @@ struct OpeningParams {
     counts: vec4<u32>,
     // Half of the stations over which the normal force is averaged; the others unused.
     averaged: vec4<u32>,
-    // Length over which the surface closes behind a tip that has entered [m]; the others unused.
+    // Length over which the surface closes behind a tip that has entered [m]; yzw: shift of a section's centre per radius, of a bevel.
     surface: vec4<f32>,
     // Table of the dimple: root of the force [N^(1/2)], depth u [m], its slope up to the next row, energy V [J].
     dimple: array<vec4<f32>, 26>,
@@ -44,6 +44,8 @@ struct OpeningStation {
     along: vec4<f32>,
     // Force across the needle on the middle of the path [N]; w unused.
     across: vec4<f32>,
+    // Impulse of the needle on the tissue there in this frame [N s]; w unused.
+    impulse: vec4<f32>,
 }
 
 // Place in a list, and two weights.

@@ -7,6 +7,11 @@ struct OpeningTotals {
     elastic: array<vec4<f32>, 32>,
 }
 
+#ifdef FLEXIBLE_NEEDLE
+#import shared/step_input
+#import effects/flexible_needle
+@group(3) @binding(16) var<storage, read_write> needle_loads: array<vec4<f32>, 64>;
+#endif
 @group(3) @binding(23) var<storage, read_write> opening_record: OpeningRecord;
 @group(3) @binding(24) var<storage, read_write> opening_totals: OpeningTotals;
 
@@ -58,6 +63,17 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
         }
     }
     opening_totals.elastic[thread / 4u][thread % 4u] = energy;
+#ifdef FLEXIBLE_NEEDLE
+    // The loads are shared over the entries of the centre-line.
+    for (var entry = select(32u, 0u, thread == 0u); entry < 32u; entry++) {
+        var load = vec4<f32>(0.0);
+        for (var i = 0u; i < opening.counts.x; i++) {
+            let share = max(0.0, 1.0 - abs(centre_line_entry(path_stations[i].place.x) - f32(entry)));
+            load += path_stations[i].impulse * share;
+        }
+        needle_loads[entry] += load;
+    }
+#endif
     if (thread == 0u) {
         opening_totals.record = opening_record;
         opening_record.impulse = vec4<f32>(0.0);

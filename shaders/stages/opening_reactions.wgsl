@@ -5,6 +5,11 @@
 #import effects/puncture
 #import effects/opening
 #import shared/tip_read
+#ifdef FLEXIBLE_NEEDLE
+#import shared/bent_axis
+#else
+#import shared/straight_axis
+#endif
 
 @group(1) @binding(22) var<storage, read> path_entries: array<OpeningEntry>;
 @group(3) @binding(20) var<storage, read_write> path_stations: array<OpeningStation>;
@@ -15,6 +20,7 @@
 var<workgroup> parts: array<vec4<f32>, 64>;
 var<workgroup> lateral: array<vec4<f32>, 64>;
 var<workgroup> torque: array<vec4<f32>, 64>;
+var<workgroup> bent: array<f32, 64>;
 
 // Part of a station that is on the shaft.
 fn on_shaft(i: u32) -> f32 {
@@ -44,8 +50,9 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
     var along = vec4<f32>(0.0);
     var aside = vec4<f32>(0.0);
     var turning = vec3<f32>(0.0);
-    // Sum of the normal forces on the shaft.
+    // Sum of the normal forces on the shaft; work of the needle beside that of its motion as a whole [J].
     var squeezed = 0.0;
+    var bend_work = 0.0;
     for (var i = lane; i < count; i += 64u) {
         let now = path_stations[i];
         // By the centre and by rc with all that follows from them.
@@ -77,10 +84,16 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
             weight += on;
         }
         normal = select(0.0, normal / weight, weight > 0.0);
-        let held = opening.numbers.y * now.centre.w / opening.direction.w;
-        let offset = across(opening.entry.xyz + now.centre.xyz - step_input.tip.xyz);
+        // Where the middle is open it is held on the axis; sections of a bevel lie aside of the tip as far as they are wide.
+        let per_radius = opening.numbers.y / opening.direction.w;
+        let held = per_radius * now.centre.w;
+        let axis = axis_at(now.place.x);
+        let lever = across(opening.entry.xyz + now.centre.xyz - step_input.tip.xyz);
+        let offset = off_axis(axis, lever) - opening.surface.yzw * now.rubbing.x;
         let guide = offset * -held;
-        let spread = by.w * now.place.w * now.place.y;
+        let by_radius = 0.5 * per_radius * dot(offset, offset);
+        let tilted = dot(along_axis(axis, -guide, -t), t) + dot(guide, opening.surface.yzw) * -now.place.w;
+        let spread = (by.w + by_radius) * now.place.w * now.place.y - tilted;
         var stick = now.rubbing.z;
         var rubbing = 0.0;
         var bound = 0.0;
@@ -98,14 +111,20 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         bound = 2.0 * kt;
 #endif
         along += vec4<f32>(spread, rubbing, 0.0, 0.5 * held * dot(offset, offset));
-        aside += vec4<f32>(guide, by.w * now.rubbing.x * now.place.z);
-        turning += cross(offset - t * now.place.x, guide);
+        aside += vec4<f32>(guide, (by.w + by_radius) * now.rubbing.x * now.place.z);
+        turning += cross(lever - t * now.place.x, guide);
+        bend_work += axis_power(axis, guide) * params.dt;
+#ifdef FLEXIBLE_NEEDLE
+        let before = select(now.impulse.xyz, vec3<f32>(0.0), step_input.step == centre_line.first_step);
+        path_stations[i].impulse = vec4<f32>(before + (t * (spread + rubbing) + guide) * params.dt, 0.0);
+#endif
         path_stations[i].rubbing.z = stick;
         path_stations[i].along = vec4<f32>(spread + rubbing, bound, 2.0 * held, 0.0);
         path_stations[i].across = vec4<f32>(guide - by_centre, 0.0);
     }
     parts[lane] = along;
     lateral[lane] = aside;
+    bent[lane] = bend_work;
     torque[lane] = vec4<f32>(turning, squeezed);
     workgroupBarrier();
     if (lane == 0u) {
@@ -114,13 +133,14 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
             aside += lateral[i];
             turning += torque[i].xyz;
             squeezed += torque[i].w;
+            bend_work += bent[i];
         }
         let dt = params.dt;
         let total = t * (along.x + along.y) + aside.xyz;
         let impulse = opening_record.impulse.xyz + total * dt;
-        opening_record.impulse = vec4<f32>(impulse, dot(total, step_input.velocity_ahead.xyz) * dt);
+        opening_record.impulse = vec4<f32>(impulse, dot(total, step_input.velocity_ahead.xyz) * dt + bend_work);
         opening_record.angular_impulse += vec4<f32>(turning * dt, squeezed * dt);
-        opening_record.parts += vec4<f32>(along.x * dt, along.y * dt, dot(total, step_input.velocity.xyz) * dt, along.z);
+        opening_record.parts += vec4<f32>(along.x * dt, along.y * dt, dot(total, step_input.velocity.xyz) * dt + bend_work, along.z);
         // The tip was told what the path took before it advanced: half of what that changed by comes off.
         let told = opening_record.now;
         opening_record.late.x += 0.5 * ((along.x - told.z) * tip_state.shifted - (aside.w - told.x) * tip_state.advanced);

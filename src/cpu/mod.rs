@@ -180,7 +180,7 @@ impl CpuEngine {
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             self.needle_contact(plan, &pose, input.step);
             if let Some(opening) = &plan.opening {
-                self.opening(plan, opening, &pose);
+                self.opening(plan, opening, &pose, input.step);
             }
         }
         if let (Some(_), Some(pose)) = (model.effects.indentation, input.pose) {

@@ -11,6 +11,7 @@ use crate::mesh::CORNERS;
 use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, mean_place};
 use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
+use crate::needle::centre_line::Bend;
 use crate::needle::opening::{Derivatives, Opening, Station, outer, squared_norm_bound};
 
 /// What is derived of one station: of the energy E.
@@ -97,10 +98,9 @@ impl CpuEngine {
     }
 
     /// Stage `opening`: forces of points, near cells, the guide on the needle and friction.
-    pub(super) fn opening(&mut self, plan: &PuncturePlan, opening: &OpeningPlan, pose: &ToolPose) {
+    pub(super) fn opening(&mut self, plan: &PuncturePlan, opening: &OpeningPlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
         let now = self.stations_now(plan, opening, pose.tip);
-        let t = plan.path.direction;
         let mut sums = vec![StationSums::default(); now.len()];
         let mut elastic = 0.0;
         // Points: every station its own.
@@ -139,18 +139,19 @@ impl CpuEngine {
             }
         }
         self.opening_elastic = elastic;
-        self.station_reactions(opening, pose, &now, &sums, t);
+        self.station_reactions(opening, plan, (pose, step), &now, &sums);
     }
 
     /// Forces of the stations on their nodes, on the needle and on the tip; friction.
     fn station_reactions(
         &mut self,
         opening: &OpeningPlan,
-        pose: &ToolPose,
+        plan: &PuncturePlan,
+        (pose, step): (&ToolPose, u64),
         now: &[Now],
         sums: &[StationSums],
-        t: DVec3,
     ) {
+        let t = plan.path.direction;
         let model = self.model.clone();
         let count = now.len();
         // By rc with all that follows from it, and by the centre.
@@ -164,9 +165,14 @@ impl CpuEngine {
             centre[behind] += rate * by;
             centre[before] -= rate * by;
         }
+        let guides: Vec<Guide> = now.iter().map(|n| self.guide(opening, plan, pose, step, n)).collect();
+        // Along the needle: by how rc and the axis change behind the tip.
+        let spreads: Vec<f64> =
+            now.iter().zip(&radius).zip(&guides).map(|((n, r), g)| r * n.slope * n.cut + g.along).collect();
         let old = [self.state.opening_resistance, self.state.opening_spreading];
-        self.state.opening_resistance = now.iter().zip(&radius).map(|(n, r)| r * n.full * n.cut_rate).sum();
-        self.state.opening_spreading = now.iter().zip(&radius).map(|(n, r)| r * n.slope * n.cut).sum();
+        self.state.opening_resistance =
+            now.iter().zip(&radius).zip(&guides).map(|((n, r), g)| (r + g.by_radius) * n.full * n.cut_rate).sum();
+        self.state.opening_spreading = spreads.iter().sum();
         // The tip was told what the path took before it advanced: half of what that changed by comes off.
         let [advance, shift] = self.advanced;
         self.sums.energy.tip += 0.5 * (self.state.opening_spreading - old[1]) * shift
@@ -174,17 +180,13 @@ impl CpuEngine {
         let normal = averaged_normal(opening, now, sums);
         let velocity = &self.state.velocity;
         let mut stored = 0.0;
-        let mut booked = ContactSums::default();
+        let (mut booked, mut bend_work) = (ContactSums::default(), 0.0);
         let friction = model.effects.friction.unwrap_or_default();
         for (i, station) in opening.stations.iter().enumerate() {
             let n = &now[i];
-            let aside = n.section.centre - pose.tip;
-            let aside = aside - t * aside.dot(t);
-            // The middle of the path lies on the needle where it is open.
-            let held = opening.guide * (n.section.radius / opening.map.shaft);
-            stored += 0.5 * held * aside.length_squared();
-            let guide = aside * -held;
-            let spread = radius[i] * n.slope * n.cut;
+            let Guide { force: guide, held, .. } = guides[i];
+            stored += guides[i].stored;
+            let spread = spreads[i];
             let mean_velocity: DVec3 =
                 station.disc.iter().map(|(p, w)| velocity[station.nodes[usize::from(*p)] as usize] * *w).sum();
             let mut rubbing = 0.0;
@@ -218,11 +220,59 @@ impl CpuEngine {
             }
             booked.normal += t * spread + guide;
             booked.friction += t * rubbing;
-            booked.torque += (aside - t * n.behind).cross(guide);
+            let lever = n.section.centre - pose.tip;
+            booked.torque += (lever - t * lever.dot(t) - t * n.behind).cross(guide);
+            if let Some(line) = self.centre_line {
+                let impulse = (t * (spread + rubbing) + guide) * self.dt;
+                line.share(&mut self.sums.needle_loads, n.behind, impulse);
+                bend_work += guide.dot(guides[i].rate) * self.dt;
+            }
         }
         self.sums.book(&booked, pose, self.dt);
+        self.sums.tool_work += bend_work;
+        self.sums.last_tool_work += bend_work;
         self.contact_energy += stored;
     }
+}
+
+impl CpuEngine {
+    /// What holds the middle of a station on the axis of the needle where it is open.
+    fn guide(&self, opening: &OpeningPlan, plan: &PuncturePlan, pose: &ToolPose, step: u64, now: &Now) -> Guide {
+        let t = pose.direction;
+        let bend = match &self.centre_line {
+            Some(line) => line.at(now.behind, (step - line.first_step) as f64 * self.dt),
+            None => Bend::default(),
+        };
+        // Sections of a bevel lie aside of the tip as far as they are wide.
+        let axis = bend.offset + plan.profile.shift * now.full;
+        let aside = now.section.centre - pose.tip;
+        let aside = aside - t * aside.dot(t) - axis;
+        let per_radius = opening.guide / opening.map.shaft;
+        let held = per_radius * now.section.radius;
+        let by_radius = 0.5 * per_radius * aside.length_squared();
+        Guide {
+            force: aside * -held,
+            held,
+            stored: 0.5 * held * aside.length_squared(),
+            by_radius,
+            along: by_radius * now.slope * now.cut - held * aside.dot(bend.slope + plan.profile.shift * now.slope),
+            rate: bend.rate,
+        }
+    }
+}
+
+/// What holds the middle of a station on the needle.
+#[derive(Debug, Clone, Copy)]
+struct Guide {
+    /// Force on the path, across the needle [N], and its stiffness [N/m].
+    force: DVec3,
+    held: f64,
+    stored: f64,
+    /// Derivatives of what is stored by rc at fixed place, and by the distance behind the tip [N].
+    by_radius: f64,
+    along: f64,
+    /// Velocity of the axis of a flexible needle there [m/s].
+    rate: DVec3,
 }
 
 /// Normal force of every station [N], averaged over its neighbours on the shaft: it is known cell by cell.

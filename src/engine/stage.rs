@@ -77,8 +77,9 @@ impl Stage {
         Stage::IntegrateNodes,
         Stage::MeasureCells,
         Stage::MeasureNodes,
-        Stage::MeasureOpening,
         Stage::MeasureContact,
+        // Adds to the loads of a flexible needle that the one above has summed.
+        Stage::MeasureOpening,
         Stage::MeasureFaces,
         Stage::MeasureSeparation,
         Stage::CellFields,

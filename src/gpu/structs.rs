@@ -246,6 +246,7 @@ shared_structs! {
         by_rate: [f32; 4],
         along: [f32; 4],
         across: [f32; 4],
+        impulse: [f32; 4],
     }
     /// shaders/effects/opening.wgsl
     struct OpeningEntry {

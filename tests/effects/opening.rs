@@ -249,3 +249,50 @@ fn a_law_that_stiffens_meets_the_force_of_its_own_curve() {
     println!("Yeoh: {force:.4} N, theory {expected:.4} N");
     close("steady force", force, expected, 0.03);
 }
+
+#[test]
+fn a_bevel_is_pushed_aside_and_a_flexible_one_gives_way() {
+    // The apex of a bevel lies at +x of its shaft, which pushes the tissue of the path towards -x: the tissue pushes back.
+    let bevel = "needle={gauge=\"18G\", bevel_angle_deg=20.0}";
+    let flexible = "effects=[\"puncture\", \"mass_scaling\", \"flexible_needle\"]";
+    let run = |overrides: &[&str], engine: EngineChoice| {
+        let depth = "motion.phase.0.depth_mm=8.0";
+        let mut simulation = Simulation::new(scene(&[&[bevel, depth], overrides].concat()), engine).unwrap();
+        let mut all = Vec::new();
+        while let Some(frame) = simulation.next_frame().unwrap() {
+            all.push(frame);
+        }
+        all
+    };
+    let rigid = engines_here().into_iter().map(|engine| run(&[], engine)).collect::<Vec<_>>();
+    let bent = engines_here()
+        .into_iter()
+        .map(|engine| run(&[flexible, "flexible_needle.free_length_mm=60.0"], engine))
+        .collect::<Vec<_>>();
+    for runs in [&rigid, &bent] {
+        for other in &runs[1..] {
+            close("lateral force of the engines", last(other).force.lateral.x, last(&runs[0]).force.lateral.x, 1e-2);
+            close("axial force of the engines", last(other).force.axial, last(&runs[0]).force.axial, 1e-2);
+        }
+    }
+    let [stiff, soft] = [&rigid[0], &bent[0]].map(|frames| last(frames));
+    let offset = soft.needle.tip_offset.x;
+    println!(
+        "lateral {:.3} N rigid, {:.3} N flexible, tip {:.3} mm aside",
+        stiff.force.lateral.x,
+        soft.force.lateral.x,
+        offset * 1e3
+    );
+    assert!(stiff.force.lateral.x < -0.2, "{}", stiff.force.lateral.x);
+    assert!(soft.force.lateral.x.abs() < 0.5 * stiff.force.lateral.x.abs());
+    assert!(offset > 0.2e-3, "{offset}");
+    let imbalance = rigid[0].iter().map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max);
+    at_most("imbalance of the rigid one", imbalance, 0.01);
+    // Loads of a frame reach the beam in the next one.
+    let imbalance = bent[0].iter().map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max);
+    at_most("imbalance of the flexible one", imbalance, 0.03);
+}
+
+fn last(frames: &[FrameRecord]) -> &FrameRecord {
+    frames.last().unwrap()
+}

@@ -119,7 +119,12 @@ fn params(model: &Model, dt: f64) -> OpeningParams {
         friction: [friction.coefficient as f32, stick as f32, friction.fade_length.max(1e-9) as f32, 0.0],
         counts: [opening.stations.len() as u32, clusters, cells, nodes],
         averaged: [opening.averaged as u32, 0, 0, 0],
-        surface: [contact.length as f32, 0.0, 0.0, 0.0],
+        surface: [
+            contact.length as f32,
+            plan.profile.shift.x as f32,
+            plan.profile.shift.y as f32,
+            plan.profile.shift.z as f32,
+        ],
         dimple: contact.knots.map(|k| [k.root, k.depth, k.slope, k.stored].map(|x| x as f32)),
     }
 }

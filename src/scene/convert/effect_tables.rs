@@ -9,7 +9,7 @@ use crate::effects::parameters::Table;
 use crate::effects::puncture::{PathWord, SchemeWord};
 use crate::effects::{self, EffectSet, TissueMaterial};
 use crate::needle::beam::Section;
-use crate::needle::{Motion, TipShape, Tool};
+use crate::needle::{Motion, Tool};
 use crate::units::four_digits;
 
 impl Check<'_> {
@@ -96,20 +96,18 @@ impl Check<'_> {
             (tets, "a mesh of tetrahedra"),
             (puncture.always_free || motion.is_free(), "a free path"),
             (effects.cohesive.is_some(), "the effect cohesive"),
-            (effects.flexible_needle.is_some(), "the effect flexible_needle"),
             (effects.plasticity.is_some(), "the effect plasticity"),
             (effects.viscoelastic.is_some(), "the effect viscoelastic"),
             (effects.damage.is_some(), "the effect damage"),
             (!effects.own.is_empty(), "effects of the program's own"),
             (needle.is_some_and(|n| n.bore.is_some()), "a hollow needle"),
-            (needle.is_some_and(|n| n.tip != TipShape::Cone), "a bevel"),
         ];
         let found: Vec<&str> = without.iter().filter(|(there, _)| *there).map(|(_, what)| *what).collect();
         if !found.is_empty() {
             self.problems.report(
                 "puncture.scheme",
                 format!("the scheme opening does not carry {} yet", found.join(", ")),
-                "a solid cone on one straight path through elastic tissue",
+                "a solid needle on one straight path through elastic tissue",
                 "leave the key out for the scheme ring",
             );
         }
