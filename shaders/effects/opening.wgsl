@@ -25,7 +25,7 @@ struct OpeningParams {
 
 // A section of the path. The first three are known before the run.
 struct OpeningStation {
-    // Material coordinate Z [m], and that from which it counts as cut; z, w unused.
+    // Material coordinate Z [m], and that from which it counts as cut; rc over the radius of the needle; w unused.
     depth: vec4<f32>,
     // Entries of the means over nodes: first, end; entries of the slots that tell of it: first, end.
     lists: vec4<u32>,

@@ -89,10 +89,11 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         let held = per_radius * now.centre.w;
         let axis = axis_at(now.place.x);
         let lever = across(opening.entry.xyz + now.centre.xyz - step_input.tip.xyz);
-        let offset = off_axis(axis, lever) - opening.surface.yzw * now.rubbing.x;
+        let shift = opening.surface.yzw / now.depth.z;
+        let offset = off_axis(axis, lever) - shift * now.rubbing.x;
         let guide = offset * -held;
         let by_radius = 0.5 * per_radius * dot(offset, offset);
-        let tilted = dot(along_axis(axis, -guide, -t), t) + dot(guide, opening.surface.yzw) * -now.place.w;
+        let tilted = dot(along_axis(axis, -guide, -t), t) + dot(guide, shift) * -now.place.w;
         let spread = (by.w + by_radius) * now.place.w * now.place.y - tilted;
         var stick = now.rubbing.z;
         var rubbing = 0.0;

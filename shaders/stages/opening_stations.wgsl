@@ -36,8 +36,9 @@ fn opening_stations(@builtin(local_invocation_index) lane: u32) {
         let part = (tip_state.coordinate - depth.y) / spacing + 0.5;
         let cut = clamp(part, 0.0, 1.0);
         let rate = select(0.0, 1.0 / spacing, part > 0.0 && part < 1.0);
-        let full = opening.direction.w * clamp(behind / tip_length, 0.0, 1.0);
-        let slope = select(0.0, opening.direction.w / tip_length, behind > 0.0 && behind < tip_length);
+        let shaft = opening.direction.w * depth.z;
+        let full = shaft * clamp(behind / tip_length, 0.0, 1.0);
+        let slope = select(0.0, shaft / tip_length, behind > 0.0 && behind < tip_length);
         path_stations[i].centre = vec4<f32>(across(middle), full * cut);
         path_stations[i].place = vec4<f32>(behind, cut, rate, slope);
         let stick = path_stations[i].rubbing.z;

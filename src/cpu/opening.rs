@@ -44,9 +44,11 @@ struct Now {
     behind: f64,
     cut: f64,
     cut_rate: f64,
-    /// Radius that a cut station would have [m], and its rate with `behind`.
+    /// rc that a cut station would have [m], and its rate with `behind`; the same of the needle itself.
     full: f64,
     slope: f64,
+    radius: f64,
+    rate: f64,
 }
 
 /// Differences of a quantity along the stations: weights of the neighbours before and behind station `i`.
@@ -81,10 +83,11 @@ impl CpuEngine {
             .map(|station| {
                 let centre = mean_place(&station.centre, &station.nodes, mesh, u);
                 let behind = (tip - mean_place(&station.disc, &station.nodes, mesh, u)).dot(t) - shift;
-                let (full, slope) = opening.radius(behind);
+                let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.map.shaft));
+                let (full, slope) = (radius * opened, rate * opened);
                 let (cut, cut_rate) = opening.cut(station, a);
                 let section = Station { centre, radius: full * cut, ..Station::default() };
-                Now { section, behind, cut, cut_rate, full, slope }
+                Now { section, behind, cut, cut_rate, full, slope, radius, rate }
             })
             .collect();
         for i in 0..now.len() {
@@ -244,7 +247,7 @@ impl CpuEngine {
             None => Bend::default(),
         };
         // Sections of a bevel lie aside of the tip as far as they are wide.
-        let axis = bend.offset + plan.profile.shift * now.full;
+        let axis = bend.offset + plan.profile.shift * now.radius;
         let aside = now.section.centre - pose.tip;
         let aside = aside - t * aside.dot(t) - axis;
         let per_radius = opening.guide / opening.map.shaft;
@@ -255,7 +258,7 @@ impl CpuEngine {
             held,
             stored: 0.5 * held * aside.length_squared(),
             by_radius,
-            along: by_radius * now.slope * now.cut - held * aside.dot(bend.slope + plan.profile.shift * now.slope),
+            along: by_radius * now.slope * now.cut - held * aside.dot(bend.slope + plan.profile.shift * now.rate),
             rate: bend.rate,
         }
     }

@@ -74,6 +74,13 @@ pub struct OpeningStation {
     pub hole: f64,
 }
 
+impl OpeningStation {
+    /// rc over the radius of the needle: tissue at the rim of the hole comes to lie on the needle, `a^2 + rc^2 = R^2` on the shaft R.
+    pub fn opened(&self, shaft: f64) -> f64 {
+        (1.0 - (self.hole / shaft).powi(2)).max(0.0).sqrt()
+    }
+}
+
 /// Points of one station in one cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cluster {

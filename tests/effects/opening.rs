@@ -157,9 +157,10 @@ fn both_engines_give_the_same_force() {
 
 #[test]
 fn a_tougher_tissue_is_cut_narrower_and_holds_the_needle_harder() {
-    // Nearly without change of volume, as the theory has it; at nu 0.473 400 J/m^2 take 4 % less.
+    // Nearly without change of volume, as the theory has it: at nu 0.49 400 J/m^2 take 4 % less, as a small hole in tissue that gives
+    // (reference 18 has 9 % less normal force for nu 0.493 and a hole of a twentieth of the needle).
     for toughness in ["100", "400"] {
-        let material = "material={c10_kpa=9.52, c01_kpa=4.14, poisson_ratio=0.49, toughness_j_m2=";
+        let material = "material={c10_kpa=9.52, c01_kpa=4.14, poisson_ratio=0.498, toughness_j_m2=";
         let scene = scene(&[&format!("{material}{toughness}}}"), "motion.phase.0.depth_mm=10.5"]);
         let expected = predicted(&scene).tip_force;
         let frames = frames(scene, engines_here().pop().unwrap());

@@ -225,7 +225,7 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
         let end = tables.entries.len() as u32;
         let cut_from = station.depth.abs().max(0.5 * opening.spacing);
         tables.stations.push(OpeningStation {
-            depth: [station.depth as f32, cut_from as f32, 0.0, 0.0],
+            depth: [station.depth as f32, cut_from as f32, station.opened(opening.map.shaft) as f32, 0.0],
             lists: [first, middle, middle, end],
             ..OpeningStation::zeroed()
         });
