@@ -4,7 +4,7 @@
 struct OpeningCell {
     // Cell, w: index of its material.
     cell: vec4<u32>,
-    // First station in it and their number; 1 where points carry no part of it; w unused.
+    // First station in it and their number; places at which it is taken, first and end: octants, or its middle (8).
     stations: vec4<u32>,
     // Middle of the cell from the entry of the path [m]; one over its edges [1/m]. w unused.
     middle: vec4<f32>,

@@ -54,8 +54,8 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
             let dj = jacobian_minus_one(H);
             let open = dj + (1.0 + dj) * dilated;
             energy += 0.5 * materials[cell.cell.w].bulk_modulus * volume * (open * open - dj * dj);
-            let whole = cell.stations.z == 1u;
-            for (var at = select(0u, 8u, whole); at < select(8u, 9u, whole); at++) {
+            let whole = cell.stations.z == 8u;
+            for (var at = cell.stations.z; at < cell.stations.w; at++) {
                 let eta = across(middle + gradient * (gauss_place(at) * width)) * scale;
                 let part = select(0.125 * volume * share_of(cell, at), volume, whole);
                 energy += part * opened_energy(cell.cell.w, opened_place(section, eta, gradient), H);

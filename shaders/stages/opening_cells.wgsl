@@ -63,8 +63,8 @@ fn opening_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         var tangent = vec2<f32>(closed.tangent, closed.turned_tangent);
         var grown = 1.0;
         let size = pow(volume, 0.33333333);
-        let whole = cell.stations.z == 1u;
-        for (var at = select(0u, 8u, whole); at < select(8u, 9u, whole); at++) {
+        let whole = cell.stations.z == 8u;
+        for (var at = cell.stations.z; at < cell.stations.w; at++) {
             let p = gauss_place(at);
             let place = opened_place(section, middle + lateral * p, gradient);
             let part = select(0.125 * volume * share_of(cell, at), volume, whole);

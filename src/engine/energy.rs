@@ -115,7 +115,7 @@ energies! {
     plastic: 1.0, "dissipated by plastic flow", sum plastic;
     damage: 1.0, "dissipated by damage", sum damage;
     viscous: 1.0, "dissipated by the viscous terms", end viscous;
-    contact: 1.0, "stored in contact, stick, tip and bond springs, plus what contact damping dissipated", end contact_stored, sum contact_damping;
+    contact: 1.0, "stored in contact, stick, tip and bond springs and in the dimple around the tip, plus what contact damping dissipated", end contact_stored, sum contact_damping;
     needle: 1.0, "gained and damped by a flexible needle", end needle;
     changes: -1.0, "put in by changes of numbers while the run went on: the same state stores more or less with other constants";
     raised_mass: 1.0, "taken by nodes whose mass was raised for a step: the kinetic energy of the mass that they have no more; negative where they gave", sum raised_mass;

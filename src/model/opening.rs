@@ -112,7 +112,7 @@ pub struct OpeningPlan {
     pub stations: Vec<OpeningStation>,
     /// Largest first: threads of a group wait for each other, so that many of the same size lie side by side.
     pub clusters: Vec<Cluster>,
-    /// Ascending in the cell.
+    /// Those with as many places side by side, as above.
     pub cells: Vec<NearCell>,
     /// All nodes that points, cells or stations act on.
     pub nodes: BTreeSet<u32>,
@@ -130,6 +130,15 @@ impl NearCell {
     /// True where points carry no part of it.
     pub fn is_whole(&self) -> bool {
         self.shares == [1.0; 8]
+    }
+
+    /// Places at which it is taken: 0 to 7 its octants, 8 its middle. None where points carry all of it.
+    pub fn places(&self) -> std::ops::Range<u32> {
+        match self.shares {
+            _ if self.is_whole() => 8..9,
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => 0..0,
+            _ => 0..8,
+        }
     }
 }
 
@@ -330,7 +339,7 @@ fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: 
         let axial = relative.dot(input.path.direction);
         ((relative - input.path.direction * axial).length(), axial)
     };
-    (0..mesh.cell_count())
+    let mut cells: Vec<NearCell> = (0..mesh.cell_count())
         .filter_map(|cell| {
             let size = mesh.cell_size(cell);
             let low = mesh.rest_position(mesh.cell_nodes(cell)[0]);
@@ -362,7 +371,9 @@ fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: 
             let (from, to) = if to > from { (from, to) } else { (nearest, nearest + 1) };
             Some(NearCell { cell: cell as u32, shares, first: from as u16, count: (to - from) as u16 })
         })
-        .collect()
+        .collect();
+    cells.sort_by_key(|near| std::cmp::Reverse(near.places().len()));
+    cells
 }
 
 /// Mean of `y = X + u` over nodes.

@@ -297,3 +297,17 @@ fn a_bevel_is_pushed_aside_and_a_flexible_one_gives_way() {
 fn last(frames: &[FrameRecord]) -> &FrameRecord {
     frames.last().unwrap()
 }
+
+#[test]
+fn a_membrane_costs_its_energy_where_it_lies() {
+    let capsule = "region=[{name=\"capsule\", layer_mm=[7.5, 8.5], material={preset=\"across-fibre\"}, \
+                   membrane={puncture_energy_mj=0.08}}]";
+    let run = |overrides: &[&str]| frames(scene(overrides), engines_here().pop().unwrap());
+    let depth = "motion.phase.0.depth_mm=10.0";
+    let (with, without) = (run(&[depth, capsule]), run(&[depth]));
+    let cutting = |frames: &[FrameRecord]| last(frames).energy.cutting;
+    let first = with.iter().find(|f| f.force.membrane > 0.0).expect("the tip meets the membrane");
+    println!("{:.4} mJ more, met at {:.3} mm", (cutting(&with) - cutting(&without)) * 1e3, first.tip_coordinate * 1e3);
+    close("energy of the membrane", cutting(&with) - cutting(&without), 0.08e-3, 0.1);
+    close("material depth of the membrane", first.tip_coordinate, 7.5e-3, 0.1 / 7.5);
+}

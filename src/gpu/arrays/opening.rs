@@ -181,10 +181,10 @@ fn slots(tables: &mut Tables, model: &Model, opening: &OpeningPlan, mesh: &Block
         let (place, middle, inverse) = cell_of(model, mesh, entry, near.cell as usize);
         let mut shares = [0.0; 8];
         CORNERS.iter().zip(near.shares).for_each(|(signs, share)| shares[bits(*signs)] = share as f32);
-        let (first, count) = (u32::from(near.first), u32::from(near.count));
+        let (first, count, places) = (u32::from(near.first), u32::from(near.count), near.places());
         tables.cells.push(OpeningCell {
             cell: place,
-            stations: [first, count, u32::from(near.is_whole()), 0],
+            stations: [first, count, places.start, places.end],
             middle,
             inverse,
             lower: [shares[0], shares[1], shares[2], shares[3]],
