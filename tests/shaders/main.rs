@@ -338,6 +338,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "PlannedTouch",
         "StraightAxis",
         "BentAxis",
+        "SurfaceTouch",
         "Pressing",
         "Contact",
         "Memory",
