@@ -16,7 +16,7 @@ fn sneddon(options: &IndentationOptions, depth: f64) -> f64 {
 }
 
 fn tip(degrees: f64, bulk_over_mu: f64, contact: ContactLaw, core: f64) -> IndentationOptions {
-    IndentationOptions { contact, core, growth: 0.3, ..IndentationOptions::tip(degrees.to_radians(), bulk_over_mu) }
+    IndentationOptions { contact, core, growth: 0.15, ..IndentationOptions::tip(degrees.to_radians(), bulk_over_mu) }
 }
 
 #[test]

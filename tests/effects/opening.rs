@@ -149,9 +149,19 @@ fn both_engines_give_the_same_force() {
     let overrides = [FRICTION, "tissue.size_mm=[14.0,14.0,9.0]", "motion.phase.0.depth_mm=6.5"];
     let [cpu, gpu] = [EngineChoice::Cpu, EngineChoice::Gpu].map(|engine| frames(scene(&overrides), engine));
     let largest = cpu.iter().map(|f| f.force.axial).fold(0.0, f64::max);
-    let apart = cpu.iter().zip(&gpu).map(|(a, b)| (a.force.axial - b.force.axial).abs()).fold(0.0, f64::max);
-    println!("largest difference {:.2e} of the peak of {largest:.3} N", apart / largest);
-    at_most("difference of the engines", apart / largest, 1e-3);
+    // The crack starts in the step in which the force passes its threshold: rounding may shift that by one, and with it the drop, which takes
+    // a hundredth of the peak per step. Where the tip goes with the needle nothing is left of that.
+    let runs =
+        |i: usize| i > 0 && cpu[i].tip_coordinate - cpu[i - 1].tip_coordinate > 2.0 * (cpu[i].depth - cpu[i - 1].depth);
+    let (mut slow, mut fast) = (0.0_f64, 0.0_f64);
+    for (i, (a, b)) in cpu.iter().zip(&gpu).enumerate() {
+        let apart = (a.force.axial - b.force.axial).abs() / largest;
+        let near_the_run = (i.saturating_sub(3)..=(i + 2).min(cpu.len() - 1)).any(runs);
+        *(if near_the_run { &mut fast } else { &mut slow }) = apart.max(if near_the_run { fast } else { slow });
+    }
+    println!("apart by {slow:.2e} of the peak of {largest:.3} N, {fast:.2e} while the crack runs");
+    at_most("difference of the engines", slow, 1e-3);
+    at_most("difference of the engines while the crack runs", fast, 0.02);
     close("elastic energy", gpu.last().unwrap().energy.elastic, cpu.last().unwrap().energy.elastic, 1e-3);
 }
 
