@@ -18,6 +18,7 @@
 pub mod cavity;
 pub mod indentation;
 pub mod law;
+mod mixed_cell;
 pub mod neo_hooke_curve;
 mod quadrature;
 mod skyline;

@@ -6,16 +6,12 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-/// Nodes per cell.
-pub const CELL_NODES: usize = 9;
-/// Displacement components per cell.
-pub const CELL_DOFS: usize = 18;
-/// Marks a displacement component that symmetry keeps at zero.
-pub const FIXED: usize = usize::MAX;
+use super::mixed_cell::{self, CELL_NODES, FIXED, GAUSS_3, add_mass, quadratic, quadratic_nodes, simpson};
 
-/// Three-point Gauss-Legendre rule on [-1, 1].
-const GAUSS_3: [(f64, f64); 3] =
-    [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+/// One cell, xi outermost.
+pub type Cell = mixed_cell::Cell<2>;
+/// One integration point.
+pub type GaussPoint = mixed_cell::GaussPoint<2>;
 
 /// How fine the mesh is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,30 +26,6 @@ pub struct MeshSize {
     pub radial_grading: f64,
     /// Size of the step in eta at the tip over the one in the middle of the slit.
     pub along_grading: f64,
-}
-
-/// One integration point.
-#[derive(Clone, Debug)]
-pub struct GaussPoint {
-    /// Rest gradient of the nine shape functions [1/a].
-    pub gradient: [[f64; 2]; CELL_NODES],
-    /// Rest area [a^2].
-    pub weight: f64,
-    /// The three pressure modes.
-    pub mode: [f64; 3],
-}
-
-/// One cell.
-#[derive(Clone, Debug)]
-pub struct Cell {
-    /// Node indices, xi outermost.
-    pub nodes: [usize; CELL_NODES],
-    /// Equation of every displacement component, or `FIXED`.
-    pub equations: [usize; CELL_DOFS],
-    /// Integration points.
-    pub points: Vec<GaussPoint>,
-    /// Inverse of the mass matrix of the pressure modes [1/a^2].
-    pub inverse_mass: [[f64; 3]; 3],
 }
 
 /// A node of the far boundary.
@@ -142,15 +114,7 @@ impl SlitMesh {
 
     /// First coupled equation of every equation, for profile storage.
     pub fn profile(&self) -> Vec<usize> {
-        let mut first: Vec<usize> = (0..self.equation_count).collect();
-        for cell in &self.cells {
-            let free = cell.equations.iter().filter(|&&e| e != FIXED);
-            let low = free.clone().min().copied().unwrap_or(0);
-            for &e in free {
-                first[e] = first[e].min(low);
-            }
-        }
-        first
+        mixed_cell::profile(&self.cells, self.equation_count)
     }
 }
 
@@ -168,41 +132,13 @@ fn graded(n: usize, end: f64, ratio: f64) -> Vec<f64> {
     points
 }
 
-/// Inserts the mid points.
-fn quadratic_nodes(corners: &[f64]) -> Vec<f64> {
-    let mut nodes = vec![corners[0]];
-    for pair in corners.windows(2) {
-        nodes.push(0.5 * (pair[0] + pair[1]));
-        nodes.push(pair[1]);
-    }
-    nodes
-}
-
 /// Far node with its share of the angle by Simpson's rule. The far ellipse is a circle to 1/(4 far_radius^2).
 fn far_node(node: usize, eta: f64, j: usize, etas: &[f64]) -> FarNode {
-    let angle = if j % 2 == 1 {
-        4.0 * (etas[j + 1] - etas[j - 1]) / 6.0
-    } else {
-        let below = if j > 0 { etas[j] - etas[j - 2] } else { 0.0 };
-        let above = if j + 2 < etas.len() { etas[j + 2] - etas[j] } else { 0.0 };
-        (below + above) / 6.0
-    };
-    FarNode { node, normal: [eta.cos(), eta.sin()], angle }
-}
-
-/// Quadratic Lagrange polynomials at -1, 0, 1 and their slopes.
-fn quadratic(s: f64) -> ([f64; 3], [f64; 3]) {
-    ([0.5 * s * (s - 1.0), 1.0 - s * s, 0.5 * s * (s + 1.0)], [s - 0.5, -2.0 * s, s + 0.5])
+    FarNode { node, normal: [eta.cos(), eta.sin()], angle: simpson(etas, j) }
 }
 
 fn cell(corner: usize, strides: [usize; 2], xi: [f64; 2], eta: [f64; 2], equations: &[[usize; 2]]) -> Cell {
-    let mut nodes = [0; CELL_NODES];
-    let mut cell_equations = [FIXED; CELL_DOFS];
-    for m in 0..CELL_NODES {
-        nodes[m] = corner + (m / 3) * strides[0] + (m % 3) * strides[1];
-        cell_equations[2 * m] = equations[nodes[m]][0];
-        cell_equations[2 * m + 1] = equations[nodes[m]][1];
-    }
+    let nodes = std::array::from_fn(|m| corner + (m / 3) * strides[0] + (m % 3) * strides[1]);
     let half = [0.5 * (xi[1] - xi[0]), 0.5 * (eta[1] - eta[0])];
     let mut points = Vec::with_capacity(9);
     let mut mass = [[0.0; 3]; 3];
@@ -221,29 +157,9 @@ fn cell(corner: usize, strides: [usize; 2], xi: [f64; 2], eta: [f64; 2], equatio
             }
             let weight = ws * wt * half[0] * half[1] * det;
             let mode = [1.0, s, t];
-            for k in 0..3 {
-                for l in 0..3 {
-                    mass[k][l] += weight * mode[k] * mode[l];
-                }
-            }
+            add_mass(&mut mass, weight, &mode);
             points.push(GaussPoint { gradient, weight, mode });
         }
     }
-    Cell { nodes, equations: cell_equations, points, inverse_mass: inverse(&mass) }
-}
-
-/// Inverse of a regular 3x3 matrix.
-fn inverse(m: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    let minor = |r: usize, c: usize| {
-        let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
-        m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1]
-    };
-    let det: f64 = (0..3).map(|c| m[0][c] * minor(0, c)).sum();
-    let mut inv = [[0.0; 3]; 3];
-    for (r, row) in inv.iter_mut().enumerate() {
-        for (c, v) in row.iter_mut().enumerate() {
-            *v = minor(c, r) / det;
-        }
-    }
-    inv
+    Cell::new(nodes, equations, points, &mass)
 }

@@ -8,8 +8,9 @@
 //! Far field: the boundary carries the springs `2 mu / B` of the exact decay u_r ~ 1/r outside it.
 
 use super::law::{EnergyJet, PlaneStrainLaw};
+use super::mixed_cell::{CELL_DOFS, CELL_NODES, CellSystem, FIXED, PressureStep, condense};
 use super::skyline::SkylineMatrix;
-use super::slit_mesh::{CELL_DOFS, CELL_NODES, Cell, FIXED, GaussPoint, MeshSize, SlitMesh};
+use super::slit_mesh::{Cell, GaussPoint, MeshSize, SlitMesh};
 
 /// Bulk modulus over shear modulus.
 const BULK_OVER_MU: f64 = 1e7;
@@ -65,27 +66,6 @@ pub enum NewtonFailure {
     NotConverged,
 }
 
-/// Recovers the step of the pressure modes of a cell from its displacement step: `constant + by_u du`.
-#[derive(Clone)]
-struct PressureStep {
-    /// kappa M^-1 G
-    constant: [f64; 3],
-    /// kappa M^-1 K_up^T
-    by_u: [[f64; CELL_DOFS]; 3],
-}
-
-/// Linearisation of one cell.
-struct CellSystem {
-    /// Tangent K_uu, lower triangle.
-    tangent: [[f64; CELL_DOFS]; CELL_DOFS],
-    /// Nodal forces.
-    force: [f64; CELL_DOFS],
-    /// K_up^T, the derivative of the volume by the displacement.
-    coupling: [[f64; CELL_DOFS]; 3],
-    /// Volume residual G.
-    volume: [f64; 3],
-}
-
 /// The discrete problem: mesh, law and work space.
 pub struct WedgedCrack<'a> {
     law: &'a dyn PlaneStrainLaw,
@@ -105,7 +85,7 @@ impl<'a> WedgedCrack<'a> {
         let mesh = SlitMesh::new(size);
         let matrix = SkylineMatrix::new(mesh.profile());
         let rhs = vec![0.0; mesh.equation_count];
-        let pressure_step = vec![PressureStep { constant: [0.0; 3], by_u: [[0.0; CELL_DOFS]; 3] }; mesh.cells.len()];
+        let pressure_step = vec![PressureStep::ZERO; mesh.cells.len()];
         Self { law, rest_jet: law.jet(3.0), mu: law.shear_modulus(), mesh, matrix, rhs, pressure_step, iterations: 0 }
     }
 
@@ -381,28 +361,6 @@ fn add_node(
             }
         }
     }
-}
-
-/// Adds `kappa K_up M^-1 K_up^T` to the tangent.
-fn condense(cell: &Cell, kappa: f64, system: &mut CellSystem) -> PressureStep {
-    let mut step = PressureStep { constant: [0.0; 3], by_u: [[0.0; CELL_DOFS]; 3] };
-    for m in 0..3 {
-        for l in 0..3 {
-            let s = kappa * cell.inverse_mass[m][l];
-            step.constant[m] += s * system.volume[l];
-            for (d, v) in step.by_u[m].iter_mut().zip(&system.coupling[l]) {
-                *d += s * v;
-            }
-        }
-    }
-    for (coupling, by_u) in system.coupling.iter().zip(&step.by_u) {
-        for (i, row) in system.tangent.iter_mut().enumerate() {
-            for (entry, d) in row[..=i].iter_mut().zip(by_u) {
-                *entry += coupling[i] * d;
-            }
-        }
-    }
-    step
 }
 
 /// Deformation gradient at an integration point.

@@ -1,33 +1,8 @@
 //! Linearisation of one cell for [`super`]: neo-Hooke `mu/2 (I1 J^(-2/3) - 3)` with mu = 1 and pressure
 //! modes `p (J - 1) - p^2/(2 K)`, axisymmetric. Deformation gradients are stored as rr, rz, zr, zz, hoop.
 
-use super::mesh::{CELL_DOFS, Cell, GaussPoint};
-
-/// Recovers the step of the pressure modes of a cell from its displacement step: `constant + by_u du` [mu].
-#[derive(Clone)]
-pub struct PressureStep {
-    /// Part that does not depend on the displacement step.
-    pub constant: [f64; 3],
-    /// Derivative by the displacement step.
-    pub by_u: [[f64; CELL_DOFS]; 3],
-}
-
-impl PressureStep {
-    /// No step.
-    pub const ZERO: Self = Self { constant: [0.0; 3], by_u: [[0.0; CELL_DOFS]; 3] };
-}
-
-/// Linearisation of one cell.
-pub struct CellSystem {
-    /// Second derivative of the energy by the displacement, lower triangle [mu R].
-    pub tangent: [[f64; CELL_DOFS]; CELL_DOFS],
-    /// Nodal forces [mu R^2].
-    pub force: [f64; CELL_DOFS],
-    /// Derivative of the volume residual by the displacement [R^2].
-    pub coupling: [[f64; CELL_DOFS]; 3],
-    /// Volume residual of every pressure mode [R^3].
-    pub volume: [f64; 3],
-}
+use super::mesh::{Cell, GaussPoint};
+use crate::penetration::mixed_cell::{CELL_DOFS, CellSystem};
 
 /// Deformation gradient at an integration point: rr, rz, zr, zz, hoop.
 pub fn deformation(cell: &Cell, point: &GaussPoint, displacement: &[[f64; 2]]) -> [f64; 5] {
@@ -110,26 +85,4 @@ pub fn cell_system(cell: &Cell, displacement: &[[f64; 2]], p: &[f64; 3], bulk: f
         }
     }
     Some(system)
-}
-
-/// Adds `K coupling M^-1 coupling^T` to the tangent.
-pub fn condense(cell: &Cell, bulk: f64, system: &mut CellSystem) -> PressureStep {
-    let mut step = PressureStep { constant: [0.0; 3], by_u: [[0.0; CELL_DOFS]; 3] };
-    for m in 0..3 {
-        for l in 0..3 {
-            let s = bulk * cell.inverse_mass[m][l];
-            step.constant[m] += s * system.volume[l];
-            for (d, v) in step.by_u[m].iter_mut().zip(&system.coupling[l]) {
-                *d += s * v;
-            }
-        }
-    }
-    for (coupling, by_u) in system.coupling.iter().zip(&step.by_u) {
-        for (i, row) in system.tangent.iter_mut().enumerate() {
-            for (entry, d) in row[..=i].iter_mut().zip(by_u) {
-                *entry += coupling[i] * d;
-            }
-        }
-    }
-    step
 }

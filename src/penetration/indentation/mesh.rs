@@ -8,16 +8,12 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// Nodes per cell.
-pub const CELL_NODES: usize = 9;
-/// Displacement components per cell.
-pub const CELL_DOFS: usize = 18;
-/// Marks a displacement component that is kept at zero.
-pub const FIXED: usize = usize::MAX;
+use crate::penetration::mixed_cell::{self, CELL_NODES, FIXED, GAUSS_3, add_mass, quadratic, quadratic_nodes, simpson};
 
-/// Three-point Gauss-Legendre rule on [-1, 1].
-const GAUSS_3: [(f64, f64); 3] =
-    [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+/// One cell: rings outermost; gradients by (r, z) and the shape function over r.
+pub type Cell = mixed_cell::Cell<3>;
+/// One integration point.
+pub type GaussPoint = mixed_cell::GaussPoint<3>;
 
 /// The body under the indenter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,30 +54,6 @@ pub enum InnerRings {
     Core(f64),
     /// So many even steps from the origin to the disc.
     Even(usize),
-}
-
-/// One integration point.
-#[derive(Clone, Debug)]
-pub struct GaussPoint {
-    /// Rest gradient of the nine shape functions by (r, z) [1/R], and shape function over rest r.
-    pub gradient: [[f64; 3]; CELL_NODES],
-    /// Rest volume of the ring [R^3].
-    pub weight: f64,
-    /// The three pressure modes.
-    pub mode: [f64; 3],
-}
-
-/// One cell.
-#[derive(Clone, Debug)]
-pub struct Cell {
-    /// Node indices, rings outermost.
-    pub nodes: [usize; CELL_NODES],
-    /// Equation of every displacement component, or `FIXED`.
-    pub equations: [usize; CELL_DOFS],
-    /// Integration points.
-    pub points: Vec<GaussPoint>,
-    /// Inverse of the mass matrix of the pressure modes [1/R^3].
-    pub inverse_mass: [[f64; 3]; 3],
 }
 
 /// A node of the far hemisphere.
@@ -204,15 +176,7 @@ impl IndentationMesh {
 
     /// First coupled equation of every equation, for profile storage.
     pub fn profile(&self) -> Vec<usize> {
-        let mut first: Vec<usize> = (0..self.equation_count).collect();
-        for cell in &self.cells {
-            let free = cell.equations.iter().filter(|&&e| e != FIXED);
-            let low = free.clone().min().copied().unwrap_or(0);
-            for &e in free {
-                first[e] = first[e].min(low);
-            }
-        }
-        first
+        mixed_cell::profile(&self.cells, self.equation_count)
     }
 }
 
@@ -250,42 +214,12 @@ fn ray_corners(count: usize, domain: &Domain) -> Vec<f64> {
     lower.chain((0..=outer).map(|k| corner + (FRAC_PI_2 - corner) * k as f64 / outer as f64)).collect()
 }
 
-/// Weight of point `j` in Simpson's rule over the points, odd ones being mid points.
-fn simpson(x: &[f64], j: usize) -> f64 {
-    if j % 2 == 1 {
-        return 4.0 * (x[j + 1] - x[j - 1]) / 6.0;
-    }
-    let below = if j > 0 { x[j] - x[j - 2] } else { 0.0 };
-    let above = if j + 2 < x.len() { x[j + 2] - x[j] } else { 0.0 };
-    (below + above) / 6.0
-}
-
-/// Inserts the mid points.
-fn quadratic_nodes(corners: &[f64]) -> Vec<f64> {
-    let mut nodes = vec![corners[0]];
-    for pair in corners.windows(2) {
-        nodes.push(0.5 * (pair[0] + pair[1]));
-        nodes.push(pair[1]);
-    }
-    nodes
-}
-
-/// Quadratic Lagrange polynomials at -1, 0, 1 and their slopes.
-fn quadratic(s: f64) -> ([f64; 3], [f64; 3]) {
-    ([0.5 * s * (s - 1.0), 1.0 - s * s, 0.5 * s * (s + 1.0)], [s - 0.5, -2.0 * s, s + 0.5])
-}
-
 /// Linear polynomials at -1 and 1, none for the point between, and their slopes.
 fn linear(s: f64) -> ([f64; 3], [f64; 3]) {
     ([0.5 * (1.0 - s), 0.0, 0.5 * (1.0 + s)], [-0.5, 0.0, 0.5])
 }
 
 fn cell(nodes: [usize; CELL_NODES], rest: &[[f64; 2]], equations: &[[usize; 2]]) -> Cell {
-    let mut cell_equations = [FIXED; CELL_DOFS];
-    for (m, &node) in nodes.iter().enumerate() {
-        cell_equations[2 * m] = equations[node][0];
-        cell_equations[2 * m + 1] = equations[node][1];
-    }
     let collapsed = nodes[0] == nodes[1];
     let mut points = Vec::with_capacity(9);
     let mut mass = [[0.0; 3]; 3];
@@ -316,32 +250,12 @@ fn cell(nodes: [usize; CELL_NODES], rest: &[[f64; 2]], equations: &[[usize; 2]])
             // a displacement proportional to the distance from the origin changes the volume by the same ratio along a
             // ray
             let mode = [1.0, t, if collapsed { 0.0 } else { s }];
-            for k in 0..3 {
-                for l in 0..3 {
-                    mass[k][l] += weight * mode[k] * mode[l];
-                }
-            }
+            add_mass(&mut mass, weight, &mode);
             points.push(GaussPoint { gradient, weight, mode });
         }
     }
     if collapsed {
         mass[2][2] = 1.0;
     }
-    Cell { nodes, equations: cell_equations, points, inverse_mass: inverse(&mass) }
-}
-
-/// Inverse of a regular 3x3 matrix.
-fn inverse(m: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    let minor = |r: usize, c: usize| {
-        let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
-        m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1]
-    };
-    let det: f64 = (0..3).map(|c| m[0][c] * minor(0, c)).sum();
-    let mut inv = [[0.0; 3]; 3];
-    for (r, row) in inv.iter_mut().enumerate() {
-        for (c, v) in row.iter_mut().enumerate() {
-            *v = minor(c, r) / det;
-        }
-    }
-    inv
+    Cell::new(nodes, equations, points, &mass)
 }

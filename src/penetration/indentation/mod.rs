@@ -23,11 +23,12 @@ mod curve;
 mod mesh;
 mod outline;
 
+use super::mixed_cell::{CELL_DOFS, FIXED, PressureStep, condense};
 use super::skyline::SkylineMatrix;
-use cell::{PressureStep, cell_system, condense, deformation, volume_ratio};
+use cell::{cell_system, deformation, volume_ratio};
 pub use curve::{CurveLimit, IndentationCurve, IndentationFailure, IndentationPoint};
 pub use mesh::Domain;
-use mesh::{CELL_DOFS, FIXED, IndentationMesh, IndentationMeshSize, InnerRings};
+use mesh::{IndentationMesh, IndentationMeshSize, InnerRings};
 use outline::{Gap, Outline};
 
 /// Stiffness of a contact node over mu R.
