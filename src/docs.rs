@@ -216,9 +216,6 @@ fn stage_text(stage: Stage) -> [&'static str; 2] {
         Stage::NeedleContact => {
             ["opened path or separated faces against the needle, friction, tip springs", "`puncture`"]
         }
-        Stage::OpeningStations => {
-            ["where the sections of an opened path are, and what is cut", "`puncture`, scheme opening"]
-        }
         Stage::OpeningPoints => ["forces of the points beside the path", "`puncture`, scheme opening"],
         Stage::OpeningCells => ["what opening adds to the cells around the path", "`puncture`, scheme opening"],
         Stage::OpeningReactions => ["normal force, friction, reaction on needle and tip", "`puncture`, scheme opening"],

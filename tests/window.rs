@@ -3,6 +3,7 @@
 //! Needs `Xvfb` and `xdotool`; `REQUIRE_WINDOW=1` turns their absence into a failure.
 #![cfg(feature = "window")]
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -89,14 +90,29 @@ impl Display {
         Command::new("xdotool").env("DISPLAY", &self.name).args(arguments).output().unwrap()
     }
 
-    /// Waits for the window.
-    fn wait(&self) {
+    /// Waits for the window of a program; without one the program's own words say why.
+    fn wait(&self, program: &mut Child) {
         let begin = Instant::now();
         while !self.xdotool(&["search", "--name", "Stylet"]).status.success() {
-            assert!(begin.elapsed() < Duration::from_secs(60), "no window");
+            let ended = program.try_wait().unwrap();
+            if ended.is_some() || begin.elapsed() > Duration::from_secs(120) {
+                let _ = program.kill();
+                let mut told = String::new();
+                if let Some(out) = &mut program.stdout {
+                    let _ = out.read_to_string(&mut told);
+                }
+                if let Some(errors) = &mut program.stderr {
+                    let _ = errors.read_to_string(&mut told);
+                }
+                panic!("no window after {:?}, {ended:?}: {told}", begin.elapsed());
+            }
             std::thread::sleep(Duration::from_millis(100));
         }
-        // Without a window manager nobody gives it the keyboard.
+        self.focus();
+    }
+
+    /// Without a window manager nobody gives the window the keyboard.
+    fn focus(&self) {
         self.xdotool(&["search", "--name", "Stylet", "windowfocus"]);
     }
 }
@@ -136,7 +152,7 @@ fn a_hand_leads_the_needle_and_its_session_is_kept() {
     let out = display.path("attempt");
     let mut child =
         display.view(&["--out", out.to_str().unwrap()]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    display.wait();
+    display.wait(&mut child);
     // Play, two seconds of the tissue with "advance" held, the wheel, a drag that turns the view, pause, close. A slow machine gets
     // the time that it needs, and the first key again where the window was not ready for it.
     let rows = || std::fs::read_to_string(out.join("force.csv")).map_or(0, |t| t.lines().count().saturating_sub(1));
@@ -215,7 +231,7 @@ fn the_mouse_pushes_and_tilts_a_needle_on_a_free_path() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    display.wait();
+    display.wait(&mut child);
     let frames = || std::fs::read_to_string(out.join("force.csv")).map_or(0, |t| t.lines().count());
     let later = |count: usize| {
         let (begin, first) = (Instant::now(), frames());
@@ -294,7 +310,7 @@ fn another_program_leads_the_needle_and_sees_it() {
     };
     assert!(depth < 2.001, "{depth}");
     drop(peer);
-    display.wait();
+    display.wait(&mut child);
     std::thread::sleep(Duration::from_millis(500));
     let begin = Instant::now();
     while child.try_wait().unwrap().is_none() {
@@ -304,7 +320,7 @@ fn another_program_leads_the_needle_and_sees_it() {
     }
     let output = child.wait_with_output().unwrap();
     let mut rest = String::new();
-    std::io::Read::read_to_string(&mut told, &mut rest).unwrap();
+    told.read_to_string(&mut rest).unwrap();
     assert!(output.status.success(), "{rest}{}", String::from_utf8_lossy(&output.stderr));
     println!("{rest}");
     assert!(rest.contains("haptic: ") && rest.contains("2.00 mm"), "{rest}");
@@ -353,7 +369,7 @@ fn a_task_is_done_from_briefing_to_debriefing() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    display.wait();
+    display.wait(&mut child);
     let started = until(30, || {
         if depth(&out) == 0.0 {
             display.xdotool(&["key", "space"]);
@@ -372,7 +388,7 @@ fn a_task_is_done_from_briefing_to_debriefing() {
             if now > last.0 {
                 last = (now, Instant::now());
             } else if last.1.elapsed() > Duration::from_secs(4) {
-                display.wait();
+                display.focus();
                 display.xdotool(&["keyup", "Down"]);
                 display.xdotool(&["keydown", "Down"]);
                 last.1 = Instant::now();
@@ -386,7 +402,7 @@ fn a_task_is_done_from_briefing_to_debriefing() {
     std::thread::sleep(Duration::from_millis(700));
     display.xdotool(&["search", "--name", "Stylet", "windowmap"]);
     display.xdotool(&["search", "--name", "Stylet", "windowsize", "1280", "800"]);
-    display.wait();
+    display.focus();
     display.xdotool(&["keyup", "Down"]);
     display.xdotool(&["keydown", "Down"]);
     assert!(push_to(4.75e-3), "stuck at {} m", depth(&out));
@@ -430,7 +446,7 @@ fn an_edited_scene_is_read_anew() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    display.wait();
+    display.wait(&mut child);
     assert!(until(60, || depth(&out) > 2e-4), "the script does not run");
     let save = |text: &str, later: u64| {
         std::fs::write(&file, text).unwrap();
@@ -468,7 +484,7 @@ fn a_lost_display_takes_nothing_with_it() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    display.wait();
+    display.wait(&mut child);
     let led = until(60, || {
         if depth(&out) == 0.0 {
             display.xdotool(&["key", "space"]);

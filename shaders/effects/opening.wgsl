@@ -15,15 +15,16 @@ struct OpeningParams {
     friction: vec4<f32>,
     // Stations, clusters, cells, nodes.
     counts: vec4<u32>,
-    // Half of the stations over which the normal force is averaged; the others unused.
-    averaged: vec4<u32>,
+    // Half of the stations over which the normal force is averaged; runs of cells; first sum of the runs, and of the cells.
+    sums: vec4<u32>,
     // Length over which the surface closes behind a tip that has entered [m]; yzw: shift of a section's centre per radius, of a bevel.
     surface: vec4<f32>,
     // Table of the dimple: root of the force [N^(1/2)], depth u [m], its slope up to the next row, energy V [J].
     dimple: array<vec4<f32>, 26>,
 }
 
-// A section of the path. The first three are known before the run.
+// A section of the path. The first three are known before the run. Of a run of cells only the mean of the sections in them: first and end
+// in `lists`, `centre`, `centre_rate` and the part that is cut.
 struct OpeningStation {
     // Material coordinate Z [m], and that from which it counts as cut; rc over the radius of the needle; w unused.
     depth: vec4<f32>,
@@ -35,7 +36,7 @@ struct OpeningStation {
     centre_rate: vec4<f32>,
     // Distance behind the tip [m], part that is cut, its rate [1/m], slope of the radius.
     place: vec4<f32>,
-    // Radius where all is cut [m], speed of the section along the needle [m/s], stretch of the stick spring [m]; w unused.
+    // Radius where all is cut [m], stretch of the stick spring [m]; yw unused.
     rubbing: vec4<f32>,
     // Derivatives of the energy: by the centre [N] and by rc [N]; by the rates of both [J].
     by_centre: vec4<f32>,
@@ -56,7 +57,7 @@ struct OpeningEntry {
     _pad: f32,
 }
 
-// What a cluster of points or a cell tells of the stations: derivatives of its energy by centre and rc, and by their rates.
+// What the points of a cluster, a cell or a run of cells tell of a station: derivatives of its energy by centre and rc, and by their rates.
 struct OpeningSum {
     by_centre: vec4<f32>,
     by_rate: vec4<f32>,

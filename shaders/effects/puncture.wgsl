@@ -61,14 +61,10 @@ struct TipAnchor {
     local: vec4<f32>,
 }
 
-// Where an anchor sits now: cell (w unused), local coordinates 0..1, force along the path [N].
+// Where an anchor sits now: cell (w unused); local coordinates 0..1, and force along the path [N].
 struct TipAnchorLoad {
     cell: vec4<u32>,
-    local: vec4<f32>,
-    force: f32,
-    _pad0: f32,
-    _pad1: f32,
-    _pad2: f32,
+    load: vec4<f32>,
 }
 
 struct TipState {

@@ -26,10 +26,10 @@ fn tip_share(contact: Contact) -> vec4<f32> {
     let near = free_tip.inside == 1.0 && dot(away, away) <= puncture.anchor_reach * puncture.anchor_reach;
     for (var anchor = select(ANCHOR_COUNT, 0u, near); anchor < ANCHOR_COUNT; anchor++) {
         let cell = tip_anchor_loads[anchor].cell.xyz;
-        let local = tip_anchor_loads[anchor].local.xyz;
-        let weight = select(vec3<f32>(0.0), 1.0 - local, contact.grid == cell)
-            + select(vec3<f32>(0.0), local, contact.grid == cell + 1u);
-        let axial = step_input.direction.xyz * tip_anchor_loads[anchor].force;
+        let load = tip_anchor_loads[anchor].load;
+        let weight = select(vec3<f32>(0.0), 1.0 - load.xyz, contact.grid == cell)
+            + select(vec3<f32>(0.0), load.xyz, contact.grid == cell + 1u);
+        let axial = step_input.direction.xyz * load.w;
         share += vec4<f32>(axial + free_tip.sway.xyz, 1.0) * (weight.x * weight.y * weight.z);
     }
     return share;

@@ -13,7 +13,7 @@ struct NodeSums {
     raised_mass: u32,
     out_of_range: u32,
     clamped_nodes: u32,
-    // Taken by raised masses and by the speed limit in this frame [J]; largest step ratio, see NodeCures.
+    // Taken by raised masses and by the speed limit in this frame [J]; largest step ratio, see node_cures.
     raised_energy: f32,
     clamped_energy: f32,
     step_ratio: f32,

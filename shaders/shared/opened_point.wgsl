@@ -21,20 +21,23 @@ fn strain_of(F: mat3x3<f32>) -> mat3x3<f32> {
     );
 }
 
-// `H`: F_h - I of the closed path.
-fn opened_stress(material: u32, place: OpenedPlace, H: mat3x3<f32>) -> OpenedStress {
-    let open = strain_of(opened_gradient(place, deformation_gradient(H)));
-    var stress = isochoric_stress(materials[material], open);
-    var closed = isochoric_stress(materials[material], H);
+// Stress of law and fibres, without the pressure.
+fn shape_stress(material: u32, H: mat3x3<f32>) -> IsochoricStress {
+    var stress = isochoric_stress(materials[material], H);
 #ifdef FIBRES
-    let fibre = fibre_stress(material, open, stress.cof, stress.dj);
+    let fibre = fibre_stress(material, H, stress.cof, stress.dj);
     stress.P += fibre.P;
     stress.tangent += fibre.tangent;
-    closed.P += fibre_stress(material, H, closed.cof, closed.dj).P;
 #endif
+    return stress;
+}
+
+// `H`: F_h - I of the closed path; `closed`: its stress.
+fn opened_stress(material: u32, place: OpenedPlace, H: mat3x3<f32>, closed: mat3x3<f32>) -> OpenedStress {
+    let stress = shape_stress(material, strain_of(opened_gradient(place, deformation_gradient(H))));
     var out: OpenedStress;
     out.derivatives = pull_back(place, stress.P);
-    out.derivatives.gradient -= closed.P;
+    out.derivatives.gradient -= closed;
     out.tangent = stress.tangent;
     out.turned_tangent = stress.turned_tangent;
     return out;

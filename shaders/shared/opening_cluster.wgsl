@@ -1,20 +1,28 @@
-// Points of one station in one cell, as both the stage of their forces and that of their energies read them.
+// Points in one cell, as both the stage of their forces and that of their energies read them.
 #import shared/opened_point
 #import shared/displacement
 
 struct OpeningCluster {
     // Cell, w: index of its material.
     cell: vec4<u32>,
-    // First point, end, station; w unused.
+    // First point, end; zw unused.
     points: vec4<u32>,
     // Middle of the cell from the entry of the path [m]; one over its edges [1/m]. w unused.
     middle: vec4<f32>,
     inverse: vec4<f32>,
 }
 
+struct OpeningPoint {
+    // Place in the cell from its middle, -1/2..1/2; w: rest volume [m^3].
+    place: vec4<f32>,
+    // Station; the sum that its derivatives go into, and 1 at the last point of that sum. w unused.
+    numbers: vec4<u32>,
+}
+
 @group(1) @binding(20) var<storage, read> path_clusters: array<OpeningCluster>;
-// Place in the cell from its middle, -1/2..1/2; w: rest volume [m^3].
-@group(1) @binding(21) var<storage, read> path_points: array<vec4<f32>>;
+// In the order in which they are cut.
+@group(1) @binding(21) var<storage, read> path_points: array<OpeningPoint>;
+@group(3) @binding(20) var<storage, read> path_stations: array<OpeningStation>;
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
 // Displacement in a cell as `mean + p.x x + p.y y + p.z z + p.x p.y xy + p.y p.z yz + p.z p.x zx + p.x p.y p.z xyz`, with the place p from
@@ -51,6 +59,11 @@ fn cell_modes(cell: vec3<u32>) -> CellModes {
     }
     m.mean += vec3<f32>(origin) * DISPLACEMENT_UNIT;
     return m;
+}
+
+// End of points first and end of a cluster that are opened: none where the first is not cut.
+fn opened_end(points: vec2<u32>) -> u32 {
+    return select(points.x, points.y, path_stations[path_points[points.x].numbers.x].place.y > 0.0);
 }
 
 fn displacement_at(m: CellModes, p: vec3<f32>) -> vec3<f32> {

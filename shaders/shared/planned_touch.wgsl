@@ -18,11 +18,10 @@ fn tip_share(contact: Contact) -> vec4<f32> {
     let near = abs(contact.rest_axial - tip_state.coordinate) <= puncture.anchor_reach;
     for (var anchor = select(ANCHOR_COUNT, 0u, near); anchor < ANCHOR_COUNT; anchor++) {
         let cell = tip_anchor_loads[anchor].cell.xyz;
-        let local = tip_anchor_loads[anchor].local.xyz;
-        let weight = select(vec3<f32>(0.0), 1.0 - local, contact.grid == cell)
-            + select(vec3<f32>(0.0), local, contact.grid == cell + 1u);
-        let force = tip_anchor_loads[anchor].force;
-        share += vec2<f32>(force, select(0.0, 1.0, force != 0.0)) * (weight.x * weight.y * weight.z);
+        let load = tip_anchor_loads[anchor].load;
+        let weight = select(vec3<f32>(0.0), 1.0 - load.xyz, contact.grid == cell)
+            + select(vec3<f32>(0.0), load.xyz, contact.grid == cell + 1u);
+        share += vec2<f32>(load.w, select(0.0, 1.0, load.w != 0.0)) * (weight.x * weight.y * weight.z);
     }
     return vec4<f32>(step_input.direction.xyz * share.x, share.y);
 }

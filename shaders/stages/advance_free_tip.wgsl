@@ -239,8 +239,7 @@ fn advance_free_tip(@builtin(local_invocation_index) lane: u32) {
     workgroupBarrier();
     if (lane < ANCHOR_COUNT) {
         tip_anchor_loads[lane].cell = vec4<u32>(grid.cell, 0u);
-        tip_anchor_loads[lane].local = vec4<f32>(grid.local, 0.0);
-        tip_anchor_loads[lane].force = spring * gap;
+        tip_anchor_loads[lane].load = vec4<f32>(grid.local, spring * gap);
         // Energy and, with the force after the move (trapezoidal rule of the leapfrog work), loss of this spring.
         gaps[lane] = 0.5 * spring * gap * gap;
         columns_x[lane] = vec3<f32>(spring * gap * (old_gap - gap), 0.0, 0.0);
@@ -255,7 +254,7 @@ fn advance_free_tip(@builtin(local_invocation_index) lane: u32) {
         for (var i = 0u; i < ANCHOR_COUNT; i++) {
             stored += gaps[i];
             lost += columns_x[i].x;
-            force += tip_anchor_loads[i].force;
+            force += tip_anchor_loads[i].load.w;
             sway += sways[i] * (inside / f32(ANCHOR_COUNT));
         }
         sway -= t * dot(sway, t);

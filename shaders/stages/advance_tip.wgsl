@@ -11,6 +11,7 @@
 #endif
 #ifdef OPENING
 #import shared/tip_contact
+#import shared/path_sections
 @group(3) @binding(23) var<storage, read> opening_record: OpeningRecord;
 #endif
 
@@ -189,8 +190,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         gaps[lane] = place.gap;
         distances[lane] = place.distance;
         tip_anchor_loads[lane].cell = vec4<u32>(place.cell, 0u);
-        tip_anchor_loads[lane].local = vec4<f32>(place.local, 0.0);
-        tip_anchor_loads[lane].force = force + bond_force / f32(ANCHOR_COUNT);
+        tip_anchor_loads[lane].load = vec4<f32>(place.local, force + bond_force / f32(ANCHOR_COUNT));
     }
     workgroupBarrier();
     if (lane == 0u) {
@@ -227,4 +227,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         tip_state.cap_dissipation += beyond;
         tip_state.membrane_impulse += force * membrane_share(after) * params.dt;
     }
+#ifdef OPENING
+    place_sections(lane, after, dimple_part(after) * touch.dimple);
+#endif
 }

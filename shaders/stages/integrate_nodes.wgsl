@@ -115,7 +115,6 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
     let ratio = sum.w * params.dt * params.dt / (4.0 * mass);
     for (var once = select(1u, 0u, mass > scaled_mass || fast || ratio > WATCHED_STEP_RATIO); once == 0u; once++) {
-        var cures = node_cures[node];
         // The kinetic energy is told with the mass at rest: what the rest of the mass gained in this step is gone.
         var raised = 0.5 * (mass - scaled_mass) * (dot(next, next) - dot(old.xyz, old.xyz));
         // Work of the force that holds the node back.
@@ -124,11 +123,9 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         raised *= share;
         clamped *= share;
 #endif
-        cures.raised_energy += raised;
-        cures.clamped_energy += clamped;
-        cures.clamped_steps += select(0.0, 1.0, fast);
-        cures.step_ratio = max(cures.step_ratio, select(0.0, ratio, ratio > WATCHED_STEP_RATIO));
-        node_cures[node] = cures;
+        let before = node_cures[node];
+        let watched = max(before.w, select(0.0, ratio, ratio > WATCHED_STEP_RATIO));
+        node_cures[node] = vec4<f32>(before.xyz + vec3<f32>(raised, clamped, select(0.0, 1.0, fast)), watched);
     }
     let damped = old.w + taken;
     node_velocity[node] = vec4<f32>(next, damped);

@@ -44,11 +44,11 @@ fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         sums.max_speed = max(sums.max_speed, length(v.xyz));
         sums.raised_mass += u32(u.w);
         let cures = node_cures[node];
-        sums.raised_energy += cures.raised_energy;
-        sums.clamped_energy += cures.clamped_energy;
-        sums.clamped_nodes += u32(cures.clamped_steps);
-        sums.step_ratio = max(sums.step_ratio, cures.step_ratio);
-        node_cures[node] = NodeCures();
+        sums.raised_energy += cures.x;
+        sums.clamped_energy += cures.y;
+        sums.clamped_nodes += u32(cures.z);
+        sums.step_ratio = max(sums.step_ratio, cures.w);
+        node_cures[node] = vec4<f32>(0.0);
         // +-30 mm of the +-31 mm that the fixed point holds.
         let far = any(abs(u.xyz) > vec3<i32>(2061584302));
         sums.out_of_range += select(0u, 1u, far || not_finite(v.xyz));

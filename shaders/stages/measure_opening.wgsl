@@ -22,44 +22,40 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
     var energy = 0.0;
     for (var index = thread; index < opening.counts.y; index += 128u) {
         let cluster = path_clusters[index];
-        let station = path_stations[cluster.points.z];
-        let section = PathSection(station.centre_rate.xyz, station.centre.w * scale, station.centre_rate.w);
-        let end = select(cluster.points.x, cluster.points.y, station.centre.w > 0.0);
+        let end = opened_end(cluster.points.xy);
         let modes = cell_modes(cluster.cell.xyz);
-        let origin = cluster.middle.xyz - station.centre.xyz;
         for (var i = cluster.points.x; i < end; i++) {
-            let p = path_points[i].xyz;
+            let point = path_points[i];
+            let station = path_stations[point.numbers.x];
+            let section = PathSection(station.centre_rate.xyz, station.centre.w * scale, station.centre_rate.w);
+            let p = point.place.xyz;
             let H = strain_at(modes, p, cluster.inverse.xyz);
-            let y = origin + p / cluster.inverse.xyz + displacement_at(modes, p);
+            let y = cluster.middle.xyz - station.centre.xyz + p / cluster.inverse.xyz + displacement_at(modes, p);
             let place = opened_place(section, across(y) * scale, deformation_gradient(H));
-            energy += path_points[i].w * opened_energy(cluster.cell.w, place, H);
+            energy += select(0.0, point.place.w, section.radius > 0.0) * opened_energy(cluster.cell.w, place, H);
         }
     }
     for (var index = thread; index < opening.counts.z; index += 128u) {
         let cell = near_cells[index];
-        let mean = mean_of_stations(cell.stations.x, cell.stations.y);
-        for (var once = select(1u, 0u, mean.middle.w > 0.0); once == 0u; once++) {
-            let section = PathSection(mean.rate.xyz, mean.middle.w * scale, mean.rate.w);
+        let mean = path_stations[opening.counts.x + cell.stations.x];
+        for (var once = select(1u, 0u, mean.centre.w > 0.0); once == 0u; once++) {
+            let section = PathSection(mean.centre_rate.xyz, mean.centre.w * scale, mean.centre_rate.w);
             let modes = cell_modes(cell.cell.xyz);
             let H = strain_at(modes, vec3<f32>(0.0), cell.inverse.xyz);
             let gradient = deformation_gradient(H);
             let width = 1.0 / cell.inverse.xyz;
             let volume = width.x * width.y * width.z;
-            let middle = cell.middle.xyz + modes.mean - mean.middle.xyz;
+            let middle = cell.middle.xyz + modes.mean - mean.centre.xyz;
             var dilated = 0.0;
-            for (var at = 0u; at < 8u; at++) {
-                let eta = across(middle + gradient * (gauss_place(at) * width)) * scale;
-                dilated += 0.125 * (dilation(section.radius, dot(eta, eta)).x - 1.0);
+            for (var i = 0u; i < 4u; i++) {
+                let eta = across(middle + gradient * (volume_place(i) * width)) * scale;
+                dilated += 0.25 * (dilation(section.radius, dot(eta, eta)).x - 1.0);
             }
             let dj = jacobian_minus_one(H);
             let open = dj + (1.0 + dj) * dilated;
             energy += 0.5 * materials[cell.cell.w].bulk_modulus * volume * (open * open - dj * dj);
-            let whole = cell.stations.z == 8u;
-            for (var at = cell.stations.z; at < cell.stations.w; at++) {
-                let eta = across(middle + gradient * (gauss_place(at) * width)) * scale;
-                let part = select(0.125 * volume * share_of(cell, at), volume, whole);
-                energy += part * opened_energy(cell.cell.w, opened_place(section, eta, gradient), H);
-            }
+            let eta = across(middle + gradient * (cell.place.xyz * width)) * scale;
+            energy += cell.place.w * volume * opened_energy(cell.cell.w, opened_place(section, eta, gradient), H);
         }
     }
     opening_totals.elastic[thread / 4u][thread % 4u] = energy;

@@ -37,6 +37,18 @@ fn needle_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     if (index >= CONTACT_COUNT) {
         return;
     }
+#ifdef OPENING
+    // No node is pushed, and the tip reaches few: of the others nothing more is read. A loop, since software adapters walk through an `if`.
+    let reached = abs(contact_nodes[index].sizes.y - tip_state.coordinate) <= puncture.anchor_reach;
+    for (var once = select(1u, 0u, reached); once == 0u; once++) {
+        advance_contact(index);
+    }
+#else
+    advance_contact(index);
+#endif
+}
+
+fn advance_contact(index: u32) {
     let contact = contact_at(index);
     let lever = contact.rest + vec3<f32>(node_displacement[contact.node].xyz) * DISPLACEMENT_UNIT
         - step_input.tip.xyz;

@@ -13,86 +13,87 @@ fn opening_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     if (index >= opening.counts.z) {
         return;
     }
+    // Where nothing was ever cut nothing was ever written. A loop, since software adapters walk through an `if`.
+    let run = opening.counts.x + near_cells[index].stations.x;
+    for (var once = select(1u, 0u, path_stations[run].place.y > 0.0); once == 0u; once++) {
+        open_cell(index, path_stations[run].centre, path_stations[run].centre_rate);
+    }
+}
+
+// `centre`, `rate`: the path there, see OpeningStation.
+fn open_cell(index: u32, centre: vec4<f32>, rate: vec4<f32>) {
     let cell = near_cells[index];
     let inverse = cell.inverse.xyz;
-    let mean = mean_of_stations(cell.stations.x, cell.stations.y);
     let scale = 1.0 / opening.direction.w;
-    let section = PathSection(mean.rate.xyz, mean.middle.w * scale, mean.rate.w);
+    let section = PathSection(rate.xyz, centre.w * scale, rate.w);
     let material = materials[cell.cell.w];
     var f: CellModes;
     var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
-    var bound = 0.0;
-    // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
-    for (var once = select(1u, 0u, mean.middle.w > 0.0); once == 0u; once++) {
-        let modes = cell_modes(cell.cell.xyz);
-        let H = strain_at(modes, vec3<f32>(0.0), inverse);
-        let gradient = deformation_gradient(H);
-        let cof = cofactor(gradient);
-        let width = 1.0 / inverse;
-        let volume = width.x * width.y * width.z;
-        // y is linear in the cell, as its gradient is one: a force at a place is one on the middle and one on the gradient.
-        let middle = across(cell.middle.xyz + modes.mean - mean.middle.xyz) * scale;
-        let lateral = mat3x3<f32>(
-            across(gradient[0]) * (width.x * scale),
-            across(gradient[1]) * (width.y * scale),
-            across(gradient[2]) * (width.z * scale),
-        );
-        // The volume is the cell's.
-        var dilated = 0.0;
-        for (var at = 0u; at < 8u; at++) {
-            let eta = middle + lateral * gauss_place(at);
-            dilated += 0.125 * (dilation(section.radius, dot(eta, eta)).x - 1.0);
-        }
-        let dj = jacobian_minus_one(H);
-        let J = 1.0 + dj;
-        let open = dj + J * dilated;
-        var by_gradient = cof * (material.bulk_modulus * (open * (1.0 + dilated) - dj) * volume);
-        let by_dilation = material.bulk_modulus * open * J * volume * 0.125;
-        var by_middle = vec3<f32>(0.0);
-        for (var at = 0u; at < 8u; at++) {
-            let p = gauss_place(at);
-            let eta = middle + lateral * p;
-            let rate = dilation(section.radius, dot(eta, eta)) * by_dilation;
-            let by_place = eta * (2.0 * rate.y * scale);
-            by_middle += by_place;
-            by_gradient += outer(by_place, p * width);
-            sum.by_centre += vec4<f32>(-by_place, rate.z * scale);
-        }
-        // What keeps the shape, where points do not carry it: in the middle of a cell without points.
-        let closed = isochoric_stress(material, H);
-        var tangent = vec2<f32>(closed.tangent, closed.turned_tangent);
-        var grown = 1.0;
-        let size = pow(volume, 0.33333333);
-        let whole = cell.stations.z == 8u;
-        for (var at = cell.stations.z; at < cell.stations.w; at++) {
-            let p = gauss_place(at);
-            let place = opened_place(section, middle + lateral * p, gradient);
-            let part = select(0.125 * volume * share_of(cell, at), volume, whole);
-            let now = opened_stress(cell.cell.w, place, H);
-            let by_place = now.derivatives.place * part;
-            by_middle += by_place;
-            by_gradient += now.derivatives.gradient * part + outer(by_place, p * width);
-            sum.by_centre += vec4<f32>(-by_place, now.derivatives.radius * part);
-            sum.by_rate += vec4<f32>(now.derivatives.centre_rate, now.derivatives.radius_rate) * part;
-            let growth = amplification(place);
-            grown = max(grown, select(1.0, growth.x + growth.y * size, part > 0.0));
-            tangent = max(tangent, select(vec2<f32>(0.0), vec2<f32>(now.tangent, now.turned_tangent), part > 0.0));
-        }
-        // Bound of the stiffness beyond that of the closed cell, where open faces may meet.
-        let b = dot(inverse, inverse) * 0.0625;
-        let cof_b = squared_norm_bound(cof) * b;
-        let most = max(1.0 + dilated, 1.0);
-        let with_opening = (material.bulk_modulus + tangent.y) * cof_b * most * most + tangent.x * grown * grown * b;
-        let without = (material.bulk_modulus + closed.turned_tangent) * cof_b + closed.tangent * b;
-        bound = 8.0 * volume * max(with_opening - without, 0.0);
-        f.mean = by_middle;
-        f.x = by_gradient[0] * inverse.x;
-        f.y = by_gradient[1] * inverse.y;
-        f.z = by_gradient[2] * inverse.z;
+    let modes = cell_modes(cell.cell.xyz);
+    let H = strain_at(modes, vec3<f32>(0.0), inverse);
+    let gradient = deformation_gradient(H);
+    let cof = cofactor(gradient);
+    let width = 1.0 / inverse;
+    // Where the path has closed again all of it is zero.
+    let volume = select(0.0, width.x * width.y * width.z, centre.w > 0.0);
+    // y is linear in the cell, as its gradient is one: a force at a place is one on the middle and one on the gradient.
+    let middle = across(cell.middle.xyz + modes.mean - centre.xyz) * scale;
+    let lateral = mat3x3<f32>(
+        across(gradient[0]) * (width.x * scale),
+        across(gradient[1]) * (width.y * scale),
+        across(gradient[2]) * (width.z * scale),
+    );
+    // The volume is the cell's: the mean of the dilation, with its derivatives by place, gradient and radius.
+    var dilated = 0.0;
+    var rates = vec4<f32>(0.0);
+    var moments = mat3x3<f32>(vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0));
+    for (var i = 0u; i < 4u; i++) {
+        let p = volume_place(i);
+        let eta = middle + lateral * p;
+        let d = dilation(section.radius, dot(eta, eta));
+        let by_place = eta * (2.0 * d.y);
+        dilated += 0.25 * (d.x - 1.0);
+        rates += vec4<f32>(by_place, d.z);
+        moments += outer(by_place, p);
     }
+    let dj = jacobian_minus_one(H);
+    let J = 1.0 + dj;
+    let open = dj + J * dilated;
+    let by_dilation = material.bulk_modulus * open * J * volume * 0.25 * scale;
+    var by_gradient = cof * (material.bulk_modulus * (open * (1.0 + dilated) - dj) * volume);
+    by_gradient += mat3x3<f32>(moments[0] * width.x, moments[1] * width.y, moments[2] * width.z) * by_dilation;
+    var by_middle = rates.xyz * by_dilation;
+    sum.by_centre = vec4<f32>(-rates.xyz, rates.w) * by_dilation;
+    // What keeps the shape, of what points do not carry.
+    let closed = shape_stress(cell.cell.w, H);
+    let p = cell.place.xyz;
+    let part = cell.place.w * volume;
+    let place = opened_place(section, middle + lateral * p, gradient);
+    let now = opened_stress(cell.cell.w, place, H, closed.P);
+    let by_place = now.derivatives.place * part;
+    by_middle += by_place;
+    by_gradient += now.derivatives.gradient * part + outer(by_place, p * width);
+    sum.by_centre += vec4<f32>(-by_place, now.derivatives.radius * part);
+    sum.by_rate += vec4<f32>(now.derivatives.centre_rate, now.derivatives.radius_rate) * part;
+    let growth = amplification(place);
+    let carries = part > 0.0;
+    let grown = select(1.0, max(1.0, growth.x + growth.y * pow(width.x * width.y * width.z, 0.33333333)), carries);
+    let opened = select(vec2<f32>(0.0), vec2<f32>(now.tangent, now.turned_tangent), carries);
+    let tangent = max(vec2<f32>(closed.tangent, closed.turned_tangent), opened);
+    // Bound of the stiffness beyond that of the closed cell, where open faces may meet.
+    let b = dot(inverse, inverse) * 0.0625;
+    let cof_b = squared_norm_bound(cof) * b;
+    let most = max(1.0 + dilated, 1.0);
+    let with_opening = (material.bulk_modulus + tangent.y) * cof_b * most * most + tangent.x * grown * grown * b;
+    let without = (material.bulk_modulus + closed.turned_tangent) * cof_b + closed.tangent * b;
+    let bound = 8.0 * volume * max(with_opening - without, 0.0);
+    f.mean = by_middle;
+    f.x = by_gradient[0] * inverse.x;
+    f.y = by_gradient[1] * inverse.y;
+    f.z = by_gradient[2] * inverse.z;
     let slot = opening.counts.y + index;
     for (var c = 0u; c < 8u; c++) {
         opening_corners[8u * slot + c] = vec4<f32>(force_on_corner(f, c), bound);
     }
-    opening_sums[slot] = sum;
+    opening_sums[opening.sums.w + index] = sum;
 }

@@ -2,15 +2,19 @@
 #import shared/params
 #import shared/thread_index
 #import shared/corner_force
+#import effects/puncture
 #import effects/opening
+#import shared/tip_read
 
-// A node near the path: its slot of `corner_force`, entries of its corners (first, end), first entry of its sections; their end.
+// A node near the path: its slot of `corner_force`, its corners (first, end), first entry of its sections; their end,
+// and material coordinate [m] of a tip that has cut nothing near it (bits of a float).
 struct OpeningNode {
     numbers: vec4<u32>,
     more: vec4<u32>,
 }
 
 @group(1) @binding(22) var<storage, read> path_entries: array<OpeningEntry>;
+@group(1) @binding(25) var<storage, read> path_corners: array<u32>;
 @group(1) @binding(24) var<storage, read> path_nodes: array<OpeningNode>;
 @group(3) @binding(20) var<storage, read> path_stations: array<OpeningStation>;
 @group(3) @binding(21) var<storage, read> opening_corners: array<vec4<f32>>;
@@ -21,10 +25,16 @@ fn opening_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     if (index >= opening.counts.w) {
         return;
     }
-    let node = path_nodes[index];
+    // A loop that runs once or not at all where nothing near the node is cut.
+    for (var once = select(1u, 0u, tip_state.coordinate > bitcast<f32>(path_nodes[index].more.y)); once == 0u; once++) {
+        gather_on(path_nodes[index]);
+    }
+}
+
+fn gather_on(node: OpeningNode) {
     var sum = vec4<f32>(0.0);
     for (var e = node.numbers.y; e < node.numbers.z; e++) {
-        let corner = opening_corners[path_entries[e].index];
+        let corner = opening_corners[path_corners[e]];
         sum += vec4<f32>(-corner.xyz, corner.w);
     }
     let t = opening.direction.xyz;

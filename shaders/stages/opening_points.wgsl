@@ -1,9 +1,8 @@
-// Stage opening_points: forces of the points beside the path, one thread per cluster: those of one station in one cell.
+// Stage opening_points: forces of the points beside the path, one thread per cluster: points in one cell.
 // Equations: src/needle/opening.rs and point_forces in src/cpu/opening.rs.
 #import shared/thread_index
 #import shared/opening_cluster
 
-@group(3) @binding(20) var<storage, read> path_stations: array<OpeningStation>;
 // f_int on the eight corners of a slot [N]; w: bound of the stiffness there [N/m].
 @group(3) @binding(21) var<storage, read_write> opening_corners: array<vec4<f32>>;
 @group(3) @binding(22) var<storage, read_write> opening_sums: array<OpeningSum>;
@@ -14,32 +13,38 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     if (index >= opening.counts.y) {
         return;
     }
+    // What is not opened is as its cells have it, and where nothing was ever cut nothing was ever written. A loop, since software adapters
+    // walk through an `if`.
+    let points = path_clusters[index].points.xy;
+    for (var once = select(1u, 0u, points.x < opened_end(points)); once == 0u; once++) {
+        open_cluster(index);
+    }
+}
+
+fn open_cluster(index: u32) {
     let cluster = path_clusters[index];
-    let station = path_stations[cluster.points.z];
     let inverse = cluster.inverse.xyz;
     let scale = 1.0 / opening.direction.w;
-    let section = PathSection(station.centre_rate.xyz, station.centre.w * scale, station.centre_rate.w);
     var f: CellModes;
     // Of the corners below, and of those above.
     var lower = vec4<f32>(0.0);
     var upper = vec4<f32>(0.0);
     var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
-    // What is not opened is as its cells have it: no point at all.
-    let end = select(cluster.points.x, cluster.points.y, station.centre.w > 0.0);
     let modes = cell_modes(cluster.cell.xyz);
-    // The middle of the cell, from the middle of the path.
-    let origin = cluster.middle.xyz - station.centre.xyz;
-    for (var i = cluster.points.x; i < end; i++) {
+    for (var i = cluster.points.x; i < cluster.points.y; i++) {
         let point = path_points[i];
-        let p = point.xyz;
+        let station = path_stations[point.numbers.x];
+        let section = PathSection(station.centre_rate.xyz, station.centre.w * scale, station.centre_rate.w);
+        let volume = select(0.0, point.place.w, section.radius > 0.0);
+        let p = point.place.xyz;
         let H = strain_at(modes, p, inverse);
-        let y = origin + p / inverse + displacement_at(modes, p);
+        let y = cluster.middle.xyz - station.centre.xyz + p / inverse + displacement_at(modes, p);
         let place = opened_place(section, across(y) * scale, deformation_gradient(H));
-        let now = opened_stress(cluster.cell.w, place, H);
-        let by_place = now.derivatives.place * point.w;
-        let x = now.derivatives.gradient[0] * (inverse.x * point.w);
-        let y_ = now.derivatives.gradient[1] * (inverse.y * point.w);
-        let z = now.derivatives.gradient[2] * (inverse.z * point.w);
+        let now = opened_stress(cluster.cell.w, place, H, shape_stress(cluster.cell.w, H).P);
+        let by_place = now.derivatives.place * volume;
+        let x = now.derivatives.gradient[0] * (inverse.x * volume);
+        let y_ = now.derivatives.gradient[1] * (inverse.y * volume);
+        let z = now.derivatives.gradient[2] * (inverse.z * volume);
         f.mean += by_place;
         f.x += by_place * p.x + x;
         f.y += by_place * p.y + y_;
@@ -51,7 +56,7 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         // Bound of the stiffness: rows of the point's own.
         let growth = amplification(place);
         let grown = growth.x + growth.y * length(place.eta) * opening.direction.w;
-        let stiffness = point.w * (now.tangent * grown * grown
+        let stiffness = volume * (now.tangent * grown * grown
             + now.turned_tangent * squared_norm_bound(cofactor(deformation_gradient(H))));
         let nx = vec4<f32>(0.5 - p.x, 0.5 + p.x, 0.5 - p.x, 0.5 + p.x);
         let ny = vec4<f32>(0.5 - p.y, 0.5 - p.y, 0.5 + p.y, 0.5 + p.y);
@@ -62,12 +67,15 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let all = stiffness * dot(below + above, vec4<f32>(1.0));
         lower += below * all;
         upper += above * all;
-        sum.by_centre += vec4<f32>(-now.derivatives.place, now.derivatives.radius) * point.w;
-        sum.by_rate += vec4<f32>(now.derivatives.centre_rate, now.derivatives.radius_rate) * point.w;
+        sum.by_centre += vec4<f32>(-now.derivatives.place, now.derivatives.radius) * volume;
+        sum.by_rate += vec4<f32>(now.derivatives.centre_rate, now.derivatives.radius_rate) * volume;
+        for (var once = select(0u, 1u, point.numbers.z == 0u); once == 0u; once++) {
+            opening_sums[point.numbers.y] = sum;
+            sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+        }
     }
     for (var c = 0u; c < 4u; c++) {
         opening_corners[8u * index + c] = vec4<f32>(force_on_corner(f, c), lower[c]);
         opening_corners[8u * index + c + 4u] = vec4<f32>(force_on_corner(f, c + 4u), upper[c]);
     }
-    opening_sums[index] = sum;
 }

@@ -11,9 +11,12 @@
 #import shared/straight_axis
 #endif
 
+#ifdef FRICTION
+@group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
+#endif
 @group(1) @binding(22) var<storage, read> path_entries: array<OpeningEntry>;
 @group(3) @binding(20) var<storage, read_write> path_stations: array<OpeningStation>;
-@group(3) @binding(22) var<storage, read> opening_sums: array<OpeningSum>;
+@group(3) @binding(22) var<storage, read_write> opening_sums: array<OpeningSum>;
 @group(3) @binding(23) var<storage, read_write> opening_record: OpeningRecord;
 
 // Per thread: forces along and across, and what else the record sums.
@@ -33,6 +36,18 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
     let t = opening.direction.xyz;
     let count = opening.counts.x;
     let spacing = opening.numbers.x;
+    // Cells around the same stations, once for all of these.
+    for (var run = lane; run < opening.sums.y; run += 64u) {
+        let slots = path_entries[run];
+        var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+        for (var slot = slots.index; slot < slots.index + u32(slots.first); slot++) {
+            let told = opening_sums[slot];
+            sum.by_centre += told.by_centre;
+            sum.by_rate += told.by_rate;
+        }
+        opening_sums[opening.sums.z + run] = sum;
+    }
+    storageBarrier();
     for (var i = lane; i < count; i += 64u) {
         let lists = path_stations[i].lists;
         var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
@@ -77,7 +92,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         let by_centre = across(by.xyz);
         var normal = 0.0;
         var weight = 0.0;
-        let reach = opening.averaged.x;
+        let reach = opening.sums.x;
         for (var j = max(i, reach) - reach; j <= min(i + reach, last); j++) {
             let on = on_shaft(j);
             normal += on * path_stations[j].by_centre.w;
@@ -103,7 +118,12 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
 #ifdef FRICTION
         let limit = opening.friction.x * squeeze;
         let kt = opening.friction.y;
-        let trial = stick + (now.rubbing.y - dot(step_input.velocity.xyz, t)) * params.dt;
+        // Speed of the section along the needle.
+        var speed = 0.0;
+        for (var e = now.lists.x; e < now.lists.y; e++) {
+            speed += dot(node_velocity[path_entries[e].index].xyz, t) * path_entries[e].second;
+        }
+        let trial = stick + (speed - dot(step_input.velocity.xyz, t)) * params.dt;
         let allowed = limit / kt;
         let stretch = select(0.0, clamp(trial, -allowed, allowed), limit > 0.0);
         rubbing = -kt * stretch;

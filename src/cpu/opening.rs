@@ -350,8 +350,14 @@ fn point_forces(
 /// Places of Gauss' rule in a cell, -1..1, are at the corners times this.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
 
+/// Four of the corners of a cell, no two on one edge, give its volume: to second order as good as all eight, and all four across a path
+/// along an edge.
+fn is_volume_place(corner: usize) -> bool {
+    CORNERS[corner].iter().product::<f64>() < 0.0
+}
+
 /// What opening adds to a cell: forces, derivatives of its energy by the path, and that energy. The gradient of y is that of its centre,
-/// as elsewhere; the map is taken at eight places.
+/// as elsewhere; the volume is taken at four places, the shape at one.
 fn near_cell_forces(
     model: &Model,
     opening: &OpeningPlan,
@@ -370,33 +376,31 @@ fn near_cell_forces(
     let gradient = DMat3::IDENTITY + shape.displacement_gradient(&u);
     let material = model.material(cell);
     let (mut sum, mut energy) = (Derivatives::ZERO, 0.0);
-    let (mut dilation, mut grown) = (0.0, 1.0f64);
-    let part = shape.volume / 8.0;
+    let mut grown = 1.0f64;
     // y is linear in the cell, as its gradient is one: a force at a place is one on the middle and one on the gradient.
     let middle = y.iter().copied().sum::<DVec3>() / 8.0;
     let width = model.mesh.block().cell_size(cell);
-    let offset = |at: usize| DVec3::from(CORNERS[at]) * (0.5 * GAUSS) * width;
     let map = |offset: DVec3| opening.map.at(section, middle + gradient * offset, gradient);
     let add = |sum: &mut Derivatives, d: &Derivatives, offset: DVec3, by: f64| {
         sum.add(d, by);
         sum.gradient += outer(d.place * by, offset);
     };
-    let maps: [_; 8] = std::array::from_fn(|at| map(offset(at)));
+    let at_volume_places: Vec<_> = (0..8)
+        .filter(|corner| is_volume_place(*corner))
+        .map(|corner| {
+            let offset = DVec3::from(CORNERS[corner]) * (0.5 * GAUSS) * width;
+            (map(offset), offset)
+        })
+        .collect();
     let tangent = material.tangent_bound(gradient - DMat3::IDENTITY, &PointState::default());
     let (mut straight, mut turned) = (tangent.straight, tangent.turned);
-    dilation += maps.iter().map(|m| m.dilation).sum::<f64>() / 8.0;
-    // Points carry the rest of what keeps the shape; a cell without points is taken in its middle.
-    let in_the_middle = [map(DVec3::ZERO)];
-    let taken = if near.is_whole() { &in_the_middle[..] } else { &maps[..] };
-    for (at, map) in taken.iter().enumerate() {
-        let (volume, offset) = match near.is_whole() {
-            true => (shape.volume, DVec3::ZERO),
-            false => (part * near.shares[at], offset(at)),
-        };
-        if volume == 0.0 {
-            continue;
-        }
-        let (d, w) = opened(material, map, gradient);
+    let dilation = at_volume_places.iter().map(|(m, _)| m.dilation).sum::<f64>() / 4.0;
+    // What keeps the shape, of what points do not carry.
+    if near.share > 0.0 {
+        let offset = near.place * width;
+        let map = map(offset);
+        let volume = near.share * shape.volume;
+        let (d, w) = opened(material, &map, gradient);
         energy += volume * w;
         add(&mut sum, &d, offset, volume);
         let tangent = material.tangent_bound(map.gradient(gradient) - DMat3::IDENTITY, &PointState::default());
@@ -410,8 +414,8 @@ fn near_cell_forces(
     let (closed, open) = (j - 1.0, j * dilation - 1.0);
     energy += shape.volume * 0.5 * bulk * (open * open - closed * closed);
     sum.gradient += cof * (bulk * (open * dilation - closed) * shape.volume);
-    for (at, map) in maps.iter().enumerate() {
-        add(&mut sum, &map.pull_back_dilation(bulk * open * j), offset(at), part);
+    for (map, offset) in &at_volume_places {
+        add(&mut sum, &map.pull_back_dilation(bulk * open * j), *offset, 0.25 * shape.volume);
     }
     // Bound of the stiffness beyond that of the closed cell, where open faces may meet (see Elements::stiffness_bound).
     let b = 0.25 / model.mesh.block().cell_size(cell);

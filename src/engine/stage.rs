@@ -23,8 +23,6 @@ pub enum Stage {
     CohesiveForces,
     /// Contact of cone and shaft with the opened path, friction, and tip springs on the nodes.
     NeedleContact,
-    /// Where the sections of an opened path are, and what of them is cut.
-    OpeningStations,
     /// Forces of the points beside the opened path.
     OpeningPoints,
     /// What opening adds to the cells around the path.
@@ -57,7 +55,7 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 25] = [
+    pub const ALL: [Stage; 24] = [
         Stage::AdvanceTip,
         Stage::SoftenPath,
         Stage::AdvanceFreeTip,
@@ -68,7 +66,6 @@ impl Stage {
         Stage::ElementForces,
         Stage::CohesiveForces,
         Stage::NeedleContact,
-        Stage::OpeningStations,
         Stage::OpeningPoints,
         Stage::OpeningCells,
         Stage::OpeningReactions,
@@ -99,7 +96,6 @@ impl Stage {
             Stage::ElementForces => "element_forces",
             Stage::CohesiveForces => "cohesive_forces",
             Stage::NeedleContact => "needle_contact",
-            Stage::OpeningStations => "opening_stations",
             Stage::OpeningPoints => "opening_points",
             Stage::OpeningCells => "opening_cells",
             Stage::OpeningReactions => "opening_reactions",

@@ -106,8 +106,7 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
         Stage::AdvanceTip => puncture && !features.free_path,
         Stage::AdvanceFreeTip | Stage::SoftenFreePath => puncture && features.free_path,
         Stage::NeedleContact => puncture,
-        Stage::OpeningStations
-        | Stage::OpeningPoints
+        Stage::OpeningPoints
         | Stage::OpeningCells
         | Stage::OpeningReactions
         | Stage::OpeningNodes
@@ -139,7 +138,7 @@ pub fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u3
         Stage::MeasureDilatation | Stage::TetrahedronForces => model.mesh.cell_count() as u32,
         Stage::AveragePressure => model.mesh.node_count() as u32,
         Stage::ElementForces => layout.strips().columns * layout.strips().count,
-        Stage::OpeningStations | Stage::OpeningReactions => 64,
+        Stage::OpeningReactions => 64,
         Stage::OpeningPoints => opening_counts(model)[0],
         Stage::OpeningCells => opening_counts(model)[1],
         Stage::OpeningNodes => opening_counts(model)[2],

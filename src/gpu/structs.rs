@@ -187,11 +187,7 @@ shared_structs! {
     /// shaders/effects/puncture.wgsl
     struct TipAnchorLoad {
         cell: [u32; 4],
-        local: [f32; 4],
-        force: f32,
-        _pad0: f32,
-        _pad1: f32,
-        _pad2: f32,
+        load: [f32; 4],
     }
     /// shaders/effects/puncture.wgsl
     struct TipState {
@@ -230,7 +226,7 @@ shared_structs! {
         numbers: [f32; 4],
         friction: [f32; 4],
         counts: [u32; 4],
-        averaged: [u32; 4],
+        sums: [u32; 4],
         surface: [f32; 4],
         dimple: [[f32; 4]; 26],
     }
@@ -269,6 +265,11 @@ shared_structs! {
         late: [f32; 4],
     }
     /// shaders/shared/opening_cluster.wgsl
+    struct OpeningPoint {
+        place: [f32; 4],
+        numbers: [u32; 4],
+    }
+    /// shaders/shared/opening_cluster.wgsl
     struct OpeningCluster {
         cell: [u32; 4],
         points: [u32; 4],
@@ -281,8 +282,7 @@ shared_structs! {
         stations: [u32; 4],
         middle: [f32; 4],
         inverse: [f32; 4],
-        lower: [f32; 4],
-        upper: [f32; 4],
+        place: [f32; 4],
     }
     /// shaders/stages/measure_opening.wgsl
     struct OpeningTotals {
@@ -450,12 +450,5 @@ shared_structs! {
         half_step: f32,
         _pad0: u32,
         _pad1: u32,
-    }
-    /// shaders/shared/node_cures.wgsl
-    struct NodeCures {
-        raised_energy: f32,
-        clamped_energy: f32,
-        clamped_steps: f32,
-        step_ratio: f32,
     }
 }

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DMat3, DVec3};
 
 use crate::effects::puncture::LEAST_TRAVELS;
-use crate::mesh::{BlockMesh, CORNERS, trilinear};
+use crate::mesh::{BlockMesh, trilinear};
 use crate::needle::lateral_axes;
 use crate::needle::opening::OpeningMap;
 use crate::needle::{NeedleShape, PlannedPath};
@@ -17,11 +17,8 @@ const SPACING: f64 = 0.18;
 /// Radius of the zone whose tissue is carried by points: twice the cell edge, but within these, in needle radii.
 const NEAR: [f64; 2] = [1.2, 2.4];
 
-/// Radii of the points of a station: nodes of Gauss' rule in the logarithm of the radius.
-const RADII: usize = 8;
-
-/// Fewest points of a ring.
-const LEAST_ANGLES: f64 = 8.0;
+/// Most points of one thread: more of them in a cell are shared out.
+const CLUSTER: usize = 16;
 
 /// Most that the tip advances in a step, in distances of stations.
 const ADVANCE: f64 = 0.5;
@@ -32,12 +29,14 @@ const CRACK_SPEED: f64 = 0.3;
 /// How far the stations go beyond the deepest place of the tip, in needle radii.
 const BEYOND: f64 = 1.5;
 
-/// Nodes and weights of Gauss' rule of [`RADII`] points on -1..1 (half of them; the others are their mirror).
-const GAUSS: [(f64, f64); RADII / 2] = [
-    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
-    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
-    (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
-    (0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
+/// Radii of the points of a station: nodes and weights of Gauss' rule of five points on -1..1, in the logarithm of the radius. What is
+/// summed falls from one constant to another there: eight points change the force by 0.3 %.
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_08),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_08),
 ];
 
 /// A mean over nodes: their places in [`Station::nodes`] and weights.
@@ -81,21 +80,21 @@ impl OpeningStation {
     }
 }
 
-/// Points of one station in one cell.
+/// Points in one cell, all or some.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cluster {
-    pub station: usize,
     pub cell: u32,
-    /// Indices into the points of the station.
-    pub points: Vec<usize>,
+    /// Station and place among its points, in the order in which they are cut.
+    pub points: Vec<(usize, usize)>,
 }
 
 /// A cell that the map reaches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearCell {
     pub cell: u32,
-    /// Part of the volume of each of its octants that points do not carry, in the order of the corners.
-    pub shares: [f64; 8],
+    /// Part of its volume that points do not carry, and the middle of that part, from the middle of the cell in edges.
+    pub share: f64,
+    pub place: DVec3,
     /// First station of those that lie in it, and their number.
     pub first: u16,
     pub count: u16,
@@ -112,7 +111,7 @@ pub struct OpeningPlan {
     pub stations: Vec<OpeningStation>,
     /// Largest first: threads of a group wait for each other, so that many of the same size lie side by side.
     pub clusters: Vec<Cluster>,
-    /// Those with as many places side by side, as above.
+    /// Those around the same stations side by side.
     pub cells: Vec<NearCell>,
     /// All nodes that points, cells or stations act on.
     pub nodes: BTreeSet<u32>,
@@ -127,18 +126,9 @@ pub struct OpeningPlan {
 }
 
 impl NearCell {
-    /// True where points carry no part of it.
-    pub fn is_whole(&self) -> bool {
-        self.shares == [1.0; 8]
-    }
-
-    /// Places at which it is taken: 0 to 7 its octants, 8 its middle. None where points carry all of it.
-    pub fn places(&self) -> std::ops::Range<u32> {
-        match self.shares {
-            _ if self.is_whole() => 8..9,
-            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => 0..0,
-            _ => 0..8,
-        }
+    /// True where it takes its part of the path from the same stations as another.
+    pub fn is_beside_the_stations_of(&self, other: &NearCell) -> bool {
+        (self.first, self.count) == (other.first, other.count)
     }
 }
 
@@ -236,7 +226,7 @@ impl OpeningPlan {
         let end = (input.deepest + BEYOND * shaft).min(input.exit);
         let count = (end / spacing).floor().max(2.0) as i32;
         let stations: Vec<OpeningStation> =
-            (first..count).map(|i| station(mesh, input, (f64::from(i) + 0.5) * spacing, spacing, near)).collect();
+            (first..count).map(|i| station(mesh, input, i, spacing, near)).collect();
         // A volume at the wall of the hole grows by R^2 s0/a^4: by a thousandth.
         let least = 0.03 * stations.iter().map(|s| s.hole).fold(f64::INFINITY, f64::min).powi(2) / shaft;
         let average = (1.45 * shaft).max(1.5 * input.cell_size);
@@ -261,7 +251,8 @@ impl OpeningPlan {
     }
 }
 
-fn station(mesh: &BlockMesh, input: &OpeningInput, depth: f64, spacing: f64, near: f64) -> OpeningStation {
+fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, near: f64) -> OpeningStation {
+    let depth = (f64::from(number) + 0.5) * spacing;
     let PlannedPath { entry, direction, .. } = *input.path;
     let (e1, e2) = lateral_axes(direction);
     let hole = (input.hole)(depth).min(0.9 * near);
@@ -290,13 +281,15 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, depth: f64, spacing: f64, nea
     let disc = mean(&[0.125, 0.375, 0.625, 0.875].map(|part: f64| shaft * part.sqrt()), 8);
     let long = (near / hole).ln();
     let mut points = Vec::new();
-    for (x, w) in GAUSS.iter().flat_map(|(x, w)| [(-x, *w), (*x, *w)]) {
+    for (ring, (x, w)) in GAUSS.into_iter().enumerate() {
         let r = hole * (0.5 * long * (x + 1.0)).exp();
-        // At least twice in every cell that a ring runs through.
-        let angles = 4 * (LEAST_ANGLES.max(4.0 * std::f64::consts::PI * r / input.cell_size) / 4.0).ceil() as usize;
+        // Neighbours along and across are turned against each other, and none lies on a plane of the grid.
+        let turn = if (ring as i32 + number) % 2 == 0 { 0.25 } else { 0.75 };
+        // About one in every cell that a ring runs through.
+        let angles = 4 * (std::f64::consts::TAU * r / input.cell_size / 4.0).ceil() as usize;
         let volume = 0.5 * long * w * r * r * std::f64::consts::TAU / angles as f64 * spacing;
         for i in 0..angles {
-            let place = at(r, (i as f64 + 0.5) / angles as f64);
+            let place = at(r, (i as f64 + turn) / angles as f64);
             let Place { cell, corners, weights, gradients, local, inside } = place_in(mesh, place);
             if !inside {
                 continue;
@@ -316,21 +309,23 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, depth: f64, spacing: f64, nea
 }
 
 fn clusters_of(stations: &[OpeningStation]) -> Vec<Cluster> {
-    let mut all: Vec<Cluster> = Vec::new();
-    for (station, s) in stations.iter().enumerate() {
-        let mut by_cell: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (index, point) in s.points.iter().enumerate() {
-            by_cell.entry(point.cell).or_default().push(index);
+    let mut order: Vec<usize> = (0..stations.len()).collect();
+    order.sort_by(|a, b| stations[*a].depth.abs().total_cmp(&stations[*b].depth.abs()));
+    let mut by_cell: BTreeMap<u32, Vec<(usize, usize)>> = BTreeMap::new();
+    for station in order {
+        for (index, point) in stations[station].points.iter().enumerate() {
+            by_cell.entry(point.cell).or_default().push((station, index));
         }
-        all.extend(by_cell.into_iter().map(|(cell, points)| Cluster { station, cell, points }));
     }
+    let parts = by_cell.iter().flat_map(|(cell, points)| points.chunks(CLUSTER).map(|part| (*cell, part.to_vec())));
+    let mut all: Vec<Cluster> = parts.map(|(cell, points)| Cluster { cell, points }).collect();
     all.sort_by_key(|c| std::cmp::Reverse(c.points.len()));
     all
 }
 
 /// Cells that the map reaches, with the part of their volume outside of the zone of points.
 fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: f64, end: f64) -> Vec<NearCell> {
-    const SAMPLES: usize = 6;
+    const SAMPLES: usize = 12;
     let faded = crate::needle::opening::FADED * plan.map.shaft;
     let last = plan.stations.len() - 1;
     let first = plan.stations[0].depth - 0.5 * plan.spacing;
@@ -348,20 +343,20 @@ fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: 
             if r > faded + reach || s > end + reach {
                 return None;
             }
-            let shares = CORNERS.map(|corner| {
-                if r > near + reach {
-                    return 1.0;
+            let (share, place) = match r > near + reach {
+                true => (1.0, DVec3::ZERO),
+                false => {
+                    let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
+                    let samples = (0..SAMPLES.pow(3))
+                        .map(|n| DVec3::new(part(n % SAMPLES), part(n / SAMPLES % SAMPLES), part(n / SAMPLES.pow(2))));
+                    let outside = samples.filter(|at| {
+                        let (r0, s0) = coordinates(low + *at * size);
+                        r0 > near || s0 > end || s0 < first
+                    });
+                    let (count, sum) = outside.fold((0usize, DVec3::ZERO), |(n, sum), at| (n + 1, sum + (at - 0.5)));
+                    (count as f64 / SAMPLES.pow(3) as f64, sum / count.max(1) as f64)
                 }
-                let mut outside = 0usize;
-                for n in 0..SAMPLES.pow(3) {
-                    let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64 * 0.5;
-                    let at = DVec3::new(part(n % SAMPLES), part(n / SAMPLES % SAMPLES), part(n / SAMPLES.pow(2)));
-                    let octant = DVec3::from(corner).max(DVec3::ZERO) * 0.5;
-                    let (r0, s0) = coordinates(low + (at + octant) * size);
-                    outside += usize::from(r0 > near || s0 > end || s0 < first);
-                }
-                outside as f64 / SAMPLES.pow(3) as f64
-            });
+            };
             // Half of its extent along the path, of a sphere where the path is oblique.
             let t = input.path.direction.abs();
             let half = 0.5 * size.dot(t * t);
@@ -369,10 +364,10 @@ fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: 
             let (from, to) = (index(s - half), index(s + half));
             let nearest = (((s - first) / plan.spacing).max(0.0) as usize).min(last);
             let (from, to) = if to > from { (from, to) } else { (nearest, nearest + 1) };
-            Some(NearCell { cell: cell as u32, shares, first: from as u16, count: (to - from) as u16 })
+            Some(NearCell { cell: cell as u32, share, place, first: from as u16, count: (to - from) as u16 })
         })
         .collect();
-    cells.sort_by_key(|near| std::cmp::Reverse(near.places().len()));
+    cells.sort_by_key(|near| (near.first, near.count));
     cells
 }
 

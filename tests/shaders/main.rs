@@ -324,7 +324,6 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "OpenedPlace",
         "OpenedStress",
         "OpeningDerivatives",
-        "OpeningMean",
         "PathSection",
         "IsochoricFactors",
         "Measure",

@@ -4,7 +4,7 @@ use bytemuck::Zeroable;
 use glam::DVec3;
 
 use super::super::structs::{
-    CellEdge, CentreLine, DriveStep, GravityParams, MeshNode, NodeCures, Params, StepInput, Tetrahedron, TiedNode,
+    CellEdge, CentreLine, DriveStep, GravityParams, MeshNode, Params, StepInput, Tetrahedron, TiedNode,
 };
 use super::{Array, Life, Place, bytes_of, read_all, to_bytes, vec4, vector, zeros};
 use crate::engine::elements::PrismBase;
@@ -53,7 +53,7 @@ pub(super) const ARRAYS: &[Array] = &[
         |_, state| to_bytes(&state.velocity.iter().map(|v| vec4(*v)).collect::<Vec<_>>()),
     ),
     Array::state("corner_force", |s| zeros(s.layout.slot_count(), 16)).at(Place::Texels),
-    Array::state("node_cures", |s| zeros(s.nodes(), size_of::<NodeCures>())),
+    Array::state("node_cures", |s| zeros(s.nodes(), 16)),
     Array::state("node_work", |s| zeros(s.nodes(), 4)),
     Array::state("cell_dilatation", |s| zeros(s.cells() + 1, 4)),
     Array::state("cell_bulk_stiffness", |s| zeros(s.cells() + 1, 4)),

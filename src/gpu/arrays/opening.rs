@@ -6,14 +6,14 @@ use bytemuck::Zeroable;
 use glam::DVec3;
 
 use super::super::structs::{
-    OpeningCell, OpeningCluster, OpeningEntry, OpeningNode, OpeningParams, OpeningRecord, OpeningStation, OpeningSum,
+    OpeningCell, OpeningCluster, OpeningEntry, OpeningNode, OpeningParams, OpeningPoint, OpeningRecord, OpeningStation, OpeningSum,
     OpeningTotals,
 };
 use super::{Array, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
 use crate::gpu::layout::Layout;
 use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::Model;
-use crate::model::opening::{Cluster, OpeningPlan};
+use crate::model::opening::{Cluster, NearCell, OpeningPlan};
 
 pub(super) const ARRAYS: &[Array] = &[
     Array::constant("opening", |s| bytes_of(&[params(s.model, s.dt)])),
@@ -21,9 +21,13 @@ pub(super) const ARRAYS: &[Array] = &[
     Array::constant("path_points", |s| bytes_of(&not_empty(&s.opening().points))),
     Array::constant("near_cells", |s| bytes_of(&not_empty(&s.opening().cells))),
     Array::constant("path_entries", |s| bytes_of(&not_empty(&s.opening().entries))),
+    Array::constant("path_corners", |s| bytes_of(&not_empty(&s.opening().corners))),
     Array::constant("path_nodes", |s| bytes_of(&not_empty(&s.opening().nodes))),
     Array::state("path_stations", |s| bytes_of(&not_empty(&s.opening().stations))).exchanged(
-        |bytes, _, state| state.stations = read_all::<OpeningStation>(bytes).map(|s| s.rubbing[2].into()).collect(),
+        |bytes, model, state| {
+            let count = model.opening().map_or(0, |o| o.stations.len());
+            state.stations = read_all::<OpeningStation>(bytes).take(count).map(|s| s.rubbing[2].into()).collect();
+        },
         |s, state| {
             let mut stations = s.opening().stations.clone();
             for (station, stretch) in stations.iter_mut().zip(&state.stations) {
@@ -33,7 +37,7 @@ pub(super) const ARRAYS: &[Array] = &[
         },
     ),
     Array::state("opening_corners", |s| zeros(8 * slot_count(s.model).max(1), 16)),
-    Array::state("opening_sums", |s| zeros(slot_count(s.model).max(1), size_of::<OpeningSum>())),
+    Array::state("opening_sums", |s| zeros(sum_count(s.model).max(1), size_of::<OpeningSum>())),
     Array::state("opening_record", |_| zeros(1, size_of::<OpeningRecord>())).exchanged(
         |bytes, _, state| {
             for record in read_all::<OpeningRecord>(bytes) {
@@ -73,9 +77,10 @@ fn add_totals(bytes: &[u8], out: &mut Sums) {
 pub struct Tables {
     stations: Vec<OpeningStation>,
     clusters: Vec<OpeningCluster>,
-    points: Vec<[f32; 4]>,
+    points: Vec<OpeningPoint>,
     cells: Vec<OpeningCell>,
     entries: Vec<OpeningEntry>,
+    corners: Vec<u32>,
     nodes: Vec<OpeningNode>,
 }
 
@@ -88,9 +93,34 @@ fn bits(signs: [f64; 3]) -> usize {
     (0..3).map(|a| usize::from(signs[a] > 0.0) << a).sum()
 }
 
-/// Numbers of clusters and cells.
+/// Sums that clusters tell: one per station that they have points of.
+fn point_sums(opening: &OpeningPlan) -> usize {
+    let of = |c: &Cluster| 1 + c.points.windows(2).filter(|pair| pair[0].0 != pair[1].0).count();
+    opening.clusters.iter().map(of).sum()
+}
+
+/// Sums of points, of cells, and of runs of cells.
+fn sum_count(model: &Model) -> u64 {
+    let count = |o: &OpeningPlan| point_sums(o) + o.cells.len() + runs_of(model).len();
+    model.opening().map_or(0, |o| count(o) as u64)
+}
+
+/// Numbers of clusters and cells: slots of forces on corners.
 fn slot_count(model: &Model) -> u64 {
     model.opening().map_or(0, |o| (o.clusters.len() + o.cells.len()) as u64)
+}
+
+/// Cells side by side that lie around the same stations: first, end. A station reads their sum instead of each of them.
+fn runs_of(model: &Model) -> Vec<(usize, usize)> {
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    let Some(opening) = model.opening() else { return runs };
+    for (index, cell) in opening.cells.iter().enumerate() {
+        match runs.last_mut() {
+            Some(run) if opening.cells[run.0].is_beside_the_stations_of(cell) => run.1 = index + 1,
+            _ => runs.push((index, index + 1)),
+        }
+    }
+    runs
 }
 
 /// Clusters, cells and nodes: threads of the stages.
@@ -118,7 +148,12 @@ fn params(model: &Model, dt: f64) -> OpeningParams {
         ],
         friction: [friction.coefficient as f32, stick as f32, friction.fade_length.max(1e-9) as f32, 0.0],
         counts: [opening.stations.len() as u32, clusters, cells, nodes],
-        averaged: [opening.averaged as u32, 0, 0, 0],
+        sums: [
+            opening.averaged as u32,
+            runs_of(model).len() as u32,
+            (point_sums(opening) + opening.cells.len()) as u32,
+            point_sums(opening) as u32,
+        ],
         surface: [
             contact.length as f32,
             plan.profile.shift.x as f32,
@@ -140,6 +175,8 @@ fn cell_of(model: &Model, mesh: &BlockMesh, entry: DVec3, cell: usize) -> ([u32;
 struct Told {
     stations: Vec<Vec<(u32, f32)>>,
     corners: BTreeMap<u32, Vec<u32>>,
+    /// Material coordinate of the tip at which anything near a node begins to be cut [m].
+    cut_from: BTreeMap<u32, f64>,
 }
 
 pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
@@ -147,56 +184,95 @@ pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
     let (Some(opening), Some(plan), Some(mesh)) = (model.opening(), &model.puncture, model.mesh.as_block()) else {
         return tables;
     };
-    let told = slots(&mut tables, model, opening, mesh, plan.path.entry);
+    let runs = runs_of(model);
+    // First, so that a run has the place of its number.
+    tables.entries = runs.iter().map(|run| run_entry(opening, *run)).collect();
+    let told = slots(&mut tables, model, opening, mesh, (plan.path.entry, &runs));
     lists(&mut tables, opening, mesh, layout, &told);
+    // Behind the stations, the means of those in a run of cells.
+    tables.stations.extend(runs.iter().map(|(first, _)| {
+        let NearCell { first, count, .. } = opening.cells[*first];
+        OpeningStation { lists: [first.into(), (first + count).into(), 0, 0], ..OpeningStation::zeroed() }
+    }));
     tables
 }
 
-/// Clusters and cells, one slot each.
-fn slots(tables: &mut Tables, model: &Model, opening: &OpeningPlan, mesh: &BlockMesh, entry: DVec3) -> Told {
+/// Sums of a run: the first, and their number.
+fn run_entry(opening: &OpeningPlan, (first, end): (usize, usize)) -> OpeningEntry {
+    let first_slot = point_sums(opening) + first;
+    OpeningEntry { index: first_slot as u32, first: (end - first) as f32, ..OpeningEntry::zeroed() }
+}
+
+/// Clusters and cells, one slot each, and runs of cells.
+fn slots(
+    tables: &mut Tables,
+    model: &Model,
+    opening: &OpeningPlan,
+    mesh: &BlockMesh,
+    (entry, runs): (DVec3, &[(usize, usize)]),
+) -> Told {
     let mut told: Vec<Vec<(u32, f32)>> = vec![Vec::new(); opening.stations.len()];
     let mut corners: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    let mut cut_from: BTreeMap<u32, f64> = BTreeMap::new();
     let mut slot = 0u32;
-    let mut corners_of = |cell: usize, slot: u32| {
+    let mut corners_of = |cell: usize, slot: u32, depth: f64| {
         for (node, signs) in mesh.cell_nodes(cell).iter().zip(CORNERS) {
+            let first = cut_from.entry(*node as u32).or_insert(depth);
+            *first = first.min(depth);
             corners.entry(*node as u32).or_default().push(8 * slot + bits(signs) as u32);
         }
     };
-    for Cluster { station, cell, points } in &opening.clusters {
-        let (station, cell) = (*station, *cell);
-        let (place, middle, inverse) = cell_of(model, mesh, entry, cell as usize);
+    let mut sum_slot = 0u32;
+    for Cluster { cell, points } in &opening.clusters {
+        let (place, middle, inverse) = cell_of(model, mesh, entry, *cell as usize);
         let first = tables.points.len() as u32;
-        for index in points {
-            let point = &opening.stations[station].points[*index];
+        for (i, (station, index)) in points.iter().enumerate() {
+            let point = &opening.stations[*station].points[*index];
             let local = point.local - 0.5;
-            tables.points.push([local.x as f32, local.y as f32, local.z as f32, point.volume as f32]);
+            let ends = points.get(i + 1).is_none_or(|next| next.0 != *station);
+            tables.points.push(OpeningPoint {
+                place: [local.x as f32, local.y as f32, local.z as f32, point.volume as f32],
+                numbers: [*station as u32, sum_slot, u32::from(ends), 0],
+            });
+            if ends {
+                told[*station].push((sum_slot, 1.0));
+                sum_slot += 1;
+            }
         }
         let end = tables.points.len() as u32;
-        tables.clusters.push(OpeningCluster { cell: place, points: [first, end, station as u32, 0], middle, inverse });
-        told[station].push((slot, 1.0));
-        corners_of(cell as usize, slot);
+        tables.clusters.push(OpeningCluster { cell: place, points: [first, end, 0, 0], middle, inverse });
+        corners_of(*cell as usize, slot, opening.stations[points[0].0].depth.abs());
         slot += 1;
     }
-    for near in &opening.cells {
+    sum_slot += opening.cells.len() as u32;
+    let run_of = |cell: usize| runs.partition_point(|run| run.1 <= cell) as u32;
+    for (index, near) in opening.cells.iter().enumerate() {
         let (place, middle, inverse) = cell_of(model, mesh, entry, near.cell as usize);
-        let mut shares = [0.0; 8];
-        CORNERS.iter().zip(near.shares).for_each(|(signs, share)| shares[bits(*signs)] = share as f32);
-        let (first, count, places) = (u32::from(near.first), u32::from(near.count), near.places());
         tables.cells.push(OpeningCell {
             cell: place,
-            stations: [first, count, places.start, places.end],
+            stations: [run_of(index), 0, 0, 0],
             middle,
             inverse,
-            lower: [shares[0], shares[1], shares[2], shares[3]],
-            upper: [shares[4], shares[5], shares[6], shares[7]],
+            place: [near.place.x as f32, near.place.y as f32, near.place.z as f32, near.share as f32],
         });
-        for station in first..first + count {
-            told[station as usize].push((slot, 1.0 / count as f32));
-        }
-        corners_of(near.cell as usize, slot);
+        let stations = &opening.stations[usize::from(near.first)..][..usize::from(near.count)];
+        corners_of(near.cell as usize, slot, stations.iter().map(|s| s.depth.abs()).fold(f64::INFINITY, f64::min));
         slot += 1;
     }
-    Told { stations: told, corners }
+    for (first, _) in runs {
+        let NearCell { first, count, .. } = opening.cells[*first];
+        for station in first..first + count {
+            told[usize::from(station)].push((sum_slot, 1.0 / f32::from(count)));
+        }
+        sum_slot += 1;
+    }
+    for station in &opening.stations {
+        for node in &station.nodes {
+            let first = cut_from.entry(*node).or_insert(f64::INFINITY);
+            *first = first.min(station.depth.abs());
+        }
+    }
+    Told { stations: told, corners, cut_from }
 }
 
 /// Stations and nodes, with the lists of what they are made of.
@@ -233,10 +309,10 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
     for node in opening.nodes.iter().copied() {
         let grid = mesh.node_coordinates(node as usize);
         let owned = layout.strips().owned_slot(grid, mesh.cells());
-        let first = tables.entries.len() as u32;
-        let corners = told.corners.get(&node).into_iter().flatten();
-        tables.entries.extend(corners.map(|c| OpeningEntry { index: *c, ..OpeningEntry::zeroed() }));
-        let middle = tables.entries.len() as u32;
+        let first = tables.corners.len() as u32;
+        tables.corners.extend(told.corners.get(&node).into_iter().flatten());
+        let corners_end = tables.corners.len() as u32;
+        let sections_first = tables.entries.len() as u32;
         let sections = sections.get(&node).into_iter().flatten();
         tables.entries.extend(sections.map(|(s, first, second)| OpeningEntry {
             index: *s,
@@ -245,6 +321,11 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
             _pad: 0.0,
         }));
         let end = tables.entries.len() as u32;
-        tables.nodes.push(OpeningNode { numbers: [owned, first, middle, middle], more: [end, 0, 0, 0] });
+        // A section begins to open half a spacing before it, and its neighbours feel that.
+        let open_from = (told.cut_from.get(&node).copied().unwrap_or(0.0) - 2.0 * opening.spacing) as f32;
+        tables.nodes.push(OpeningNode { numbers: [owned, first, corners_end, sections_first], more: [end, open_from.to_bits(), 0, 0] });
     }
+    // Threads of a group wait for each other: many of the same length lie side by side.
+    let length = |n: &OpeningNode| (n.more[0] - n.numbers[3]) + (n.numbers[2] - n.numbers[1]);
+    tables.nodes.sort_by_key(|n| std::cmp::Reverse(length(n)));
 }
