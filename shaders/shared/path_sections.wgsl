@@ -28,8 +28,11 @@ fn place_sections(lane: u32, coordinate: f32, shift: f32) {
         let cut = clamp(part, 0.0, 1.0);
         let rate = select(0.0, 1.0 / spacing, part > 0.0 && part < 1.0);
         let shaft = opening.direction.w * depth.z;
-        let full = shaft * clamp(behind / tip_length, 0.0, 1.0);
-        let slope = select(0.0, shaft / tip_length, behind > 0.0 && behind < tip_length);
+        // OpeningPlan::radius: the corner between tip and shaft is rounded.
+        let steep = shaft / tip_length;
+        let bend = clamp((tip_length - behind) / spacing + 0.5, 0.0, 1.0);
+        let full = select(shaft - 0.5 * steep * spacing * bend * bend, steep * max(behind, 0.0), bend == 1.0);
+        let slope = select(0.0, steep * bend, behind > 0.0);
         path_stations[i].centre = vec4<f32>(across(middle), full * cut);
         path_stations[i].place = vec4<f32>(behind, cut, rate, slope);
         path_stations[i].rubbing.x = full;

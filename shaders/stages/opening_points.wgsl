@@ -13,15 +13,6 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     if (index >= opening.counts.y) {
         return;
     }
-    // What is not opened is as its cells have it, and where nothing was ever cut nothing was ever written. A loop, since software adapters
-    // walk through an `if`.
-    let points = path_clusters[index].points.xy;
-    for (var once = select(1u, 0u, points.x < opened_end(points)); once == 0u; once++) {
-        open_cluster(index);
-    }
-}
-
-fn open_cluster(index: u32) {
     let cluster = path_clusters[index];
     let inverse = cluster.inverse.xyz;
     let scale = 1.0 / opening.direction.w;
@@ -30,8 +21,10 @@ fn open_cluster(index: u32) {
     var lower = vec4<f32>(0.0);
     var upper = vec4<f32>(0.0);
     var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+    // What is not opened is as its cells have it: no point at all.
+    let end = opened_end(cluster.points.xy);
     let modes = cell_modes(cluster.cell.xyz);
-    for (var i = cluster.points.x; i < cluster.points.y; i++) {
+    for (var i = cluster.points.x; i < end; i++) {
         let point = path_points[i];
         let station = path_stations[point.numbers.x];
         let section = PathSection(station.centre_rate.xyz, station.centre.w * scale, station.centre_rate.w);

@@ -6,8 +6,8 @@ use bytemuck::Zeroable;
 use glam::DVec3;
 
 use super::super::structs::{
-    OpeningCell, OpeningCluster, OpeningEntry, OpeningNode, OpeningParams, OpeningPoint, OpeningRecord, OpeningStation, OpeningSum,
-    OpeningTotals,
+    OpeningCell, OpeningCluster, OpeningEntry, OpeningNode, OpeningParams, OpeningPoint, OpeningRecord, OpeningStation,
+    OpeningSum, OpeningTotals,
 };
 use super::{Array, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
 use crate::gpu::layout::Layout;
@@ -323,7 +323,10 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
         let end = tables.entries.len() as u32;
         // A section begins to open half a spacing before it, and its neighbours feel that.
         let open_from = (told.cut_from.get(&node).copied().unwrap_or(0.0) - 2.0 * opening.spacing) as f32;
-        tables.nodes.push(OpeningNode { numbers: [owned, first, corners_end, sections_first], more: [end, open_from.to_bits(), 0, 0] });
+        tables.nodes.push(OpeningNode {
+            numbers: [owned, first, corners_end, sections_first],
+            more: [end, open_from.to_bits(), 0, 0],
+        });
     }
     // Threads of a group wait for each other: many of the same length lie side by side.
     let length = |n: &OpeningNode| (n.more[0] - n.numbers[3]) + (n.numbers[2] - n.numbers[1]);
