@@ -199,7 +199,9 @@ fn bound_table() -> String {
 /// What a stage does, and where it exists.
 fn stage_text(stage: Stage) -> [&'static str; 2] {
     match stage {
-        Stage::AdvanceTip => ["tip springs, threshold, advance of the tip", "`puncture`, planned path"],
+        Stage::AdvanceTip => {
+            ["tip springs, threshold, advance of the tip; sections of an opened path", "`puncture`, planned path"]
+        }
         Stage::SoftenPath => {
             ["cells that the tip passes lose stiffness", "`puncture`, planned path; beside `cohesive` with a bore only"]
         }

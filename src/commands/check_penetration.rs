@@ -3,7 +3,7 @@
 
 use crate::effects::TissueMaterial;
 use crate::effects::puncture::{Cutting, Params, SchemeWord};
-use crate::material::describe_constants;
+use crate::material::{ElasticLaw, describe_constants};
 use crate::needle::{NeedleShape, TipShape, Tool};
 use crate::penetration::surface::Surface;
 use crate::penetration::{Ring, Steady};
@@ -95,6 +95,7 @@ fn describe_one(
             n(friction),
             n(slope)
         ),
+        change_of_volume(&steady, &material.law),
         format!("puncture force (n + 1) F_tip = {} N, {exponent}; {puncture}", n(steady.puncture_force)),
         format!(
             "depth of the tip at that force, on a half space: sqrt(F pi (1 - nu^2)/(2 c E tan(alpha))) = {} mm",
@@ -127,6 +128,21 @@ fn describe_one(
         ));
     }
     lines
+}
+
+/// What the compressibility of the law makes of it.
+fn change_of_volume(steady: &Steady, law: &ElasticLaw) -> String {
+    let nu = four_digits(law.poisson_ratio());
+    match steady.with_change_of_volume(law) {
+        Some((force, normal)) => format!(
+            "tissue that changes its volume (nu {nu}) around that hole gives way: F_tip = {} N ({:+.1} %), N = {} N/mm ({:+.1} %)",
+            four_digits(force),
+            100.0 * (force / steady.tip_force - 1.0),
+            four_digits(normal * 1e-3),
+            100.0 * (normal / steady.normal_force - 1.0)
+        ),
+        None => format!("with the change of volume of nu {nu} no equilibrium was found"),
+    }
 }
 
 /// What the run takes for the puncture and the cutting force.

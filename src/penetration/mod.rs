@@ -16,6 +16,7 @@
 #![warn(missing_docs)]
 
 pub mod cavity;
+pub mod compressible;
 pub mod indentation;
 pub mod law;
 mod mixed_cell;

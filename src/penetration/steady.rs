@@ -17,10 +17,11 @@ use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::cavity;
+use super::compressible;
 use super::law::{EnergyJet, PlaneStrainLaw};
 use super::neo_hooke_curve;
 use super::wedge_curve::{CurveEnd, OutOfCurve, WedgeCurve, WedgeOptions, WedgePoint};
-use crate::material::Isochoric;
+use crate::material::{ElasticLaw, Isochoric};
 use crate::needle::TipShape;
 use crate::units::four_digits;
 
@@ -190,6 +191,13 @@ impl Steady {
     /// J^ = J_c/(mu R).
     pub fn relative_toughness(&self) -> f64 {
         self.resistance.toughness / (self.shear_modulus * self.radius)
+    }
+
+    /// The same slit in tissue that changes its volume: `F_tip` [N] and N [N/m], with the energy of the hole a_eq in the whole law. `None`
+    /// where the law has no equilibrium.
+    pub fn with_change_of_volume(&self, law: &ElasticLaw) -> Option<(f64, f64)> {
+        let hole = compressible::opened_hole(law, self.hole_radius, self.radius)?;
+        Some((self.cutting_force + hole.energy, hole.normal_force))
     }
 
     /// Stretch of the wall of the hole, R/a_eq.

@@ -334,7 +334,7 @@ fn output_folder_without_write_permission() {
 fn wrong_commands_and_options() {
     let place = Place::new();
     place.tiny(&[]);
-    let calls: [(&[&str], &str); 9] = [
+    let calls: [(&[&str], &str); 10] = [
         (&["run", "tiny.toml", "--frob"], "--frob"),
         (&["frobnicate", "tiny.toml"], "no subcommand and no scene file called frobnicate"),
         (&["chek", "tiny.toml"], "did you mean stylet check?"),
@@ -343,6 +343,7 @@ fn wrong_commands_and_options() {
         (&["run", "tiny.toml", "--engine", "tpu"], "auto, gpu or cpu"),
         (&["run", "tiny.toml", "--out"], "--out"),
         (&["bench", "--max-cells", "many"], "many"),
+        (&["bench", "--stages", "--engine", "cpu"], "--engine gpu"),
         (&["schema", "tiny.toml"], "tiny.toml"),
     ];
     for (args, text) in calls {
