@@ -12,7 +12,7 @@ fn main() -> stylet::Result<()> {
     let scene = Scene::load(Path::new("scenes/muscle_biopsy.toml"), &overrides)?;
     // Without an adapter the f64 engine runs.
     let device = Gpu::open().ok();
-    let mut simulation = Simulation::for_purpose(scene, device, Purpose { led: true, drawn: false })?;
+    let mut simulation = Simulation::for_purpose(scene, device, Purpose { led: true, drawn: false, lanes: false })?;
     let start = simulation.hand().expect("a hand leads");
     for frame in 0..60 {
         // Half a second towards the tissue, then still.

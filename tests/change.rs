@@ -26,7 +26,7 @@ fn scene(overrides: &[&str]) -> Scene {
     Scene::load(&path, &with_overrides(&all, &["motion.phase.0.depth_mm=6".into()])).unwrap_or_else(|e| panic!("{e}"))
 }
 
-const LED: Purpose = Purpose { led: true, drawn: false };
+const LED: Purpose = Purpose { led: true, drawn: false, lanes: false };
 
 /// A simulation that a hand leads, on the adapter or in f64.
 fn led(scene: Scene, gpu: bool) -> Option<Simulation> {

@@ -87,7 +87,7 @@ impl Place {
     /// Runs the short scene into `out`, kills it after its first checkpoint.
     fn killed_run(&self, out: &str) {
         let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
-            .args(["run", "short.toml", "--engine", "cpu", "--out", out, "--checkpoint", "0.05"])
+            .args(["run", "short.toml", "--engine", "cpu64", "--out", out, "--checkpoint", "0.05"])
             .current_dir(self.0.path())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
@@ -146,7 +146,7 @@ fn assert_whole_tables(folder: &Path) -> usize {
 #[test]
 fn a_disk_that_fills_up_within_a_run_leaves_whole_rows_and_a_checkpoint() {
     let place = Place::new();
-    let output = place.call("run short.toml --engine cpu --out whole --checkpoint 0");
+    let output = place.call("run short.toml --engine cpu64 --out whole --checkpoint 0");
     assert!(output.status.success(), "{}", told(&output));
     place.killed_run("out");
     let (checkpoint, at_kill) = (place.bytes("out/checkpoint.stylet"), assert_whole_tables(&place.path("out")));
@@ -213,7 +213,7 @@ fn a_run_without_room_for_a_checkpoint() {
     let place = Place::new();
     let fine = SCENE.replace("cell_size_mm = 1.2", "cell_size_mm = 0.7").replace("depth_mm = 3.0", "depth_mm = 0.5");
     std::fs::write(place.path("fine.toml"), fine).unwrap();
-    let output = place.call_limited(64, "run fine.toml --engine cpu --out out --checkpoint 0.05");
+    let output = place.call_limited(64, "run fine.toml --engine cpu64 --out out --checkpoint 0.05");
     let text = told(&output);
     assert!(output.status.success(), "{text}");
     let note = "out/checkpoint.stylet: File too large (os error 27); there is none, the run goes on without";
@@ -222,7 +222,7 @@ fn a_run_without_room_for_a_checkpoint() {
     assert!(place.leftovers("out").is_empty() && !place.path("out/checkpoint.stylet").exists());
 
     // Neither the tables nor a checkpoint fit.
-    let output = place.call_limited(18, "run short.toml --engine cpu --out bare --checkpoint 0");
+    let output = place.call_limited(18, "run short.toml --engine cpu64 --out bare --checkpoint 0");
     let text = assert_told(&output, 1, ".csv", "File too large");
     assert!(text.contains("note: no checkpoint could be written either, so the run cannot go on from here"), "{text}");
     assert!(text.contains("bare/checkpoint.stylet: File too large") && !text.contains("go on with"), "{text}");
@@ -245,7 +245,7 @@ fn a_disk_that_is_really_full() {
         ))
     };
     // Room to begin, not to end.
-    let output = on_disk(40, "\"$STYLET\" run short.toml --engine cpu --out disk/out --checkpoint 0");
+    let output = on_disk(40, "\"$STYLET\" run short.toml --engine cpu64 --out disk/out --checkpoint 0");
     let text = told(&output);
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(text.contains("No space left on device") && text.contains("disk/out/"), "{text}");
@@ -259,7 +259,7 @@ fn a_disk_that_is_really_full() {
     std::fs::remove_dir_all(place.path("kept")).unwrap();
     std::fs::create_dir(place.path("kept")).unwrap();
     let line = "mkdir disk/out && printf old >disk/out/force.csv && head -c 999999 /dev/zero >disk/filling 2>/dev/null; \
-                \"$STYLET\" run short.toml --engine cpu --out disk/out --force";
+                \"$STYLET\" run short.toml --engine cpu64 --out disk/out --force";
     let output = on_disk(64, line);
     assert_told(&output, 2, "no room for results in disk/out", "No space left on device");
     assert_eq!(place.bytes("kept/out/force.csv"), b"old");
@@ -297,8 +297,8 @@ fn a_read_only_folder_keeps_its_results() {
     let mut bound = 0;
     for arguments in [
         &["run", "--resume", "out"][..],
-        &["run", "short.toml", "--engine", "cpu", "--out", "out", "--force"],
-        &["run", "short.toml", "--engine", "cpu", "--out", "out/inner"],
+        &["run", "short.toml", "--engine", "cpu64", "--out", "out", "--force"],
+        &["run", "short.toml", "--engine", "cpu64", "--out", "out/inner"],
     ] {
         let Some(output) = bound_call(&place, arguments) else { continue };
         assert_told(&output, 2, "cannot write results to out", "Permission denied");
@@ -311,7 +311,7 @@ fn a_read_only_folder_keeps_its_results() {
     assert_eq!(names.map(|name| place.bytes(name)), before);
     // A file where the folder should be stops everybody.
     for out in ["short.toml", "short.toml/inner"] {
-        let output = place.call(&format!("run unstable.toml --engine cpu --out {out}"));
+        let output = place.call(&format!("run unstable.toml --engine cpu64 --out {out}"));
         assert_told(&output, 2, &format!("cannot write results to {out}"), "os error");
     }
     assert_eq!(place.bytes("short.toml"), SCENE.as_bytes());
@@ -325,7 +325,7 @@ fn a_failure_is_told_where_forensics_cannot_be_written() {
     // A file in the place of the folder.
     std::fs::create_dir(place.path("out")).unwrap();
     std::fs::write(place.path("out/forensics"), "mine").unwrap();
-    let output = place.call("run unstable.toml --engine cpu --out out");
+    let output = place.call("run unstable.toml --engine cpu64 --out out");
     let text = assert_told(&output, 3, "run stopped in frame", "");
     assert!(text.contains("no forensics: out/forensics: ") && text.contains("way out: a file stands"), "{text}");
     assert!(place.bytes("out/forensics") == b"mine" && place.path("out/summary.json").exists());
@@ -333,7 +333,7 @@ fn a_failure_is_told_where_forensics_cannot_be_written() {
     assert!(rows > 0);
 
     // Files that are too large: those that fit are there, the others are named.
-    let whole = place.call("run unstable.toml --engine cpu --out whole");
+    let whole = place.call("run unstable.toml --engine cpu64 --out whole");
     assert_eq!(whole.status.code(), Some(3), "{}", told(&whole));
     let size = |name: &str| std::fs::metadata(place.path("whole/forensics").join(name)).unwrap().len();
     let limit = 40;
@@ -342,7 +342,7 @@ fn a_failure_is_told_where_forensics_cannot_be_written() {
             .into_iter()
             .partition(|name| size(name) > limit * 1024);
     assert!(!too_large.is_empty() && fit.contains(&"report.txt"), "{too_large:?} {fit:?}");
-    let output = place.call_limited(limit, "run unstable.toml --engine cpu --out less");
+    let output = place.call_limited(limit, "run unstable.toml --engine cpu64 --out less");
     let text = assert_told(&output, 3, "run stopped in frame", "");
     assert!(text.contains("the forensics in less/forensics are not complete"), "{text}");
     for name in too_large {

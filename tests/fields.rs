@@ -16,7 +16,7 @@ fn compare(scene: &str, overrides: &[&str], frames: u64) {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(scene);
     let overrides: Vec<String> = overrides.iter().map(|o| o.to_string()).collect();
     let scene = Scene::load(&file, &overrides).unwrap();
-    let purpose = Purpose { led: false, drawn: true };
+    let purpose = Purpose { led: false, drawn: true, lanes: false };
     let mut simulation = Simulation::for_purpose(scene, Some(gpu.clone()), purpose).unwrap();
     simulation.stop_after(frames);
     let mut record = simulation.next_frame().unwrap().unwrap();

@@ -94,7 +94,7 @@ fn what_was_clicked_runs_in_the_next_frame() {
     let Some(gpu) = common::gpu() else { return };
     let coarse = ["tissue.cell_size_mm=1.2", "tissue.size_mm=[14, 14, 12]"];
     let mut harness = harness(panel(&coarse));
-    let purpose = Purpose { led: true, drawn: true };
+    let purpose = Purpose { led: true, drawn: true, lanes: false };
     let scene = harness.state().scene.clone();
     let mut simulation = Simulation::for_purpose(scene, Some(gpu.clone()), purpose).unwrap_or_else(|e| panic!("{e}"));
     let slider = harness

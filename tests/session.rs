@@ -31,7 +31,7 @@ fn wanted(frame: usize) -> f64 {
 /// Leads the needle over `frames` frames; the session and the records.
 fn practised(frames: usize, ahead: usize) -> (Session, Vec<FrameRecord>) {
     let scene = scene();
-    let purpose = Purpose { led: true, drawn: ahead == 0 && gpu().is_some() };
+    let purpose = Purpose { led: true, drawn: ahead == 0 && gpu().is_some(), lanes: false };
     let mut simulation = Simulation::for_purpose(scene.clone(), gpu(), purpose).unwrap();
     let mut session = Session::new(&scene, &OVERRIDES.map(String::from), simulation.engine().info());
     let mut records = Vec::new();
@@ -79,7 +79,7 @@ impl Place {
 #[test]
 fn changes_are_replayed_in_their_frames() {
     let mut simulation =
-        Simulation::for_purpose(scene(), gpu(), Purpose { led: true, drawn: gpu().is_some() }).unwrap();
+        Simulation::for_purpose(scene(), gpu(), Purpose { led: true, drawn: gpu().is_some(), lanes: false }).unwrap();
     let overrides: Vec<String> = OVERRIDES.map(String::from).to_vec();
     let mut session = Session::new(&scene(), &overrides, simulation.engine().info());
     // Absolute, so that the replay finds it from everywhere.
@@ -133,7 +133,7 @@ fn a_hand_that_goes_as_the_script_does_feels_the_same() {
     // As deep as a hand may go: both get the same mesh.
     scene.motion.phases = vec![stylet::needle::Phase::Insert { speed: 2e-3, depth: 8.5e-3 }];
     let mut scripted = Simulation::on(scene.clone(), gpu()).unwrap();
-    let mut led = Simulation::for_purpose(scene, gpu(), Purpose { led: true, drawn: false }).unwrap();
+    let mut led = Simulation::for_purpose(scene, gpu(), Purpose { led: true, drawn: false, lanes: false }).unwrap();
     let mut frames = 0;
     while let Some(record) = scripted.next_frame().unwrap() {
         let pose = scripted.tool_pose(scripted.end_of(record.frame)).unwrap();
@@ -209,7 +209,8 @@ fn wanted_free(now: &HandPose, frame: usize) -> HandPose {
 
 /// Records of a run that these poses lead.
 fn led_by(poses: impl Iterator<Item = HandPose>, device: Option<stylet::gpu::Gpu>) -> Vec<FrameRecord> {
-    let mut simulation = Simulation::for_purpose(free_scene(), device, Purpose { led: true, drawn: false }).unwrap();
+    let mut simulation =
+        Simulation::for_purpose(free_scene(), device, Purpose { led: true, drawn: false, lanes: false }).unwrap();
     let step = |pose| {
         simulation.lead(&pose);
         simulation.next_frame().unwrap().unwrap()
@@ -221,7 +222,7 @@ fn led_by(poses: impl Iterator<Item = HandPose>, device: Option<stylet::gpu::Gpu
 fn tilts_and_another_entry_come_again_bit_for_bit() {
     for device in [None, gpu()] {
         let (drawn, mut frames) = (device.is_some(), 0);
-        let purpose = Purpose { led: true, drawn };
+        let purpose = Purpose { led: true, drawn, lanes: false };
         let scene = free_scene();
         let mut simulation = Simulation::for_purpose(scene.clone(), device.clone(), purpose).unwrap();
         let mut session = Session::new(&scene, &FREE.map(String::from), simulation.engine().info());
@@ -255,7 +256,8 @@ fn tilts_and_another_entry_come_again_bit_for_bit() {
 #[test]
 fn a_session_grows_line_by_line() {
     let scene = scene();
-    let mut engine = Simulation::for_purpose(scene.clone(), None, Purpose { led: true, drawn: false }).unwrap();
+    let mut engine =
+        Simulation::for_purpose(scene.clone(), None, Purpose { led: true, drawn: false, lanes: false }).unwrap();
     let mut session = Session::new(&scene, &OVERRIDES.map(String::from), engine.engine().info());
     let pose = engine.hand().unwrap();
     let place = Place::new();

@@ -137,7 +137,7 @@ fn the_list_names_every_case() {
 fn wrong_calls_are_refused() {
     for (args, expected) in [
         (&["--only", "twist"][..], &["no stability case `twist`", "twist_270"][..]),
-        (&["--engine", "fast"], &["auto, gpu, cpu or both"]),
+        (&["--engine", "fast"], &["auto, gpu, cpu, cpu64 or both"]),
         (&["--scenes", "assets", "--only", "rest"], &["no scene", "--scenes"]),
         (&["--list", "--json"], &["cannot be used with"]),
     ] {

@@ -31,7 +31,7 @@ const EDGES: [f64; 9] = [0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0];
 pub struct AdviseArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    /// auto, gpu, cpu or cpu64; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
     #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
     /// Ask for settings that keep real time

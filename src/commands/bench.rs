@@ -32,7 +32,7 @@ use crate::simulation::{EngineChoice, Simulation};
 
 #[derive(Debug, Clone, Args)]
 pub struct BenchArgs {
-    /// auto, gpu or cpu
+    /// auto, place, cpu or cpu64
     #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
     /// Print JSON instead of a table
@@ -140,17 +140,18 @@ pub(super) struct Subject {
 }
 
 impl Subject {
-    fn new(cells: [usize; 3], needle: bool, gpu: Option<&Gpu>, max_steps: usize) -> Result<Self> {
+    fn new(cells: [usize; 3], needle: bool, place: &Place, max_steps: usize) -> Result<Self> {
         let scene = scene(cells, needle);
         let mesh = uniform_mesh(cells, scene.tissue.cell_size);
-        Self::of_model(Arc::new(Model::new(scene, mesh)), gpu, max_steps)
+        Self::of_model(Arc::new(Model::new(scene, mesh)), place, max_steps)
     }
 
     /// A model of any scene.
-    pub(super) fn of_model(model: Arc<Model>, gpu: Option<&Gpu>, max_steps: usize) -> Result<Self> {
+    pub(super) fn of_model(model: Arc<Model>, place: &Place, max_steps: usize) -> Result<Self> {
         let dt = 0.8 * wave_speed_bound(&model);
-        let engine: Box<dyn Engine> = match gpu {
+        let engine: Box<dyn Engine> = match &place.gpu {
             Some(gpu) => Box::new(GpuEngine::new(model.clone(), gpu.clone(), dt, max_steps)?),
+            None if place.lanes => Box::new(CpuEngine::in_lanes(model.clone(), dt)),
             None => Box::new(CpuEngine::new(model.clone(), dt)),
         };
         let stages = stages(&model.effects, &Features::of(&model)).iter().filter(|s| !s.once_per_frame()).count();
@@ -219,9 +220,9 @@ impl Subject {
     }
 }
 
-fn measure(cells: [usize; 3], needle: bool, gpu: Option<&Gpu>) -> Result<Row> {
+fn measure(cells: [usize; 3], needle: bool, place: &Place) -> Result<Row> {
     const STEPS: usize = 100;
-    let mut subject = Subject::new(cells, needle, gpu, STEPS)?;
+    let mut subject = Subject::new(cells, needle, place, STEPS)?;
     if needle {
         subject.advance_tool(6e-3, STEPS)?;
     } else {
@@ -249,16 +250,16 @@ fn measure(cells: [usize; 3], needle: bool, gpu: Option<&Gpu>) -> Result<Row> {
 
 /// Cost of a step with the needle in the tissue over that of the bare tissue, 20 k cells: both in turn, median of the
 /// ratios, so that a drifting machine does not count.
-fn needle_over_bare(gpu: Option<&Gpu>, scheme: SchemeWord) -> Result<f64> {
+fn needle_over_bare(place: &Place, scheme: SchemeWord) -> Result<f64> {
     const STEPS: usize = 100;
-    let mut bare = Subject::new(SIZES[1], false, gpu, STEPS)?;
-    let mut needle = Subject::of_model(Arc::new(bench_stages::subject(Some(scheme))), gpu, STEPS)?;
+    let mut bare = Subject::new(SIZES[1], false, place, STEPS)?;
+    let mut needle = Subject::of_model(Arc::new(bench_stages::subject(Some(scheme))), place, STEPS)?;
     needle.advance_tool(6e-3, STEPS)?;
     bare.frame(STEPS, 1.0)?;
     let mut ratios = Vec::new();
     for _ in 0..7 {
         let (with, without) = (needle.round(STEPS)?, bare.round(STEPS)?);
-        let software = gpu.is_none_or(Gpu::is_software);
+        let software = place.is_software();
         ratios.push(match with.1.zip(without.1).filter(|_| software) {
             Some((with, without)) => with / without,
             None => with.0 / without.0,
@@ -269,13 +270,13 @@ fn needle_over_bare(gpu: Option<&Gpu>, scheme: SchemeWord) -> Result<f64> {
 }
 
 /// Wall and CPU time per tetrahedron and step [ns] of 20 k tetrahedra with averaged pressure.
-fn tetrahedra(gpu: Option<&Gpu>) -> Result<(f64, Option<f64>)> {
+fn tetrahedra(place: &Place) -> Result<(f64, Option<f64>)> {
     const STEPS: usize = 100;
     const CELLS: [usize; 3] = [15; 3];
     let scene = scene(CELLS, false);
     let block = uniform_mesh(CELLS, scene.tissue.cell_size);
     let model = Arc::new(Model::new(scene, Arc::new(TetMesh::from_block(&block))));
-    let mut subject = Subject::of_model(model, gpu, STEPS)?;
+    let mut subject = Subject::of_model(model, place, STEPS)?;
     subject.frame(STEPS, 1.0)?;
     let (wall, cpu) = subject.best(STEPS)?;
     let scale = 1e9 / subject.model.mesh.cell_count() as f64;
@@ -283,8 +284,8 @@ fn tetrahedra(gpu: Option<&Gpu>) -> Result<(f64, Option<f64>)> {
 }
 
 /// Share of a 16-step frame that is no step: submission, measuring stages and read-back together.
-fn frame_overhead(gpu: Option<&Gpu>) -> Result<f64> {
-    let mut subject = Subject::new(SIZES[1], false, gpu, 160)?;
+fn frame_overhead(place: &Place) -> Result<f64> {
+    let mut subject = Subject::new(SIZES[1], false, place, 160)?;
     subject.frame(160, 1.0)?;
     // Both in turn and the median of the pairs, so that a drifting machine does not count.
     let mut shares = Vec::new();
@@ -313,19 +314,32 @@ fn start(cold: bool, engine: EngineChoice) -> Option<(f64, f64)> {
 
 /// `stylet first-step`: one step of the 20 k block; prints milliseconds since `program_start` and the peak memory.
 pub fn first_step(engine: EngineChoice, program_start: Instant) -> Result<String> {
-    let gpu = open(engine)?;
-    let mut subject = Subject::new(SIZES[1], false, gpu.as_ref(), 1)?;
+    let place = open(engine)?;
+    let mut subject = Subject::new(SIZES[1], false, &place, 1)?;
     subject.frame(1, 1.0)?;
     let ms = program_start.elapsed().as_secs_f64() * 1e3;
     Ok(format!("{ms:.3} {}", process::peak_bytes().unwrap_or(0)))
 }
 
-pub(super) fn open(engine: EngineChoice) -> Result<Option<Gpu>> {
-    match engine {
-        EngineChoice::Cpu => Ok(None),
-        EngineChoice::Gpu => Gpu::open().map(Some),
-        EngineChoice::Auto => Ok(Gpu::open().ok()),
+/// Where a subject is computed: on a device, else on the CPU engine, in lanes or in f64.
+pub(super) struct Place {
+    pub gpu: Option<Gpu>,
+    pub lanes: bool,
+}
+
+impl Place {
+    pub fn is_software(&self) -> bool {
+        self.gpu.as_ref().is_none_or(Gpu::is_software)
     }
+}
+
+pub(super) fn open(engine: EngineChoice) -> Result<Place> {
+    let gpu = match engine {
+        EngineChoice::Cpu | EngineChoice::Cpu64 => None,
+        EngineChoice::Gpu => Some(Gpu::open()?),
+        EngineChoice::Auto => Gpu::open().ok(),
+    };
+    Ok(Place { gpu, lanes: engine != EngineChoice::Cpu64 })
 }
 
 /// Real-time factor of the main job without its outputs.
@@ -393,20 +407,20 @@ pub fn execute(args: &BenchArgs) -> Result<u8> {
 
 /// Measures everything that fits under `max_cells`. What is under way goes to standard error.
 pub fn bench(args: &BenchArgs) -> Result<Report> {
-    let gpu = open(args.engine)?;
-    let software = gpu.as_ref().is_none_or(Gpu::is_software);
+    let place = open(args.engine)?;
+    let software = place.is_software();
     let mut rows = Vec::new();
     let sizes = SIZES.iter().take(if software { 4 } else { 5 });
     for cells in sizes.filter(|c| c.iter().product::<usize>() <= args.max_cells) {
         eprintln!("measuring {} cells", cells.iter().product::<usize>());
-        rows.push(measure(*cells, false, gpu.as_ref())?);
+        rows.push(measure(*cells, false, &place)?);
         tell(&rows[rows.len() - 1]);
     }
     eprintln!("measuring the needle");
-    let needle = measure(SIZES[1], true, gpu.as_ref())?;
+    let needle = measure(SIZES[1], true, &place)?;
     tell(&needle);
     rows.push(needle.clone());
-    let info = Subject::new(SIZES[0], false, gpu.as_ref(), 1)?.engine.info().clone();
+    let info = Subject::new(SIZES[0], false, &place, 1)?.engine.info().clone();
     let mut goals = Vec::new();
     let mut goal = |what: &str, measured: f64, unit: &str, sense: &str, bound: f64| {
         goals.push(Goal {
@@ -432,20 +446,20 @@ pub fn bench(args: &BenchArgs) -> Result<Report> {
         }
     }
     eprintln!("measuring tetrahedra");
-    let (wall, cpu) = tetrahedra(gpu.as_ref())?;
+    let (wall, cpu) = tetrahedra(&place)?;
     let measured = cpu.filter(|_| software).unwrap_or(wall);
     goal("tet4 with averaged pressure, 20 k tets, per tet-step", measured, unit, "<=", 75.0);
     if let Some(bare) = &bare {
         eprintln!("measuring the needle beside the bare block, in turn");
-        let extra = |scheme| needle_over_bare(gpu.as_ref(), scheme).map(|ratio| 100.0 * (ratio - 1.0));
+        let extra = |scheme| needle_over_bare(&place, scheme).map(|ratio| 100.0 * (ratio - 1.0));
         goal("needle, contact and tip law on top, 20 k cells", extra(SchemeWord::Ring)?, "%", "<=", 25.0);
         goal("needle on an opened path on top, 20 k cells", extra(SchemeWord::Opening)?, "%", "<=", 30.0);
         goal("device memory, optional effects off", bare.device_bytes_per_cell, "B/cell", "<=", 200.0);
     }
-    if gpu.is_some() {
+    if place.gpu.is_some() {
         goal("recording per dispatch, 100 steps per frame", needle.record_us_per_dispatch, "us", "<=", 1.0);
         eprintln!("measuring submission and read-back");
-        let overhead = 100.0 * frame_overhead(gpu.as_ref())?;
+        let overhead = 100.0 * frame_overhead(&place)?;
         goal("submission, measuring and read-back of a 16-step frame", overhead, "%", "<=", 5.0);
     }
     for (cold, bound) in [(true, 150.0), (false, 70.0)] {
@@ -472,7 +486,7 @@ pub fn bench(args: &BenchArgs) -> Result<Report> {
         if let Some(bare) = &bare {
             goal("20 k cells, per step", bare.wall_us_per_step, "us", "<=", 10.0);
         }
-        if let (Some(gpu), Some(row)) = (&gpu, rows.iter().find(|r| r.cells >= 1_000_000)) {
+        if let (Some(gpu), Some(row)) = (&place.gpu, rows.iter().find(|r| r.cells >= 1_000_000)) {
             let rate = bytes_per_cell_step(4.0) / (row.wall_ns_per_cell_step * 1e-9);
             goal("share of the copy bandwidth at 1 M cells", 100.0 * rate / copy_bandwidth(gpu)?, "%", ">=", 60.0);
         }

@@ -12,11 +12,10 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::bench::{BenchArgs, Subject, open, scene, uniform_mesh};
+use super::bench::{BenchArgs, Place, Subject, open, scene, uniform_mesh};
 use crate::effects::{self, EFFECTS, EffectSet, Kind, damage, fibres, gravity, plasticity, viscoelastic};
 use crate::ending;
 use crate::error::Result;
-use crate::gpu::Gpu;
 use crate::gpu::compose::{compose, compose_without_effects};
 use crate::gpu::plan::{Features, defines, stages};
 use crate::material::LAWS;
@@ -85,7 +84,7 @@ fn with_effects(effects: &mut EffectSet, keys: &[&str], low: bool) {
 }
 
 /// The bench block with the effects `keys`; mass scaling, puncture and friction by `needle` as in the bench.
-fn subject(keys: &[&str], low: bool, gpu: Option<&Gpu>) -> Result<Subject> {
+fn subject(keys: &[&str], low: bool, place: &Place) -> Result<Subject> {
     let needle = keys.contains(&"puncture") || keys.contains(&"friction");
     let mut scene: Scene = scene(CELLS, needle);
     if !keys.contains(&"mass_scaling") {
@@ -110,7 +109,7 @@ fn subject(keys: &[&str], low: bool, gpu: Option<&Gpu>) -> Result<Subject> {
         scene.effects.indentation = Some(Default::default());
     }
     let mesh = uniform_mesh(CELLS, scene.tissue.cell_size);
-    let mut subject = Subject::of_model(Arc::new(Model::new(scene, mesh)), gpu, STEPS)?;
+    let mut subject = Subject::of_model(Arc::new(Model::new(scene, mesh)), place, STEPS)?;
     if needle {
         subject.advance_tool(6e-3, STEPS)?;
     } else if indents {
@@ -131,10 +130,10 @@ fn subject(keys: &[&str], low: bool, gpu: Option<&Gpu>) -> Result<Subject> {
     Ok(subject)
 }
 
-fn cost(keys: &[&str], beside: &[&str], low: bool, gpu: Option<&Gpu>) -> Result<EffectCost> {
-    let mut with = subject(keys, low, gpu)?;
-    let mut without = subject(beside, low, gpu)?;
-    let software = gpu.is_none_or(Gpu::is_software);
+fn cost(keys: &[&str], beside: &[&str], low: bool, place: &Place) -> Result<EffectCost> {
+    let mut with = subject(keys, low, place)?;
+    let mut without = subject(beside, low, place)?;
+    let software = place.is_software();
     let (mut ratios, mut best) = (Vec::new(), (f64::INFINITY, f64::INFINITY));
     for _ in 0..PAIRS {
         let one = |subject: &mut Subject| -> Result<f64> {
@@ -203,8 +202,7 @@ pub fn execute(args: &BenchArgs) -> Result<u8> {
 /// # Errors
 /// `Error::Adapter` where the wanted engine is not to be had.
 pub fn bench_effects(engine: EngineChoice) -> Result<EffectReport> {
-    let gpu = open(engine)?;
-    let gpu = gpu.as_ref();
+    let place = &open(engine)?;
     let constitutive: Vec<&str> = effects::keys_of(Kind::Constitutive).collect();
     let mut costs = Vec::new();
     let plan: [(&[&str], &[&str], bool); 14] = [
@@ -225,10 +223,10 @@ pub fn bench_effects(engine: EngineChoice) -> Result<EffectReport> {
     ];
     for (keys, beside, low) in plan {
         eprintln!("  {} ({})", keys.join(" + "), if low { "work" } else { "rest" });
-        costs.push(cost(keys, beside, low, gpu)?);
+        costs.push(cost(keys, beside, low, place)?);
     }
     let all = costs.iter().find(|c| c.load == "rest" && c.effects == constitutive.join(" + "));
-    let info = Subject::of_model(Arc::new(Model::new(scene([2; 3], false), uniform_mesh([2; 3], 0.8e-3))), gpu, 1)?;
+    let info = Subject::of_model(Arc::new(Model::new(scene([2; 3], false), uniform_mesh([2; 3], 0.8e-3))), place, 1)?;
     Ok(EffectReport {
         engine: info.engine.info().engine.clone(),
         adapter: info.engine.info().adapter.clone(),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::bench::{BenchArgs, Subject, open, scene, uniform_mesh};
+use super::bench::{BenchArgs, Place, Subject, open, scene, uniform_mesh};
 use crate::effects::puncture::SchemeWord;
 use crate::ending;
 use crate::engine::Engine as _;
@@ -70,7 +70,7 @@ pub(super) fn subject(scheme: Option<SchemeWord>) -> Model {
 
 fn costs(name: &'static str, scheme: Option<SchemeWord>, gpu: &Gpu) -> Result<SubjectCosts> {
     let model = Arc::new(subject(scheme));
-    let mut subject = Subject::of_model(model.clone(), Some(gpu), STEPS)?;
+    let mut subject = Subject::of_model(model.clone(), &Place { gpu: Some(gpu.clone()), lanes: false }, STEPS)?;
     subject.advance_tool(if scheme.is_some() { DEPTH } else { 0.0 }, STEPS)?;
     subject.frame(STEPS, 1.0)?;
     let state = subject.engine.read_state()?;
@@ -113,7 +113,8 @@ fn costs(name: &'static str, scheme: Option<SchemeWord>, gpu: &Gpu) -> Result<Su
 /// [`Error::Input`] without an adapter: the CPU engine has no dispatches to time.
 pub fn execute(args: &BenchArgs) -> Result<u8> {
     ending::watch();
-    let Some(gpu) = open(args.engine)? else {
+    let place = open(args.engine)?;
+    let Some(gpu) = &place.gpu else {
         return Err(Error::Input {
             message: "--stages times what is dispatched to an adapter, and the CPU engine dispatches nothing".into(),
             way_out: "--engine gpu on a machine with an adapter (a software one will do)".into(),
@@ -123,7 +124,7 @@ pub fn execute(args: &BenchArgs) -> Result<u8> {
     let mut all = Vec::new();
     for (name, scheme) in schemes {
         eprintln!("measuring {name}");
-        all.push(costs(name, scheme, &gpu)?);
+        all.push(costs(name, scheme, gpu)?);
     }
     if args.json {
         println!("{}", serde_json::to_string_pretty(&all).unwrap_or_default());

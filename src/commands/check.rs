@@ -32,7 +32,7 @@ const MOST_ITERATED: usize = 30_000;
 pub struct CheckArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    /// auto, gpu, cpu or cpu64; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
     #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
 }

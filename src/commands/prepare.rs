@@ -92,7 +92,8 @@ pub fn prepare(args: &PrepareArgs, mut tell: impl FnMut(&str)) -> Result<String>
     let leads = args.led().map_or_else(|| vec![false, true], |led| vec![led]);
     let (mut ready, mut apart) = (BTreeSet::new(), BTreeSet::new());
     for led in leads {
-        let simulation = Simulation::for_purpose(load(&[])?, Some(gpu.clone()), Purpose { led, drawn: true })?;
+        let simulation =
+            Simulation::for_purpose(load(&[])?, Some(gpu.clone()), Purpose { led, drawn: true, lanes: true })?;
         let on = simulation.model.effects.keys();
         if part != Part::Switches {
             simulation.plan_change(load(&[])?)?.prepare()?;

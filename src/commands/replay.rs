@@ -68,12 +68,20 @@ pub fn execute(args: &ReplayArgs) -> Result<u8> {
 pub fn replay(args: &ReplayArgs) -> Result<ReplayOutcome> {
     let session = Session::read(&session_file(&args.session))?;
     let scene = session.scene()?;
-    let device = match (args.engine, session.engine.as_str()) {
-        (EngineChoice::Cpu, _) | (EngineChoice::Auto, "cpu") => None,
-        _ => Some(Gpu::open()?),
+    let choice = match args.engine {
+        EngineChoice::Auto => session.engine.parse().unwrap_or(EngineChoice::Gpu),
+        chosen => chosen,
+    };
+    let device = match choice {
+        EngineChoice::Cpu | EngineChoice::Cpu64 => None,
+        EngineChoice::Gpu | EngineChoice::Auto => Some(Gpu::open()?),
     };
     let folder = OutputFolder::create(args.out.as_deref(), &scene.name, args.force)?;
-    let mut simulation = Simulation::for_purpose(scene.clone(), device, Purpose { led: true, drawn: false })?;
+    let mut simulation = Simulation::for_purpose(
+        scene.clone(),
+        device,
+        Purpose { led: true, drawn: false, lanes: choice == EngineChoice::Cpu },
+    )?;
     let info = simulation.engine().info().clone();
     let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
     let mut tables = Tables::create(&folder, &driven, simulation.model.has_bore(), &scene)?;

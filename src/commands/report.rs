@@ -36,7 +36,7 @@ pub struct ReportArgs {
     /// Folder of the runs and of the page [default: out/report_<NAME>, with --quick out/report_<NAME>_quick]
     #[arg(long)]
     pub out: Option<PathBuf>,
-    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    /// auto, gpu, cpu or cpu64; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
     #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
     /// Coarse cells: a look at the page within seconds, no result

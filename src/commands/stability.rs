@@ -20,7 +20,7 @@ const JSON: &str = "stability.json";
 
 #[derive(Debug, Clone, Args)]
 pub struct StabilityArgs {
-    /// auto, gpu, cpu or both
+    /// auto, gpu, cpu, cpu64 or both (gpu and cpu64)
     #[arg(long, default_value = "auto")]
     engine: Engines,
     /// Run this case only; may be given several times
@@ -66,7 +66,7 @@ impl Engines {
     fn choices(self) -> Vec<EngineChoice> {
         match self {
             Engines::One(engine) => vec![engine],
-            Engines::Both => vec![EngineChoice::Gpu, EngineChoice::Cpu],
+            Engines::Both => vec![EngineChoice::Gpu, EngineChoice::Cpu64],
         }
     }
 }
@@ -79,7 +79,7 @@ impl FromStr for Engines {
             "both" => Ok(Engines::Both),
             _ => EngineChoice::from_str(text)
                 .map(Engines::One)
-                .map_err(|_| format!("there is no engine `{text}`; use auto, gpu, cpu or both")),
+                .map_err(|_| format!("there is no engine `{text}`; use auto, gpu, cpu, cpu64 or both")),
         }
     }
 }

@@ -30,7 +30,7 @@ const MOST_PARTS: usize = 1000;
 pub struct StudyArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    /// auto, gpu, cpu or cpu64; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
     #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
     /// What is varied, separated by commas: mesh, mass, step, engine, effects [default: all]
@@ -286,10 +286,7 @@ fn parse_shard(text: &str) -> Result<(usize, usize)> {
 /// The plan that the folder holds, where it fits; else a new one, which is stored.
 fn plan(store: &Store, subject: &Subject, axes: &[Axis], args: &StudyArgs, part: bool) -> Result<Plan> {
     let (budget, finest) = (60.0 * args.budget, args.finest.unwrap_or(0.0));
-    let engines: Vec<Engine> = match subject.adapter {
-        Some(_) => vec![Engine::Gpu, Engine::Cpu],
-        None => vec![Engine::Cpu],
-    };
+    let engines = &subject.engines;
     let old = store.plan()?;
     let current = |plan: &Plan| plan.scene_hash == subject.scene_hash() && plan.version == env!("CARGO_PKG_VERSION");
     let mut costs = None;
@@ -300,7 +297,7 @@ fn plan(store: &Store, subject: &Subject, axes: &[Axis], args: &StudyArgs, part:
                 store.path().display()
             );
         } else {
-            let fits = old.costs.measured != part && old.costs.engines.keys().eq(&engines);
+            let fits = old.costs.measured != part && old.costs.engines.keys().eq(engines);
             let same = old.axes == axes && old.budget_s == budget && old.base == subject.base;
             if fits && same && old.asked_finest_mm == finest {
                 return Ok(old);
@@ -317,7 +314,7 @@ fn plan(store: &Store, subject: &Subject, axes: &[Axis], args: &StudyArgs, part:
         }
         None => {
             eprintln!("measuring what a step costs here");
-            runner::measure_costs(subject, &engines)?
+            runner::measure_costs(subject, engines)?
         }
     };
     let plan = Plan::new(subject, axes, budget, costs, finest)?;
@@ -350,7 +347,7 @@ impl Row<'_> {
     /// The finished run, if the folder holds it: of the same scene, settings and version, on the same adapter.
     fn finished(&self, planned: &PlannedRun) -> Option<RunRecord> {
         let here = |run: &RunRecord| {
-            planned.settings.engine == Engine::Cpu || self.subject.adapter.as_deref() == Some(run.adapter.as_str())
+            planned.settings.engine != Engine::Gpu || self.subject.adapter.as_deref() == Some(run.adapter.as_str())
         };
         let run = self.store.run(&planned.id)?;
         (run.hash == self.subject.hash(&planned.settings) && here(&run)).then_some(run)

@@ -11,14 +11,14 @@ use crate::scene::Face;
 
 /// Sums of one node over one step: energies [J], counts and the ratio of [`FrameSums::step_ratio`].
 #[derive(Debug, Clone, Copy, Default)]
-struct NodeSums {
-    damping: f64,
-    work: f64,
-    raised_energy: f64,
-    clamped_energy: f64,
-    clamped: u32,
-    raised: u32,
-    step_ratio: f64,
+pub(super) struct NodeSums {
+    pub damping: f64,
+    pub work: f64,
+    pub raised_energy: f64,
+    pub clamped_energy: f64,
+    pub clamped: u32,
+    pub raised: u32,
+    pub step_ratio: f64,
 }
 
 /// What acts on a node, summed over its tied copies.
@@ -34,65 +34,108 @@ struct Acting {
     share: f64,
 }
 
-impl CpuEngine {
-    /// Stage `integrate_nodes`: `v+ = ((1 - alpha dt/2) v + dt f/m) / (1 + alpha dt/2)`, `u+ = u + dt v+`.
-    pub(super) fn integrate_nodes(&mut self, input: &StepInput) {
-        let model = self.model.clone();
-        let dt = self.dt;
-        let limit = model.speed_limit(dt);
-        let gravity = model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling());
-        let (cells, elements) = (&self.cells, &self.elements);
-        let (external, added_bound) = (&self.external, &self.added_bound);
-        let acting = |node: usize| {
-            let own = [node as u32];
-            // Tied copies move as one node: every copy sums over all of them and books its share of the mass.
-            let copies = model.separation.tied(node).unwrap_or(&own);
-            let mut sum = Acting::default();
-            for copy in copies.iter().map(|n| *n as usize) {
-                let (f, k) = elements.gather(&model.mesh, cells, copy);
-                sum.force += f + external[copy];
-                sum.bound += k + added_bound[copy];
-                sum.mass += model.node_mass[copy];
-                sum.load += gravity * model.node_mass[copy];
-                sum.load += model.node_load.get(copy).map_or(DVec3::ZERO, |f| *f * input.load_factor);
-            }
-            sum.force += sum.load;
-            sum.share = if copies.len() > 1 { model.node_mass[node] / sum.mass } else { 1.0 };
-            sum
-        };
-        let nodes: Vec<NodeSums> = self
-            .state
-            .displacement
-            .par_iter_mut()
-            .zip(self.state.velocity.par_iter_mut())
-            .enumerate()
-            .with_min_len(256)
-            .map(|(node, (u, v))| advance_node(&model, input, dt, limit, node, &acting(node), (u, v)))
-            .collect();
-        // In the order of the nodes: sums of threads that come as they come would differ in their last bits from run to run.
-        let sums = &mut self.sums;
-        for node in &nodes {
-            sums.energy.damping += node.damping;
-            sums.load_work += node.work;
-            sums.energy.raised_mass += node.raised_energy;
-            sums.energy.speed_limit += node.clamped_energy;
-            sums.health.clamped_nodes += node.clamped;
-            sums.health.raised_mass += node.raised;
-            sums.step_ratio = sums.step_ratio.max(node.step_ratio);
-        }
+impl NodeSums {
+    pub fn add(&mut self, other: &NodeSums) {
+        self.damping += other.damping;
+        self.work += other.work;
+        self.raised_energy += other.raised_energy;
+        self.clamped_energy += other.clamped_energy;
+        self.clamped += other.clamped;
+        self.raised += other.raised;
+        self.step_ratio = self.step_ratio.max(other.step_ratio);
     }
 }
 
-/// Moves a node by one step of `dt` [s], no faster than `limit` [m/s]; displacement and velocity [m, m/s].
-fn advance_node(
-    model: &Model,
-    input: &StepInput,
-    dt: f64,
-    limit: f64,
-    node: usize,
-    acting: &Acting,
-    (u, v): (&mut DVec3, &mut DVec3),
-) -> NodeSums {
+/// What every node of a step is told.
+pub(super) struct NodeStep<'a> {
+    pub model: &'a Model,
+    pub input: &'a StepInput,
+    pub dt: f64,
+    /// Largest speed [m/s].
+    pub limit: f64,
+    pub gravity: DVec3,
+    pub external: &'a [DVec3],
+    pub added_bound: &'a [f64],
+}
+
+impl CpuEngine {
+    /// Stage `integrate_nodes`: `v+ = ((1 - alpha dt/2) v + dt f/m) / (1 + alpha dt/2)`, `u+ = u + dt v+`.
+    pub(super) fn integrate_nodes(&mut self, input: &StepInput) {
+        let CpuEngine { model, state, elements, cells, lanes, .. } = self;
+        let step = NodeStep {
+            model,
+            input,
+            dt: self.dt,
+            limit: model.speed_limit(self.dt),
+            gravity: model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling()),
+            external: &self.external,
+            added_bound: &self.added_bound,
+        };
+        let nodes: Vec<NodeSums> = match lanes {
+            Some(lanes) => lanes.integrate(&step, &mut state.displacement, &mut state.velocity),
+            None => {
+                let gather = |node: usize| elements.gather(&model.mesh, cells, node);
+                state
+                    .displacement
+                    .par_iter_mut()
+                    .zip(state.velocity.par_iter_mut())
+                    .enumerate()
+                    .with_min_len(256)
+                    .map(|(node, (u, v))| step.advance(node, gather, (u, v)))
+                    .collect()
+            }
+        };
+        // In the order of the nodes: sums of threads that come as they come would differ in their last bits from run to run.
+        let mut all = NodeSums::default();
+        for node in &nodes {
+            all.add(node);
+        }
+        let sums = &mut self.sums;
+        sums.energy.damping += all.damping;
+        sums.load_work += all.work;
+        sums.energy.raised_mass += all.raised_energy;
+        sums.energy.speed_limit += all.clamped_energy;
+        sums.health.clamped_nodes += all.clamped;
+        sums.health.raised_mass += all.raised;
+        sums.step_ratio = sums.step_ratio.max(all.step_ratio);
+    }
+}
+
+impl NodeStep<'_> {
+    /// Moves a node, displacement and velocity [m, m/s]; `gather`: force of the cells on it and their bound.
+    pub fn advance(
+        &self,
+        node: usize,
+        gather: impl Fn(usize) -> (DVec3, f64),
+        moved: (&mut DVec3, &mut DVec3),
+    ) -> NodeSums {
+        advance_node(self, node, &self.acting(node, gather), moved)
+    }
+
+    /// What acts on a node.
+    fn acting(&self, node: usize, gather: impl Fn(usize) -> (DVec3, f64)) -> Acting {
+        let NodeStep { model, input, gravity, external, added_bound, .. } = *self;
+        let own = [node as u32];
+        // Tied copies move as one node: every copy sums over all of them and books its share of the mass.
+        let copies = model.separation.tied(node).unwrap_or(&own);
+        let mut sum = Acting::default();
+        for copy in copies.iter().map(|n| *n as usize) {
+            let (f, k) = gather(copy);
+            sum.force += f + external[copy];
+            sum.bound += k + added_bound[copy];
+            sum.mass += model.node_mass[copy];
+            sum.load += gravity * model.node_mass[copy];
+            sum.load += model.node_load.get(copy).map_or(DVec3::ZERO, |f| *f * input.load_factor);
+        }
+        sum.force += sum.load;
+        sum.share = if copies.len() > 1 { model.node_mass[node] / sum.mass } else { 1.0 };
+        sum
+    }
+}
+
+/// Moves a node by one step, no faster than the limit; displacement and velocity [m, m/s].
+fn advance_node(step: &NodeStep, node: usize, acting: &Acting, (u, v): (&mut DVec3, &mut DVec3)) -> NodeSums {
+    let NodeStep { model, input, dt, limit, .. } = *step;
     let Acting { force, load, bound, mass: scaled, share } = *acting;
     let alpha = model.scene.solver.mass_damping;
     let mass = if model.effects.mass_scaling.is_some() { stable_mass(scaled, bound, dt) } else { scaled };

@@ -4,15 +4,19 @@ mod cohesive_forces;
 mod free_tip;
 mod indenter_contact;
 mod integrate_nodes;
+mod lanes;
 mod needle_contact;
 mod needle_touch;
 mod opening;
 mod slit_contact;
+mod team;
 mod tip;
 
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
+use lanes::LaneBlock;
+pub use lanes::unknown_to_lanes;
 use rayon::prelude::*;
 
 use crate::effects::adhesion::Bond;
@@ -55,6 +59,9 @@ pub struct CpuEngine {
     dt: f64,
     info: EngineInfo,
     state: State,
+    /// True where lanes were asked for; cells in lanes; without them they are in `cells`.
+    wants_lanes: bool,
+    lanes: Option<LaneBlock>,
     cells: Vec<CellForces>,
     external: Vec<DVec3>,
     /// Stiffness bound that cohesive faces add at a node [N/m].
@@ -66,6 +73,8 @@ pub struct CpuEngine {
     contact_energy: f64,
     /// In the scheme `opening`: how far the tip advanced in this step, and how far the dimple shifted the path with it [m].
     advanced: [f64; 2],
+    /// True in the last step of a frame, at which energies are told.
+    measures: bool,
     /// Elastic energy that the scheme `opening` added in the last step [J].
     opening_elastic: f64,
     /// What the points have dissipated and earlier frames have told.
@@ -100,27 +109,46 @@ impl CpuEngine {
         }
     }
 
-    /// A model at rest, advanced with steps of `dt` [s].
+    /// A model at rest in f64, advanced with steps of `dt` [s]: the reference.
     pub fn new(model: Arc<Model>, dt: f64) -> Self {
+        Self::with(model, dt, false)
+    }
+
+    /// The same with cells in lanes of f32, as far as these know the model; what they do not know is in f64.
+    pub fn in_lanes(model: Arc<Model>, dt: f64) -> Self {
+        Self::with(model, dt, true)
+    }
+
+    fn with(model: Arc<Model>, dt: f64, wants_lanes: bool) -> Self {
         let (nodes, cells) = (model.mesh.node_count(), model.mesh.cell_count());
         let state = Self::new_state(&model);
+        let elements = Elements::new(&model);
+        let lanes = if wants_lanes { LaneBlock::new(&model, &elements) } else { Err(String::new()) };
+        let arithmetic = match &lanes {
+            Ok(lanes) => format!("cells in {} lanes of f32", lanes.width()),
+            Err(unknown) if unknown.is_empty() => "f64".into(),
+            Err(unknown) => format!("f64: lanes do not know {unknown}"),
+        };
+        let lanes = lanes.ok();
         let bytes = nodes * (3 * size_of::<DVec3>() + 8)
-            + cells * size_of::<CellForces>()
+            + lanes.as_ref().map_or(cells * size_of::<CellForces>(), LaneBlock::bytes)
             + state.stiffness.len() * 8
             + state.points.len() * (size_of::<PointState>() + model.prony_term_count() * size_of::<DMat3>())
             + state.contact.len() * (size_of::<ContactState>() + size_of::<ContactSums>());
         CpuEngine {
-            elements: Elements::new(&model),
+            wants_lanes,
             dt,
             info: EngineInfo {
-                engine: "cpu".into(),
-                adapter: format!("{} CPU threads, f64", rayon::current_num_threads()),
+                engine: if wants_lanes { "cpu" } else { "cpu64" }.into(),
+                adapter: format!("{} CPU threads, {arithmetic}", rayon::current_num_threads()),
                 driver: format!("stylet {}", env!("CARGO_PKG_VERSION")),
                 device_bytes: bytes as u64,
                 software: true,
             },
             state,
-            cells: vec![CellForces::default(); cells],
+            cells: if lanes.is_some() { Vec::new() } else { vec![CellForces::default(); cells] },
+            lanes,
+            elements,
             external: vec![DVec3::ZERO; nodes],
             added_bound: vec![0.0; nodes],
             tip_forces: Vec::new(),
@@ -128,6 +156,7 @@ impl CpuEngine {
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
             advanced: [0.0; 2],
+            measures: false,
             opening_elastic: 0.0,
             booked: FrameEnergies::default(),
             centre_line: None,
@@ -138,14 +167,22 @@ impl CpuEngine {
         }
     }
 
+    /// The state at the end of the last frame.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
     /// Force [N] and stiffness bound [N/m] of every node at the present state, as a step with this input would find them; tied
     /// copies have those of all of them. Nothing changes: a look at one step, for tests and bisecting.
     pub fn forces_and_bounds(&mut self, input: &StepInput) -> (Vec<DVec3>, Vec<f64>) {
         let kept = (self.state.clone(), self.sums.clone());
+        if let Some(lanes) = &mut self.lanes {
+            lanes.take(&self.state.displacement);
+        }
         self.forces(input);
         let nodes = 0..self.model.mesh.node_count();
         let at = |node: usize| {
-            let (force, bound) = self.elements.gather(&self.model.mesh, &self.cells, node);
+            let (force, bound) = self.gather(node);
             (force + self.external[node], bound + self.added_bound[node])
         };
         let (mut forces, mut bounds): (Vec<DVec3>, Vec<f64>) = nodes.map(at).unzip();
@@ -188,8 +225,42 @@ impl CpuEngine {
         }
     }
 
+    /// Force of the cells on a node (-f_int) [N] and its stiffness bound [N/m].
+    fn gather(&self, node: usize) -> (DVec3, f64) {
+        match &self.lanes {
+            Some(lanes) => lanes.at(node),
+            None => self.elements.gather(&self.model.mesh, &self.cells, node),
+        }
+    }
+
+    /// Calls `work` with `0..count` on all threads; results in that order.
+    fn each<R: Send>(&self, count: usize, work: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
+        match &self.lanes {
+            Some(lanes) => lanes.team().each(count, work),
+            None => (0..count).into_par_iter().map(work).collect(),
+        }
+    }
+
+    /// Adds to the forces of a cell (with the sign of f_int) and to its bounds.
+    fn add_to_cell(&mut self, cell: usize, added: &CellForces) {
+        match &mut self.lanes {
+            Some(lanes) => lanes.add(&self.model.mesh.cell_nodes(cell), added),
+            None => {
+                let cell = &mut self.cells[cell];
+                for i in 0..8 {
+                    cell.force[i] += added.force[i];
+                    cell.bound[i] += added.bound[i];
+                }
+            }
+        }
+    }
+
     /// Stage `element_forces`; tetrahedra get their averaged pressure first.
     fn element_forces(&mut self, input: &StepInput) {
+        if let Some(lanes) = &mut self.lanes {
+            lanes.compute(&self.model, &self.elements, &self.state.displacement, &self.state.stiffness);
+            return;
+        }
         let (model, elements, dt) = (&self.model, &self.elements, self.dt);
         let State { displacement, stiffness, points, .. } = &mut self.state;
         let states = CellStates { points, stiffness };
@@ -277,7 +348,10 @@ impl CpuEngine {
         self.take_own_supply();
         let (model, elements, state, sums) = (&self.model, &self.elements, &self.state, &mut self.sums);
         if model.has_driven_faces() {
-            let forces = elements.nodal_forces(&model.mesh, &self.cells);
+            let forces: Vec<DVec3> = match &self.lanes {
+                Some(lanes) => (0..model.mesh.node_count()).map(|n| -lanes.at(n).0).collect(),
+                None => elements.nodal_forces(&model.mesh, &self.cells),
+            };
             sums.reactions = face_reactions(model, &forces);
             sums.face_moments = face_moments(model, &forces, &self.state.displacement);
         }
@@ -291,10 +365,10 @@ impl CpuEngine {
     /// E - dt/2 f v by the trapezoidal rule.
     fn measure_nodes(&mut self) {
         let (model, state) = (&self.model, &self.state);
+        let force = |node: usize| self.gather(node).0 + self.external[node];
+        let power = state.velocity.iter().enumerate().map(|(node, v)| force(node).dot(*v)).sum::<f64>();
         let sums = &mut self.sums;
         if sums.steps > 0 {
-            let force = |node: usize| self.elements.gather(&model.mesh, &self.cells, node).0 + self.external[node];
-            let power = state.velocity.iter().enumerate().map(|(node, v)| force(node).dot(*v)).sum::<f64>();
             sums.energy.half_step -= 0.5 * self.dt * power;
         }
         sums.energy.kinetic =
@@ -358,11 +432,15 @@ impl Engine for CpuEngine {
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {
         self.sums = FrameSums { frame: plan.frame, steps: plan.steps.len() as u32, ..Default::default() };
         self.centre_line = plan.centre_line;
+        if let Some(lanes) = &mut self.lanes {
+            lanes.take(&self.state.displacement);
+        }
         for (index, input) in plan.steps.iter().enumerate() {
             if crate::ending::is_overdue() {
                 return Err(Error::Ended(crate::ending::reason()));
             }
             self.sums.last_tool_work = 0.0;
+            self.measures = index + 1 == plan.steps.len();
             self.forces(input);
             if index + 1 == plan.steps.len() {
                 // What the tool does until the middle of the last step, with the speed that it has then, goes into the springs of contact.
@@ -390,7 +468,7 @@ impl Engine for CpuEngine {
         if !Self::new_state(&model).fits(&self.state) {
             return Ok(false);
         }
-        let mut next = CpuEngine::new(model, dt);
+        let mut next = CpuEngine::with(model, dt, self.wants_lanes);
         std::mem::swap(&mut next.state, &mut self.state);
         std::mem::swap(&mut next.finished, &mut self.finished);
         (next.booked, next.tip_energy, next.contact_energy) = (self.booked, self.tip_energy, self.contact_energy);
@@ -412,22 +490,28 @@ impl Engine for CpuEngine {
     }
 
     fn save(&mut self) -> Result<EngineImage> {
-        Ok(EngineImage::Cpu { state: Box::new(self.state.clone()), booked: self.booked })
+        let (state, lanes) = (Box::new(self.state.clone()), self.wants_lanes);
+        Ok(EngineImage::Cpu { state, booked: self.booked, lanes })
     }
 
     fn restore(&mut self, image: &EngineImage) -> Result<()> {
         match image {
-            EngineImage::Cpu { state, booked } if state.fits(&self.state) => {
+            EngineImage::Cpu { state, booked, lanes } if *lanes == self.wants_lanes && state.fits(&self.state) => {
                 self.state = State::clone(state);
                 self.booked = *booked;
                 self.finished.clear();
                 Ok(())
             }
-            _ => Err(foreign_image("cpu", image)),
+            _ => Err(foreign_image(&self.info.engine, image)),
         }
     }
 
     fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
+        if let Some(lanes) = &mut self.lanes {
+            lanes.take(&self.state.displacement);
+            lanes.compute(&self.model, &self.elements, &self.state.displacement, &self.state.stiffness);
+            return Ok((0..self.model.mesh.node_count()).map(|node| -lanes.at(node).0).collect());
+        }
         let states = CellStates { points: &self.state.points, stiffness: &self.state.stiffness };
         Ok(self.elements.internal_forces(&self.model, &self.state.displacement, states))
     }

@@ -1,11 +1,13 @@
 //! Stage `opening` in f64: tissue beside the path of the needle, carried by points. Equations: src/needle/opening.rs.
 
 use glam::{DMat3, DVec3};
-use rayon::prelude::*;
 
+use super::lanes::LaneBlock;
 use super::{ContactSums, CpuEngine};
 use crate::engine::elements::{CellForces, CellShape};
+use crate::material::TangentBound;
 use crate::material::kinematics::cofactor;
+use crate::material::regular::{Polynomial, Regular};
 use crate::material_point::{Material, PointState, Volumetric};
 use crate::mesh::CORNERS;
 use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, mean_place};
@@ -77,19 +79,16 @@ impl CpuEngine {
         let (u, a) = (&self.state.displacement, self.state.tip_coordinate);
         let t = plan.path.direction;
         let shift = plan.contact.as_ref().map_or(0.0, |c| c.part(a)) * self.state.touch.dimple;
-        let mut now: Vec<Now> = opening
-            .stations
-            .par_iter()
-            .map(|station| {
-                let centre = mean_place(&station.centre, &station.nodes, mesh, u);
-                let behind = (tip - mean_place(&station.disc, &station.nodes, mesh, u)).dot(t) - shift;
-                let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.map.shaft));
-                let (full, slope) = (radius * opened, rate * opened);
-                let (cut, cut_rate) = opening.cut(station, a);
-                let section = Station { centre, radius: full * cut, ..Station::default() };
-                Now { section, behind, cut, cut_rate, full, slope, radius, rate }
-            })
-            .collect();
+        let mut now = self.each(opening.stations.len(), |i| {
+            let station = &opening.stations[i];
+            let centre = mean_place(&station.centre, &station.nodes, mesh, u);
+            let behind = (tip - mean_place(&station.disc, &station.nodes, mesh, u)).dot(t) - shift;
+            let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.map.shaft));
+            let (full, slope) = (radius * opened, rate * opened);
+            let (cut, cut_rate) = opening.cut(station, a);
+            let section = Station { centre, radius: full * cut, ..Station::default() };
+            Now { section, behind, cut, cut_rate, full, slope, radius, rate }
+        });
         for i in 0..now.len() {
             let (before, behind, by) = neighbours(i, now.len(), opening.spacing);
             let (a, b) = (now[before].section, now[behind].section);
@@ -108,12 +107,15 @@ impl CpuEngine {
         let mut elastic = 0.0;
         // Points: every station its own.
         let displacement = &self.state.displacement;
-        let points: Vec<_> = opening
-            .stations
-            .par_iter()
-            .zip(&now)
-            .map(|(station, now)| point_forces(&model, opening, station, &now.section, displacement))
-            .collect();
+        let (lanes, measures) = (&self.lanes, self.measures);
+        let shape = |lanes: &Option<LaneBlock>, cell: u32| Shape {
+            material: model.material(cell as usize),
+            regular: lanes.as_ref().map(|lanes| lanes.law(model.material_index(cell as usize))),
+            measures,
+        };
+        let points = self.each(now.len(), |i| {
+            point_forces(&|cell| shape(lanes, cell), opening, &opening.stations[i], &now[i].section, displacement)
+        });
         for ((station, local), sums) in opening.stations.iter().zip(&points).zip(&mut sums) {
             for (node, (force, bound)) in station.nodes.iter().zip(&local.1) {
                 self.external[*node as usize] -= *force;
@@ -123,25 +125,22 @@ impl CpuEngine {
             elastic += local.0.energy;
         }
         // Cells that the map reaches.
-        let states = &self.state;
-        let cells: Vec<_> = opening
-            .cells
-            .par_iter()
-            .map(|near| near_cell_forces(&model, opening, near, &within(&now, near), &states.displacement))
-            .collect();
+        let (lanes, displacement) = (&self.lanes, &self.state.displacement);
+        let cells = self.each(opening.cells.len(), |i| {
+            let near = &opening.cells[i];
+            near_cell_forces(&model, shape(lanes, near.cell), opening, near, &within(&now, near), displacement)
+        });
         for (near, added) in opening.cells.iter().zip(cells) {
             let Some((forces, derivatives, energy)) = added else { continue };
-            let cell = &mut self.cells[near.cell as usize];
-            for i in 0..8 {
-                cell.force[i] += forces.force[i];
-                cell.bound[i] += forces.bound[i];
-            }
+            self.add_to_cell(near.cell as usize, &forces);
             elastic += energy;
             for sums in &mut sums[usize::from(near.first)..][..usize::from(near.count)] {
                 sums.add(&derivatives, 1.0 / f64::from(near.count));
             }
         }
-        self.opening_elastic = elastic;
+        if measures {
+            self.opening_elastic = elastic;
+        }
         self.station_reactions(opening, plan, (pose, step), &now, &sums);
     }
 
@@ -291,27 +290,55 @@ fn averaged_normal(opening: &OpeningPlan, now: &[Now], sums: &[StationSums]) -> 
         .collect()
 }
 
-/// Stress [Pa] of what keeps the shape: law and fibres, without the pressure, which is the cell's.
-fn shape_stress(material: &Material, f: DMat3) -> DMat3 {
-    material.stress(f - DMat3::IDENTITY, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default())
+/// What keeps the shape: law and fibres, without the pressure, which is the cell's.
+#[derive(Clone, Copy)]
+struct Shape<'a> {
+    material: &'a Material,
+    /// Form of the law that lanes know, without powers and with all that stress and bound share; `None` on the f64 engine.
+    regular: Option<Polynomial>,
+    /// True where the energy is asked for.
+    measures: bool,
 }
 
-/// Its energy [J/m^3].
-fn shape_energy(material: &Material, f: DMat3) -> f64 {
-    material.energy(f - DMat3::IDENTITY, 0.0, 1.0, &PointState::default()).stored
-}
+impl Shape<'_> {
+    /// Stress [Pa] and bound of the tangent of F.
+    fn stress_and_bound(&self, f: DMat3) -> (DMat3, TangentBound) {
+        let h = f - DMat3::IDENTITY;
+        if let Some((law, state)) = self.regular.as_ref().zip(Regular::new(h.to_cols_array_2d())) {
+            let [straight, turned] = state.tangent_bound(law, self.material.law.bulk_modulus);
+            let stress = state.stress(law, 0.0);
+            return (DMat3::from_cols_array_2d(&stress), TangentBound { straight, turned });
+        }
+        (self.stress(f), self.material.tangent_bound(h, &PointState::default()))
+    }
 
-/// What opening adds at a place: derivatives of `W(F) - W(F_h)` and that difference, per volume.
-fn opened(material: &Material, map: &Opening, gradient: DMat3) -> (Derivatives, f64) {
-    let f = map.gradient(gradient);
-    let mut d = map.pull_back(shape_stress(material, f));
-    d.gradient -= shape_stress(material, gradient);
-    (d, shape_energy(material, f) - shape_energy(material, gradient))
+    fn stress(&self, f: DMat3) -> DMat3 {
+        let h = f - DMat3::IDENTITY;
+        if let Some((law, state)) = self.regular.as_ref().zip(Regular::new(h.to_cols_array_2d())) {
+            return DMat3::from_cols_array_2d(&state.stress(law, 0.0));
+        }
+        self.material.stress(h, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default())
+    }
+
+    /// Energy of F over that of F_h [J/m^3]; 0 where nobody asks.
+    fn energy_over(&self, f: DMat3, gradient: DMat3) -> f64 {
+        let energy = |f: DMat3| self.material.energy(f - DMat3::IDENTITY, 0.0, 1.0, &PointState::default()).stored;
+        if self.measures { energy(f) - energy(gradient) } else { 0.0 }
+    }
+
+    /// What opening adds at a place: derivatives of `W(F) - W(F_h)`, that difference, per volume, and the bound of the tangent there.
+    fn opened(&self, map: &Opening, gradient: DMat3) -> (Derivatives, f64, TangentBound) {
+        let f = map.gradient(gradient);
+        let (stress, bound) = self.stress_and_bound(f);
+        let mut d = map.pull_back(stress);
+        d.gradient -= self.stress(gradient);
+        (d, self.energy_over(f, gradient), bound)
+    }
 }
 
 /// Forces (with the sign of f_int) and bounds of the points of a station at its nodes.
-fn point_forces(
-    model: &Model,
+fn point_forces<'a>(
+    shape: &impl Fn(u32) -> Shape<'a>,
     opening: &OpeningPlan,
     station: &OpeningStation,
     section: &Station,
@@ -327,11 +354,9 @@ fn point_forces(
     for point in &station.points {
         let (y, gradient) = point.place_and_gradient(&u);
         let map = opening.map.at(section, y, gradient);
-        let material = model.material(point.cell as usize);
-        let (d, energy) = opened(material, &map, gradient);
+        let (d, energy, tangent) = shape(point.cell).opened(&map, gradient);
         sums.energy += point.volume * energy;
         sums.add(&d, point.volume);
-        let tangent = material.tangent_bound(map.gradient(gradient) - DMat3::IDENTITY, &PointState::default());
         // Rows of the point's own stiffness.
         let (by_gradient, by_place) = map.amplification();
         let grown = by_gradient + by_place * map.eta().length();
@@ -360,6 +385,7 @@ fn is_volume_place(corner: usize) -> bool {
 /// as elsewhere; the volume is taken at four places, the shape at one.
 fn near_cell_forces(
     model: &Model,
+    shape_of: Shape,
     opening: &OpeningPlan,
     near: &NearCell,
     section: &Station,
@@ -374,7 +400,7 @@ fn near_cell_forces(
     let nodes = model.mesh.cell_nodes(cell);
     let y: [DVec3; 8] = std::array::from_fn(|i| model.mesh.rest_position(nodes[i]) + u[i]);
     let gradient = DMat3::IDENTITY + shape.displacement_gradient(&u);
-    let material = model.material(cell);
+    let material = shape_of.material;
     let (mut sum, mut energy) = (Derivatives::ZERO, 0.0);
     let mut grown = 1.0f64;
     // y is linear in the cell, as its gradient is one: a force at a place is one on the middle and one on the gradient.
@@ -400,10 +426,9 @@ fn near_cell_forces(
         let offset = near.place * width;
         let map = map(offset);
         let volume = near.share * shape.volume;
-        let (d, w) = opened(material, &map, gradient);
+        let (d, w, tangent) = shape_of.opened(&map, gradient);
         energy += volume * w;
         add(&mut sum, &d, offset, volume);
-        let tangent = material.tangent_bound(map.gradient(gradient) - DMat3::IDENTITY, &PointState::default());
         let (by_gradient, by_place) = map.amplification();
         grown = grown.max(by_gradient + by_place * shape.edge());
         (straight, turned) = (straight.max(tangent.straight), turned.max(tangent.turned));

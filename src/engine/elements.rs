@@ -353,7 +353,7 @@ impl Elements {
     }
 
     /// True where open faces of the block meet in a cell, and in all cells where the bound of inner ones does not serve.
-    fn is_on_edge(&self, model: &Model, cell: usize) -> bool {
+    pub fn is_on_edge(&self, model: &Model, cell: usize) -> bool {
         if !model.effects.bounds_inner_cells() {
             return true;
         }
@@ -362,6 +362,16 @@ impl Elements {
         let open = |face: usize| !model.scene.faces[face].fixed[face / 2];
         let open_sides = (0..3).filter(|a| at[*a] == 0 && open(2 * a) || at[*a] + 1 == cells[*a] && open(2 * a + 1));
         open_sides.count() > 1
+    }
+
+    /// kappa 3.11 mu0 of a material [Pa].
+    pub fn hourglass_of(&self, material: usize) -> f64 {
+        self.hourglass[material]
+    }
+
+    /// Factor c of the quartic hourglass term.
+    pub fn quartic(&self) -> f64 {
+        self.quartic
     }
 
     fn hourglass(&self, model: &Model, cell: usize) -> f64 {

@@ -11,8 +11,8 @@ use crate::error::Error;
 pub enum EngineImage {
     /// Every device buffer that a shader writes and that later steps read, by name; work of gravity since t = 0 [J].
     Gpu { buffers: Vec<(String, Vec<u8>)>, gravity_work: f64 },
-    /// The state, and what its points have dissipated and earlier frames have told.
-    Cpu { state: Box<State>, booked: FrameEnergies },
+    /// The state, what its points have dissipated and earlier frames have told, and whether lanes were asked for.
+    Cpu { state: Box<State>, booked: FrameEnergies, lanes: bool },
 }
 
 impl EngineImage {
@@ -20,7 +20,8 @@ impl EngineImage {
     pub fn engine(&self) -> &'static str {
         match self {
             EngineImage::Gpu { .. } => "gpu",
-            EngineImage::Cpu { .. } => "cpu",
+            EngineImage::Cpu { lanes: true, .. } => "cpu",
+            EngineImage::Cpu { lanes: false, .. } => "cpu64",
         }
     }
 }

@@ -6,6 +6,7 @@ use super::kinematics::{
     J_CONTINUATION, Measure, cofactor, invariants, is_measure_continued, isochoric_measure, jacobian_minus_one,
 };
 use super::law::IsochoricLaw;
+use super::regular::Polynomial;
 use super::{Continuation, LARGEST_STRETCH, Mode, TangentBound, Verdict};
 
 /// Degrees m of `J^-m I1` and `J^-m I2`.
@@ -26,6 +27,10 @@ pub trait InvariantLaw {
     fn energy(&self, i1: f64, i2: f64) -> f64;
     /// Its derivatives for `I1bar - 3`.
     fn slopes(&self, i1: f64) -> Slopes;
+    /// Its constants where it is a polynomial, for [`regular`](super::regular).
+    fn polynomial(&self) -> Option<Polynomial> {
+        None
+    }
     /// Whether it depends on `I1bar`, and on `I2bar`.
     fn measures(&self) -> [bool; 2] {
         [true, false]
@@ -145,6 +150,10 @@ impl<L: InvariantLaw> IsochoricLaw for L {
         self.is_capped(|| isochoric_measure(i1, j, FIRST).value - 3.0).then_some(Continuation::Exponent)
     }
 
+    fn polynomial(&self) -> Option<Polynomial> {
+        InvariantLaw::polynomial(self)
+    }
+
     fn nominal_stress(&self, mode: Mode, x: f64) -> f64 {
         let i1 = mode.principal_stretches(x).iter().map(|l| l * l).sum::<f64>() - 3.0;
         let s = self.slopes(i1);
@@ -159,7 +168,7 @@ impl<L: InvariantLaw> IsochoricLaw for L {
 
 /// Strain e up to which the tangent bound is `turned = 8/3 (w1 + w2) (1 + 6 e)`, `straight = 3.2 e (w1 + w2)`: most cells of a block, and
 /// far fewer operations.
-const SMALL_STRAIN: f64 = 0.1;
+pub(super) const SMALL_STRAIN: f64 = 0.1;
 
 /// Largest change of a diagonal entry of C, and twice the largest entry beside the diagonal.
 fn largest_strain(c: DMat3) -> f64 {

@@ -6,6 +6,7 @@
 
 use glam::DMat3;
 
+use super::regular::Polynomial;
 use super::{Continuation, Isochoric, LAWS, Mode, TangentBound};
 
 /// Most constants of a law: the lanes of `Material.constants` in the shaders.
@@ -152,6 +153,10 @@ pub trait IsochoricLaw {
     fn tangent_bound(&self, h: DMat3, bulk_modulus: f64) -> TangentBound;
     /// Where it is continued, for H = F - I.
     fn continuation(&self, h: DMat3) -> Option<Continuation>;
+    /// Its constants where it is a polynomial of the invariants.
+    fn polynomial(&self) -> Option<Polynomial> {
+        None
+    }
     /// Nominal stress of an incompressible sample at the stretch, or amount of shear, `x` [Pa].
     fn nominal_stress(&self, mode: Mode, x: f64) -> f64;
 }
@@ -234,6 +239,12 @@ macro_rules! laws {
             fn continuation(&self, h: DMat3) -> Option<Continuation> {
                 match self {
                     $(Isochoric::$Law(l) => l.continuation(h)),+
+                }
+            }
+
+            fn polynomial(&self) -> Option<Polynomial> {
+                match self {
+                    $(Isochoric::$Law(l) => IsochoricLaw::polynomial(l)),+
                 }
             }
 

@@ -28,7 +28,9 @@ pub mod least_squares;
 pub mod mode;
 pub mod mooney_rivlin;
 pub mod neo_hookean;
+pub mod number;
 pub mod ogden;
+pub mod regular;
 pub mod yeoh;
 
 pub use invariants::{InvariantLaw, Slopes};
@@ -37,6 +39,7 @@ pub use mode::Mode;
 
 use glam::{DMat3, DVec3};
 use kinematics::{cofactor, double_dot, jacobian_minus_one};
+use regular::Polynomial;
 
 use crate::units::four_digits;
 

@@ -6,6 +6,7 @@
 //! `mu0 = 2 (c10 + c01)`. Source: Rivlin 1948; [Lv2022] Eq. 1 with N = 1; isochoric split: `src/material/mod.rs`.
 
 use super::law::{Constant, Constants, Form, Law, Search};
+use super::regular::Polynomial;
 use super::{InvariantLaw, Isochoric, Slopes, Verdict};
 
 pub const LAW: Law = Law {
@@ -56,6 +57,10 @@ impl MooneyRivlin {
 }
 
 impl InvariantLaw for MooneyRivlin {
+    fn polynomial(&self) -> Option<Polynomial> {
+        Some(Polynomial { c1: self.c10, c01: self.c01, ..Polynomial::default() })
+    }
+
     fn energy(&self, i1: f64, i2: f64) -> f64 {
         self.c10 * i1 + self.c01 * i2
     }

@@ -6,6 +6,7 @@
 //! `mu0 = 2 c10`. Elliptic for every deformation where c10 > 0. Source: Rivlin 1948; isochoric split: `src/material/mod.rs`.
 
 use super::law::{Constant, Constants, Form, Law, Search};
+use super::regular::Polynomial;
 use super::{InvariantLaw, Isochoric, Slopes, Verdict};
 
 pub const LAW: Law = Law {
@@ -44,6 +45,10 @@ impl NeoHookean {
 }
 
 impl InvariantLaw for NeoHookean {
+    fn polynomial(&self) -> Option<Polynomial> {
+        Some(Polynomial { c1: self.c10, ..Polynomial::default() })
+    }
+
     fn energy(&self, i1: f64, _i2: f64) -> f64 {
         self.c10 * i1
     }

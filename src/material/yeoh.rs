@@ -7,6 +7,7 @@
 
 use super::invariants::stable_range;
 use super::law::{Constant, Constants, Form, Law, Search};
+use super::regular::Polynomial;
 use super::{InvariantLaw, Isochoric, Slopes, Verdict};
 
 pub const LAW: Law = Law {
@@ -60,6 +61,10 @@ impl Yeoh {
 }
 
 impl InvariantLaw for Yeoh {
+    fn polynomial(&self) -> Option<Polynomial> {
+        Some(Polynomial { c1: self.c10, c2: self.c20, c3: self.c30, c01: 0.0 })
+    }
+
     fn energy(&self, e: f64, _i2: f64) -> f64 {
         e * (self.c10 + e * (self.c20 + e * self.c30))
     }

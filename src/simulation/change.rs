@@ -8,6 +8,7 @@
 use std::sync::Arc;
 
 use super::flexible_needle::FlexibleNeedle;
+use super::run_engine::takes_lanes;
 use super::start::{choose_step, sizes, too_many_steps};
 use super::{LONGEST_LED, Purpose, RunEngine, Simulation};
 use crate::cpu::CpuEngine;
@@ -58,7 +59,7 @@ impl Change {
     /// As [`GpuEngine::new`].
     pub fn engine(&self) -> Result<RunEngine> {
         let most_steps = self.purpose.most_steps(self.steps_per_frame);
-        RunEngine::new(&self.model, self.device.as_ref(), self.dt, most_steps, self.purpose.drawn)
+        RunEngine::new(&self.model, self.device.as_ref(), self.dt, most_steps, self.purpose)
     }
 
     fn gpu_engine(&self, gpu: &Gpu) -> Result<GpuEngine> {
@@ -75,10 +76,14 @@ impl Change {
     pub fn prepare(&self) -> Result<()> {
         let Some(gpu) = &self.device else { return Ok(()) };
         let mut engine = self.gpu_engine(gpu)?;
+        let steps_elsewhere = takes_lanes(&self.model, gpu, self.purpose);
         if self.purpose.drawn {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             engine.encode_fields(&mut encoder);
             gpu.queue.submit([encoder.finish()]);
+        }
+        if steps_elsewhere {
+            return Ok(());
         }
         let steps = vec![StepInput::at(&self.model, 0.0, self.dt)];
         engine.start_frame(&FramePlan { frame: 0, first_step: 0, steps, centre_line: None })?;

@@ -58,6 +58,8 @@ pub struct Purpose {
     pub led: bool,
     /// The device keeps the fields that a window draws.
     pub drawn: bool,
+    /// Without a device, cells are computed in lanes of f32 where these know the scene, not in f64.
+    pub lanes: bool,
 }
 
 impl Purpose {
@@ -282,6 +284,7 @@ impl Simulation {
         let Some(mut sums) = self.engine.collect(true)? else {
             return Err(Error::Device("the engine lost a frame".into()));
         };
+        self.engine.show()?;
         self.collected += 1;
         let bent = self.answer_of_the_needle(&mut sums);
         let when = (&self.clock, self.clock.first_step(sums.frame));

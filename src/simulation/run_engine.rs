@@ -4,16 +4,29 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
-use crate::cpu::CpuEngine;
+use super::Purpose;
+use crate::cpu::{CpuEngine, unknown_to_lanes};
 use crate::engine::Engine;
 use crate::error::Result;
+use crate::gpu::device::adapter_wanted_by_name;
 use crate::gpu::{Gpu, GpuEngine};
 use crate::model::Model;
 
 /// The engine of a run.
 pub enum RunEngine {
     Gpu(Box<GpuEngine>),
-    Cpu(Box<CpuEngine>),
+    /// With an engine on a device that computes nothing: a window draws from its buffers, which get the state of every frame.
+    Cpu {
+        engine: Box<CpuEngine>,
+        drawn: Option<Box<GpuEngine>>,
+    },
+}
+
+/// True where the CPU engine takes a model although there is a device: a software adapter, whose work is the processor's too, that nobody has
+/// asked for by name, and a model that lanes know.
+pub(super) fn takes_lanes(model: &Model, device: &Gpu, purpose: Purpose) -> bool {
+    let is_free = purpose.lanes && device.is_software() && !adapter_wanted_by_name();
+    is_free && unknown_to_lanes(&model.scene, &model.mesh).is_none()
 }
 
 impl RunEngine {
@@ -21,13 +34,21 @@ impl RunEngine {
     ///
     /// # Errors
     /// As [`GpuEngine::new`].
-    pub fn new(model: &Arc<Model>, device: Option<&Gpu>, dt: f64, most_steps: usize, drawn: bool) -> Result<Self> {
+    pub fn new(model: &Arc<Model>, device: Option<&Gpu>, dt: f64, most_steps: usize, purpose: Purpose) -> Result<Self> {
+        let on_processor = |drawn| {
+            let make = if purpose.lanes { CpuEngine::in_lanes } else { CpuEngine::new };
+            RunEngine::Cpu { engine: Box::new(make(model.clone(), dt)), drawn }
+        };
         Ok(match device {
+            Some(gpu) if takes_lanes(model, gpu, purpose) => {
+                let drawn = || GpuEngine::for_purpose(model.clone(), gpu.clone(), dt, 1, true).map(Box::new);
+                on_processor(purpose.drawn.then(drawn).transpose()?)
+            }
             Some(gpu) => {
-                let engine = GpuEngine::for_purpose(model.clone(), gpu.clone(), dt, most_steps, drawn)?;
+                let engine = GpuEngine::for_purpose(model.clone(), gpu.clone(), dt, most_steps, purpose.drawn)?;
                 RunEngine::Gpu(Box::new(engine))
             }
-            None => RunEngine::Cpu(Box::new(CpuEngine::new(model.clone(), dt))),
+            None => on_processor(None),
         })
     }
 
@@ -35,7 +56,15 @@ impl RunEngine {
     pub fn on_device(&self) -> Option<&GpuEngine> {
         match self {
             RunEngine::Gpu(engine) => Some(engine),
-            RunEngine::Cpu(_) => None,
+            RunEngine::Cpu { drawn, .. } => drawn.as_deref(),
+        }
+    }
+
+    /// Gives the state to those who draw, where another engine computed it.
+    pub fn show(&mut self) -> Result<()> {
+        match self {
+            RunEngine::Cpu { engine, drawn: Some(drawn) } => drawn.write_state(engine.state()),
+            _ => Ok(()),
         }
     }
 }
@@ -46,7 +75,7 @@ impl Deref for RunEngine {
     fn deref(&self) -> &Self::Target {
         match self {
             RunEngine::Gpu(engine) => engine.as_ref(),
-            RunEngine::Cpu(engine) => engine.as_ref(),
+            RunEngine::Cpu { engine, .. } => engine.as_ref(),
         }
     }
 }
@@ -55,7 +84,7 @@ impl DerefMut for RunEngine {
     fn deref_mut(&mut self) -> &mut Self::Target {
         match self {
             RunEngine::Gpu(engine) => engine.as_mut(),
-            RunEngine::Cpu(engine) => engine.as_mut(),
+            RunEngine::Cpu { engine, .. } => engine.as_mut(),
         }
     }
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::advice::advice;
 use super::flexible_needle::FlexibleNeedle;
 use super::{LONGEST_LED, Purpose, RunEngine, Simulation};
+use crate::cpu::unknown_to_lanes;
 use crate::engine::clock::Clock;
 use crate::engine::stable_dt::{power_iteration, wave_speed_bound};
 use crate::error::{Error, Result};
@@ -23,11 +24,15 @@ use crate::verdict::FLOOR_STRAIN;
 /// Which engine the user wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EngineChoice {
-    /// The best adapter; the CPU where there is none.
+    /// A hardware adapter; else the CPU engine where its lanes know the scene; else a software adapter; else the CPU engine.
     #[default]
     Auto,
+    /// The best adapter, a software one where there is no other.
     Gpu,
+    /// The CPU engine, cells in lanes of f32 where these know the scene.
     Cpu,
+    /// The CPU engine in f64: the reference.
+    Cpu64,
 }
 
 impl EngineChoice {
@@ -37,6 +42,7 @@ impl EngineChoice {
             EngineChoice::Auto => "auto",
             EngineChoice::Gpu => "gpu",
             EngineChoice::Cpu => "cpu",
+            EngineChoice::Cpu64 => "cpu64",
         }
     }
 }
@@ -49,7 +55,8 @@ impl FromStr for EngineChoice {
             "auto" => Ok(EngineChoice::Auto),
             "gpu" => Ok(EngineChoice::Gpu),
             "cpu" => Ok(EngineChoice::Cpu),
-            _ => Err(format!("there is no engine `{text}`; use auto, gpu or cpu")),
+            "cpu64" => Ok(EngineChoice::Cpu64),
+            _ => Err(format!("there is no engine `{text}`; use auto, gpu, cpu or cpu64")),
         }
     }
 }
@@ -78,8 +85,11 @@ impl Simulation {
 
     /// The same on a given mesh.
     pub fn with_mesh(scene: Scene, mesh: impl Into<Mesh>, choice: EngineChoice) -> Result<Self> {
-        let (device, notices) = Self::choose_device(choice)?;
-        Self::prepare(scene, mesh.into(), device, notices, MOST_STEPS_PER_FRAME, Purpose::default())
+        let mesh = mesh.into();
+        let (device, notices) = Self::choose_device(choice, &scene, &mesh)?;
+        let lanes = matches!(choice, EngineChoice::Auto | EngineChoice::Cpu);
+        let purpose = Purpose { lanes, ..Purpose::default() };
+        Self::prepare(scene, mesh, device, notices, MOST_STEPS_PER_FRAME, purpose)
     }
 
     /// The same on this device, without one on the CPU engine.
@@ -102,17 +112,26 @@ impl Simulation {
     }
 
     /// The device of a choice, and what is to be said about it; no device: the CPU engine.
-    fn choose_device(choice: EngineChoice) -> Result<(Option<Gpu>, Vec<String>)> {
+    fn choose_device(choice: EngineChoice, scene: &Scene, mesh: &Mesh) -> Result<(Option<Gpu>, Vec<String>)> {
         let mut notices = Vec::new();
         let device = match choice {
-            EngineChoice::Cpu => None,
+            EngineChoice::Cpu | EngineChoice::Cpu64 => None,
             EngineChoice::Gpu => Some(Gpu::open()?),
             EngineChoice::Auto => match Gpu::open() {
+                Ok(gpu)
+                    if gpu.is_software() && !adapter_wanted_by_name() && unknown_to_lanes(scene, mesh).is_none() =>
+                {
+                    notices.push(format!(
+                        "the adapter {} is software: the CPU engine takes this scene, in less time (--engine gpu: on the adapter)",
+                        gpu.info.name
+                    ));
+                    None
+                }
                 Ok(gpu) => Some(gpu),
                 // A name that fits nothing is the user's mistake; no adapter at all is not.
                 Err(error) if adapter_wanted_by_name() => return Err(error),
                 Err(error) => {
-                    notices.push(format!("running on the CPU engine (f64): {error}"));
+                    notices.push(format!("running on the CPU engine: {error}"));
                     None
                 }
             },
@@ -157,7 +176,7 @@ impl Simulation {
         }
         notices.extend(advice(&model));
         let most = purpose.most_steps(steps_per_frame);
-        let engine = RunEngine::new(&model, device.as_ref(), dt, most, purpose.drawn)?;
+        let engine = RunEngine::new(&model, device.as_ref(), dt, most, purpose)?;
         let kinematics = match purpose.led {
             true => model.kinematics.is_some().then(|| Kinematics::led(&model.scene.motion)),
             false => model.kinematics.clone(),

@@ -80,7 +80,7 @@ impl Simulation {
                 self.device(),
                 clock.dt,
                 self.purpose.most_steps(clock.steps_per_frame),
-                self.purpose.drawn,
+                self.purpose,
             )?;
             engine.write_state(&state)?;
             self.engine = engine;

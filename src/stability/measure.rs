@@ -2,6 +2,7 @@
 
 use super::Trace;
 use crate::Result;
+use crate::error::Error;
 use crate::scene::Face;
 use crate::simulation::{EngineChoice, Simulation};
 
@@ -22,7 +23,8 @@ pub fn top_force(simulation: &mut Simulation, trace: &Trace) -> Result<f64> {
 
 /// Number of frames whose records differ in any bit from those of the same run without an interruption.
 pub fn unlike_frames(simulation: &mut Simulation, trace: &Trace) -> Result<f64> {
-    let engine = if simulation.engine().info().engine == "gpu" { EngineChoice::Gpu } else { EngineChoice::Cpu };
+    let engine: EngineChoice =
+        simulation.engine().info().engine.parse().map_err(|e: String| Error::input(e, "report this as a defect"))?;
     let (scene, mesh) = (simulation.model.scene.clone(), simulation.model.mesh.clone());
     let mut whole = Simulation::with_mesh(scene, mesh, engine)?;
     let (mut frames, mut unlike) = (0, 0);

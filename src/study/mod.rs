@@ -28,7 +28,10 @@ use crate::units::trimmed;
 #[serde(rename_all = "lowercase")]
 pub enum Engine {
     Gpu,
+    /// Cells in lanes of f32.
     Cpu,
+    /// All in f64.
+    Cpu64,
 }
 
 impl Engine {
@@ -36,6 +39,7 @@ impl Engine {
         match self {
             Engine::Gpu => EngineChoice::Gpu,
             Engine::Cpu => EngineChoice::Cpu,
+            Engine::Cpu64 => EngineChoice::Cpu64,
         }
     }
 
@@ -48,14 +52,8 @@ impl Engine {
     pub fn describe(self) -> &'static str {
         match self {
             Engine::Gpu => "gpu f32",
-            Engine::Cpu => "cpu f64",
-        }
-    }
-
-    pub fn other(self) -> Engine {
-        match self {
-            Engine::Gpu => Engine::Cpu,
-            Engine::Cpu => Engine::Gpu,
+            Engine::Cpu => "cpu f32",
+            Engine::Cpu64 => "cpu64 f64",
         }
     }
 }

@@ -206,7 +206,7 @@ impl Page<'_> {
             text += &figure(chart, caption);
         }
         text += "</div>\n<p class=\"soft\">Large points are on the Pareto front: no other run is both cheaper and closer. \
-                 Circles: gpu f32. Squares: cpu f64. A run on the mesh of the reference has no error of the mesh in its own. The \
+                 Circles: GPU engine. Squares: CPU engine. A run on the mesh of the reference has no error of the mesh in its own. The \
                  repetition of the base and runs with effects switched on or off are not in these charts.</p>\n";
         Ok(text)
     }
@@ -622,7 +622,7 @@ fn short(settings: &Settings) -> String {
 }
 
 fn shape(settings: &Settings) -> Shape {
-    if settings.engine == Engine::Cpu { Shape::Square } else { Shape::Circle }
+    if settings.engine == Engine::Gpu { Shape::Circle } else { Shape::Square }
 }
 
 fn clamped(row: &Row) -> String {

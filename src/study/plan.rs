@@ -66,7 +66,11 @@ impl Costs {
     /// plan without talking to one another.
     pub fn assumed() -> Self {
         let cost = |step_s: f64, cell_step_s: f64| UnitCost { step_s, cell_step_s };
-        let engines = [(Engine::Gpu, cost(100e-6, 60e-9)), (Engine::Cpu, cost(20e-6, 190e-9))];
+        let engines = [
+            (Engine::Gpu, cost(100e-6, 60e-9)),
+            (Engine::Cpu, cost(20e-6, 40e-9)),
+            (Engine::Cpu64, cost(20e-6, 190e-9)),
+        ];
         Costs { engines: engines.into(), measured: false }
     }
 }
@@ -422,13 +426,13 @@ impl Planner<'_> {
         settings
     }
 
-    /// The reference with the level of its mesh: the finest mesh on which it takes at most `share_s` [s]; on it f64 before f32,
-    /// then the lowest mass scaling.
+    /// The reference with the level of its mesh: the finest mesh on which it takes at most `share_s` [s]; on it lanes, which are
+    /// 5e-5 of the peak from f64 in a fifth of its time (`tests/lanes.rs`), then f64, then a GPU; then the lowest mass scaling.
     fn reference(&mut self, share_s: f64) -> Option<(i32, PlannedRun)> {
         let base = self.basis.base;
         for level in self.finest_level()..=0 {
             let Ok(size) = self.meshes.size(level) else { continue };
-            for engine in [Engine::Cpu, Engine::Gpu] {
+            for engine in [Engine::Cpu, Engine::Cpu64, Engine::Gpu] {
                 // Something has to be better than in the base.
                 let lower = self.has(Axis::Mass) || !self.has(Axis::Mesh);
                 let factors: &[f64] = if lower { &REFERENCE_MASS_FACTORS } else { &[1.0] };
@@ -469,12 +473,13 @@ impl Planner<'_> {
             wanted.extend(MASS_FACTORS.map(|factor| (Role::Mass, self.with_mass(base.clone(), factor), 0)));
         }
         if self.has(Axis::Engine) {
-            match self.costs.engines.contains_key(&base.engine.other()) {
-                true => wanted.push((Role::Engine, Settings { engine: base.engine.other(), ..base.clone() }, 0)),
-                false => left_out.push(LeftOut {
-                    what: format!("engine {}", base.engine.other().key()),
+            let others = self.costs.engines.keys().filter(|engine| **engine != base.engine);
+            wanted.extend(others.map(|engine| (Role::Engine, Settings { engine: *engine, ..base.clone() }, 0)));
+            if !self.costs.engines.contains_key(&Engine::Gpu) {
+                left_out.push(LeftOut {
+                    what: "engine gpu".into(),
                     reason: "no adapter was found, or --engine cpu looks for none".into(),
-                }),
+                });
             }
         }
         if self.has(Axis::Step) {

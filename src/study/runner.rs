@@ -98,7 +98,7 @@ pub fn run(
         version: env!("CARGO_PKG_VERSION").into(),
         adapter: info.adapter,
         driver: info.driver,
-        software: info.software || settings.engine == Engine::Cpu,
+        software: info.software || settings.engine != Engine::Gpu,
         part: part.map(str::to_string),
         cells: simulation.model.mesh.cell_count() as u64,
         nodes: simulation.model.mesh.node_count() as u64,

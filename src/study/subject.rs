@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::{Engine, MeshSize, Settings};
+use crate::cpu::unknown_to_lanes;
 use crate::effects::{EFFECTS, Kind};
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::error::{Error, Result};
@@ -52,6 +53,8 @@ pub struct Subject {
     pub base: Settings,
     /// Adapter of the GPU engine; `None` where there is none.
     pub adapter: Option<String>,
+    /// Engines that the study may take.
+    pub engines: Vec<Engine>,
     /// What the study changes in the scene beside its axes, one sentence each.
     pub changes: Vec<String>,
     pub variants: Vec<Variant>,
@@ -71,15 +74,29 @@ impl Subject {
         let (scene, changes) = insertion(loaded)?;
         let gpu = match choice {
             // No adapter is looked for: parts of a study on several machines then agree.
-            EngineChoice::Cpu => None,
+            EngineChoice::Cpu | EngineChoice::Cpu64 => None,
             EngineChoice::Gpu => Some(Gpu::open()?),
             EngineChoice::Auto => match Gpu::open() {
                 Err(error) if adapter_wanted_by_name() => return Err(error),
                 found => found.ok(),
             },
         };
+        let is_known = choice != EngineChoice::Cpu64 && unknown_to_lanes(&scene, &Mesh::of_scene(&scene)).is_none();
+        let processor = if is_known { Engine::Cpu } else { Engine::Cpu64 };
+        // As a run chooses.
+        let engine = match &gpu {
+            Some(gpu) if choice == EngineChoice::Gpu || adapter_wanted_by_name() || !gpu.is_software() || !is_known => {
+                Engine::Gpu
+            }
+            _ => processor,
+        };
         let adapter = gpu.map(|gpu| describe(&gpu.info));
-        let engine = if adapter.is_some() { Engine::Gpu } else { Engine::Cpu };
+        let engines = match (choice, is_known) {
+            (EngineChoice::Cpu | EngineChoice::Cpu64, _) => vec![processor],
+            (_, true) => vec![Engine::Cpu, Engine::Cpu64],
+            (_, false) => vec![Engine::Cpu64],
+        };
+        let engines = adapter.iter().map(|_| Engine::Gpu).chain(engines).collect();
         let base = Settings {
             cell_size_mm: rounded(scene.tissue.cell_size * 1e3, DECIMALS),
             mass_scaling: rounded(scene.effects.mass_scaling.map_or(1.0, |p| p.factor), DECIMALS),
@@ -95,6 +112,7 @@ impl Subject {
             scene,
             base,
             adapter,
+            engines,
             changes,
             variants: Vec::new(),
             skipped: Vec::new(),

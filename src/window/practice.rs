@@ -120,7 +120,7 @@ impl Timing {
 }
 
 fn purpose(leader: Leader) -> Purpose {
-    Purpose { led: leader == Leader::Hand, drawn: true }
+    Purpose { led: leader == Leader::Hand, drawn: true, lanes: true }
 }
 
 /// Largest speed of a hand that is let through [m/s].

@@ -10,6 +10,8 @@ mod effects;
 mod fields;
 #[path = "../indentation.rs"]
 mod indentation;
+#[path = "../lanes.rs"]
+mod lanes;
 #[path = "../material/main.rs"]
 mod material;
 #[path = "../material_point/main.rs"]

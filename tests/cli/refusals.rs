@@ -149,12 +149,12 @@ fn refusals_stay_short_and_plain() {
         (&["run", &long], "File name too long"),
         (&["run", &folders], "File name too long"),
         (&["run", &words], "File name too long"),
-        (&["check", "tiny.toml", "--engine", &long], "auto, gpu or cpu"),
-        (&["check", "tiny.toml", "--engine", &words], "auto, gpu or cpu"),
+        (&["check", "tiny.toml", "--engine", &long], "auto, gpu, cpu or cpu64"),
+        (&["check", "tiny.toml", "--engine", &words], "auto, gpu, cpu or cpu64"),
         (&["fit", &long], "File name too long"),
         (&["run", "tiny.toml", "--out", &long], "File name too long"),
         (&["check", "\x1b[31mred.toml"], "\\u{1b}[31mred.toml"),
-        (&["check", "tiny.toml", "--engine", "\x1b[31mred"], "auto, gpu or cpu"),
+        (&["check", "tiny.toml", "--engine", "\x1b[31mred"], "auto, gpu, cpu or cpu64"),
     ];
     for (args, reason) in calls {
         let answer = place.call(args).ended(2).says("error: ").says(reason);
@@ -340,7 +340,7 @@ fn wrong_commands_and_options() {
         (&["chek", "tiny.toml"], "did you mean stylet check?"),
         (&["chek"], "did you mean stylet check?"),
         (&["chek", "--engine", "cpu"], "did you mean stylet check?"),
-        (&["run", "tiny.toml", "--engine", "tpu"], "auto, gpu or cpu"),
+        (&["run", "tiny.toml", "--engine", "tpu"], "auto, gpu, cpu or cpu64"),
         (&["run", "tiny.toml", "--out"], "--out"),
         (&["bench", "--max-cells", "many"], "many"),
         (&["bench", "--stages", "--engine", "cpu"], "--engine gpu"),

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DMat3, DVec3};
 use serde_json::Value;
-use stylet::cpu::CpuEngine;
+use stylet::cpu::{CpuEngine, unknown_to_lanes};
 use stylet::effects::TissueMaterial;
 use stylet::engine::{Engine, FramePlan, FrameSums, State, StepInput};
 use stylet::gpu::{Gpu, GpuEngine};
@@ -48,10 +48,14 @@ pub fn gpu() -> Option<Gpu> {
     .clone()
 }
 
-/// The engines that can run here, f64 first.
+/// The engines that can run here: f64, the adapter, lanes of f32 where these know the model.
 pub fn engines(model: &Arc<Model>, dt: f64, max_steps: usize) -> Vec<(&'static str, Box<dyn Engine>)> {
     let mut engines: Vec<(&'static str, Box<dyn Engine>)> = vec![("cpu", Box::new(CpuEngine::new(model.clone(), dt)))];
     engines.extend(gpu_engine(model, dt, max_steps).map(|e| ("gpu", Box::new(e) as Box<dyn Engine>)));
+    // Elsewhere it is the f64 engine once more.
+    if unknown_to_lanes(&model.scene, &model.mesh).is_none() {
+        engines.push(("lanes", Box::new(CpuEngine::in_lanes(model.clone(), dt))));
+    }
     engines
 }
 

@@ -37,7 +37,7 @@ use crate::simulation::{EngineChoice, Simulation};
 pub struct RunArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// auto, gpu or cpu; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
+    /// auto, gpu, cpu or cpu64; WGPU_BACKEND and WGPU_ADAPTER_NAME choose the adapter
     #[arg(long, default_value = "auto")]
     pub engine: EngineChoice,
     /// Folder of the results [default: the next out/<scene>/001, 002, ...]
@@ -70,8 +70,7 @@ impl RunArgs {
     fn of_resumed(&self, folder: &Path, checkpoint: &RunCheckpoint) -> Self {
         let mut args = self.clone();
         args.engine = match (self.engine, checkpoint.simulation.engine.engine()) {
-            (EngineChoice::Auto, "cpu") => EngineChoice::Cpu,
-            (EngineChoice::Auto, _) => EngineChoice::Gpu,
+            (EngineChoice::Auto, wrote) => wrote.parse().unwrap_or_default(),
             (chosen, _) => chosen,
         };
         args.out = Some(folder.to_path_buf());

@@ -116,7 +116,7 @@ pub fn run(
 /// The devices of the engines, opened once; `None`: the CPU engine.
 fn devices(engines: &[EngineChoice]) -> Result<Vec<Option<Gpu>>> {
     let open = |engine: &EngineChoice| match engine {
-        EngineChoice::Cpu => Ok(None),
+        EngineChoice::Cpu | EngineChoice::Cpu64 => Ok(None),
         EngineChoice::Gpu => Gpu::open().map(Some),
         EngineChoice::Auto => Ok(Gpu::open().ok()),
     };

@@ -1,0 +1,183 @@
+//! The step of the nodes of a block in lanes, line by line.
+//!
+//! Most nodes are free, carry no load, are tied to nothing and stay below the limits. Their step is
+//! `v+ = (a v + kick) c, u+ = u + dt v+` with `kick = f dt/m`: one loop over the components of a line. All others of the line take the step
+//! of the f64 engine afterwards.
+
+use glam::DVec3;
+use pulp::{Simd, WithSimd};
+
+use super::{LaneBlock, NODE, NodeLine};
+use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
+use crate::effects::mass_scaling::{MOST_RAISED, RAISED_STEP_RATIO};
+use crate::engine::WATCHED_STEP_RATIO;
+use crate::model::HELD;
+
+impl LaneBlock {
+    /// Moves all nodes; sums of the parts of the team, in their order.
+    pub(in crate::cpu) fn integrate(
+        &mut self,
+        step: &NodeStep,
+        displacement: &mut [DVec3],
+        velocity: &mut [DVec3],
+    ) -> Vec<NodeSums> {
+        let (grid, all) = (&self.grid, &self.nodes);
+        let (arch, stride, width) = (grid.arch, grid.stride, grid.cells[0] + 1);
+        // Copies that are tied stand in other lines.
+        let any = |node: usize| grid.node_at(all, node);
+        let is_plain =
+            step.gravity == DVec3::ZERO && step.model.node_load.is_empty() && step.model.separation.ties.is_empty();
+        let part = self.team.part(displacement.len() / width);
+        let nodes = displacement.chunks_mut(part * width).zip(velocity.chunks_mut(part * width));
+        let lines = self.places.chunks_mut(part * super::PLACE * stride).zip(all.chunks(part * NODE * stride));
+        let items: Vec<_> = nodes.zip(lines).collect();
+        self.team.map(items, |number, ((u, v), (places, nodes))| {
+            let mut scratch = Scratch::new(width);
+            let mut sums = NodeSums::default();
+            let lines = places.chunks_exact_mut(super::PLACE * stride).zip(nodes.chunks_exact(NODE * stride));
+            for (i, ((places, nodes), (u, v))) in lines.zip(u.chunks_mut(width).zip(v.chunks_mut(width))).enumerate() {
+                let first = (number * part + i) * width;
+                let mut line = NodeLine { stride, places, nodes };
+                if is_plain {
+                    arch.dispatch(PlainLine { step, first, line: &line, u, v, scratch: &mut scratch, sums: &mut sums });
+                } else {
+                    scratch.others.clear();
+                    scratch.others.extend((0..width).map(|i| (i, u[i], v[i])));
+                }
+                for (i, old_u, old_v) in scratch.others.drain(..) {
+                    (u[i], v[i]) = (old_u, old_v);
+                    sums.add(&step.advance(first + i, any, (&mut u[i], &mut v[i])));
+                }
+                line.set_places(u);
+            }
+            sums
+        })
+    }
+}
+
+/// Arrays of a line: per component kick, new velocity, mass and raised part of it; nodes that are not plain, as they were.
+struct Scratch {
+    kick: Vec<f64>,
+    new: Vec<f64>,
+    mass: Vec<f64>,
+    raised: Vec<f64>,
+    others: Vec<(usize, DVec3, DVec3)>,
+}
+
+impl Scratch {
+    fn new(width: usize) -> Self {
+        let zeros = vec![0.0; 3 * width];
+        Scratch { kick: zeros.clone(), new: zeros.clone(), mass: zeros.clone(), raised: zeros, others: Vec::new() }
+    }
+}
+
+#[inline(always)]
+fn load<S: Simd>(values: &[f64], at: usize) -> S::f64s {
+    bytemuck::pod_read_unaligned(bytemuck::cast_slice(&values[at..at + S::F64_LANES]))
+}
+
+struct PlainLine<'a, 'b> {
+    step: &'a NodeStep<'b>,
+    first: usize,
+    line: &'a NodeLine<'a>,
+    u: &'a mut [DVec3],
+    v: &'a mut [DVec3],
+    scratch: &'a mut Scratch,
+    sums: &'a mut NodeSums,
+}
+
+impl WithSimd for PlainLine<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let PlainLine { step, first, line, u, v, scratch, sums } = self;
+        let NodeStep { model, dt, .. } = *step;
+        let Scratch { kick, new, mass, raised, others } = scratch;
+        others.clear();
+        let count = u.len();
+        let masses = &model.node_mass[first..first + count];
+        let (external, added_bound) = (&step.external[first..first + count], &step.added_bound[first..first + count]);
+        // Factor of a bound that raises the mass, and largest ratio of bound and mass that is not watched.
+        let (raise, watched) = (dt * dt / (4.0 * RAISED_STEP_RATIO), 4.0 * WATCHED_STEP_RATIO / (dt * dt));
+        let raise = if model.effects.mass_scaling.is_some() { raise } else { 0.0 };
+        let mut more = 0;
+        let is_driven = model.has_driven_faces();
+        let flags = &model.node_flags[first..first + count];
+        let [fx, fy, fz, bounds] = line.numbers(count);
+        let numbers =
+            kick.as_chunks_mut::<3>().0.iter_mut().zip(mass.as_chunks_mut::<3>().0).zip(raised.as_chunks_mut::<3>().0);
+        for (i, ((kick, mass), raised)) in numbers.enumerate() {
+            let bound = f64::from(bounds[i]) + added_bound[i];
+            let own = masses[i];
+            let all = (bound * raise).max(own).min(MOST_RAISED * own);
+            let stands = flags[i] & HELD == HELD && !is_driven && v[i] == DVec3::ZERO;
+            if (flags[i] & HELD != 0 && !stands) || bound > watched * all {
+                others.push((i, u[i], v[i]));
+                (*kick, *mass, *raised) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+                continue;
+            }
+            more += u32::from(all > own);
+            if stands {
+                (*kick, *mass, *raised) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+                continue;
+            }
+            let by = dt / all;
+            let force = external[i];
+            *kick = [
+                (f64::from(fx[i]) + force.x) * by,
+                (f64::from(fy[i]) + force.y) * by,
+                (f64::from(fz[i]) + force.z) * by,
+            ];
+            (*mass, *raised) = ([all; 3], [all - own; 3]);
+        }
+        let alpha = model.scene.solver.mass_damping;
+        let (a, c) = (1.0 - 0.5 * alpha * dt, 1.0 / (1.0 + 0.5 * alpha * dt));
+        let old: &mut [f64] = bytemuck::cast_slice_mut(v);
+        let places: &mut [f64] = bytemuck::cast_slice_mut(u);
+        let lanes = S::F64_LANES;
+        let all = old.len() / lanes * lanes;
+        let zero = simd.splat_f64s(0.0);
+        let (mut damped, mut gained, mut fastest) = (zero, zero, zero);
+        let (a_s, c_s, half) = (simd.splat_f64s(a), simd.splat_f64s(c), simd.splat_f64s(0.5));
+        let mut at = 0;
+        while at < all {
+            let before: S::f64s = load::<S>(old, at);
+            let after = simd.mul_f64s(simd.mul_add_f64s(before, a_s, load::<S>(kick, at)), c_s);
+            let mid = simd.mul_f64s(half, simd.add_f64s(before, after));
+            damped = simd.mul_add_f64s(load::<S>(mass, at), simd.mul_f64s(mid, mid), damped);
+            // after^2 - before^2 = 2 mid (after - before)
+            let grown = simd.mul_f64s(mid, simd.sub_f64s(after, before));
+            gained = simd.mul_add_f64s(load::<S>(raised, at), grown, gained);
+            fastest = simd.max_f64s(fastest, simd.abs_f64s(after));
+            new[at..at + lanes].copy_from_slice(bytemuck::cast_slice(std::slice::from_ref(&after)));
+            at += lanes;
+        }
+        let (mut damped, mut gained) = (simd.reduce_sum_f64s(damped), simd.reduce_sum_f64s(gained));
+        let mut fastest = simd.reduce_max_f64s(fastest);
+        while at < old.len() {
+            let (before, after) = (old[at], (old[at] * a + kick[at]) * c);
+            let mid = 0.5 * (before + after);
+            damped += mass[at] * (mid * mid);
+            gained += raised[at] * mid * (after - before);
+            fastest = fastest.max(after.abs());
+            new[at] = after;
+            at += 1;
+        }
+        // The limit is one of the whole velocity: what may be beyond it, or is not a number, takes the other way.
+        let largest = step.limit / 3f64.sqrt();
+        if !(fastest < largest && damped.is_finite()) {
+            others.clear();
+            others
+                .extend((0..count).map(|i| (i, DVec3::from_slice(&places[3 * i..]), DVec3::from_slice(&old[3 * i..]))));
+            return;
+        }
+        sums.raised += more;
+        sums.damping += alpha * dt * damped;
+        sums.raised_energy += gained;
+        for ((place, old), new) in places.iter_mut().zip(old).zip(new.iter()) {
+            *old = *new;
+            *place += *new * dt;
+        }
+    }
+}

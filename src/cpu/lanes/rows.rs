@@ -1,0 +1,331 @@
+//! One row of cells after the other: gradients, stress, hourglass forces and bounds, in vectors along x.
+
+// Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
+#![allow(clippy::needless_range_loop)]
+
+use glam::DVec3;
+use pulp::{Simd, WithSimd};
+
+use super::number::Lanes;
+use super::{Grid, LINES, LaneMaterial, NODE, PLACE, WIDEST};
+use crate::engine::elements::{CellInput, Elements};
+use crate::material::number::Number;
+use crate::material::regular::{Regular, dot};
+use crate::mesh::CORNERS;
+use crate::model::Model;
+
+/// Number in node lines of the corners of a cell: bit 0 along x, bit 1 along y, bit 2 along z.
+const PLACES: usize = 8;
+/// Products of two and of three signs, by their bits.
+const HOURGLASS: [usize; 4] = [6, 5, 3, 7];
+
+/// What all rows read.
+pub(super) struct CellRows<'a> {
+    pub grid: &'a Grid,
+    pub places: &'a [f32],
+    pub model: &'a Model,
+    pub elements: &'a Elements,
+    pub displacement: &'a [DVec3],
+    /// Per cell; empty: all of it.
+    pub stiffness: &'a [f64],
+}
+
+/// Forces on the corners of a row of cells by corner and axis, then the bound; each with [`WIDEST`] zeros before it.
+struct RowForces {
+    width: usize,
+    values: Vec<f32>,
+}
+
+impl RowForces {
+    fn new(stride: usize) -> Self {
+        let width = WIDEST + stride;
+        RowForces { width, values: vec![0.0; (3 * PLACES + 1) * width] }
+    }
+
+    fn place(&self, corner: usize, axis: usize, cell: usize) -> usize {
+        (3 * corner + axis) * self.width + WIDEST + cell
+    }
+
+    fn bound(&self, cell: usize) -> usize {
+        self.place(PLACES, 0, cell)
+    }
+}
+
+impl CellRows<'_> {
+    /// Rows of cells from `first` on, into their lines.
+    pub fn compute(&self, first: usize, lines: &mut [f32]) {
+        self.grid.arch.dispatch(SomeRows { rows: self, first, lines });
+    }
+}
+
+struct SomeRows<'a> {
+    rows: &'a CellRows<'a>,
+    first: usize,
+    lines: &'a mut [f32],
+}
+
+impl WithSimd for SomeRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let SomeRows { rows, first, lines } = self;
+        let (stride, ny) = (rows.grid.stride, rows.grid.cells[1]);
+        let mut forces = RowForces::new(stride);
+        let mut intact = vec![1.0f32; stride];
+        for (i, lines) in lines.chunks_exact_mut(LINES * stride).enumerate() {
+            let row = first + i;
+            cell_row(simd, rows, [row % ny, row / ny], &mut forces, &mut intact);
+            add_up(simd, &forces, stride, lines);
+        }
+    }
+}
+
+/// Forces and bounds of one row.
+#[inline(always)]
+fn cell_row<S: Simd>(simd: S, rows: &CellRows, [j, k]: [usize; 2], forces: &mut RowForces, intact: &mut [f32]) {
+    let CellRows { grid, places, model, .. } = *rows;
+    let (stride, [nx, ny, _]) = (grid.stride, grid.cells);
+    let first_cell = (k * ny + j) * nx;
+    if !rows.stiffness.is_empty() {
+        for (to, from) in intact.iter_mut().zip(&rows.stiffness[first_cell..first_cell + nx]) {
+            *to = *from as f32;
+        }
+    }
+    let line = |j: usize, k: usize| &places[(k * (ny + 1) + j) * PLACE * stride..][..PLACE * stride];
+    let node_lines = [line(j, k), line(j + 1, k), line(j, k + 1), line(j + 1, k + 1)];
+    let on_edge = grid.on_edge.get((k * ny + j) * stride..(k * ny + j + 1) * stride);
+    for i in (0..nx).step_by(Lanes::<S>::COUNT) {
+        let last = (i + Lanes::<S>::COUNT).min(nx);
+        let kind = |i: usize| model.material_index(first_cell + i);
+        let first = kind(i);
+        let is_uniform = model.cell_material.is_empty() || (i..last).all(|i| kind(i) == first);
+        let vector = Vector { i, edges: [j, k], node_lines, on_edge, intact };
+        if !is_uniform || !lane_forces(simd, grid, &grid.materials[first], &vector, forces) {
+            cells_one_by_one(rows, first_cell, i..last, forces);
+        }
+    }
+}
+
+/// One vector of cells of a row.
+struct Vector<'a> {
+    /// The first of its cells.
+    i: usize,
+    edges: [usize; 2],
+    node_lines: [&'a [f32]; 4],
+    on_edge: Option<&'a [f32]>,
+    intact: &'a [f32],
+}
+
+/// Sums and differences of the values at the corners: what a field has of every product of signs (`xi`, `eta`, `xi eta` ... by their
+/// bits), and back.
+#[inline(always)]
+fn hadamard<N: Number>(mut v: [N; PLACES]) -> [N; PLACES] {
+    let mut bit = 1;
+    while bit < PLACES {
+        let mut low = 0;
+        while low < PLACES {
+            if low & bit == 0 {
+                let (a, b) = (v[low], v[low | bit]);
+                (v[low], v[low | bit]) = (a + b, b - a);
+            }
+            low += 1;
+        }
+        bit *= 2;
+    }
+    v
+}
+
+/// The transpose of [`hadamard`].
+#[inline(always)]
+fn spread<N: Number>(mut v: [N; PLACES]) -> [N; PLACES] {
+    let mut bit = 1;
+    while bit < PLACES {
+        let mut low = 0;
+        while low < PLACES {
+            if low & bit == 0 {
+                let (sum, difference) = (v[low], v[low | bit]);
+                (v[low], v[low | bit]) = (sum - difference, sum + difference);
+            }
+            low += 1;
+        }
+        bit *= 2;
+    }
+    v
+}
+
+/// Forces and bounds of a vector; false where a cell has left the range of these forms.
+#[inline(always)]
+fn lane_forces<S: Simd>(simd: S, grid: &Grid, material: &LaneMaterial, at: &Vector, forces: &mut RowForces) -> bool {
+    let stride = grid.stride;
+    // No closures and no adapters of iterators from here on: what is not inlined falls back to calls per operation.
+    let [ey, ez] = [grid.y[at.edges[0]], grid.z[at.edges[1]]];
+    let zero = Lanes::splat(simd, 0.0);
+    let one = Lanes::splat(simd, 1.0);
+    let quarter =
+        [Lanes::load(simd, &grid.x.quarter, at.i), Lanes::splat(simd, ey.quarter), Lanes::splat(simd, ez.quarter)];
+    // Modes of every axis, from differences to the first corner.
+    let mut modes = [[zero; PLACES]; 3];
+    for axis in 0..3 {
+        let (high, low) = (2 * axis * stride + at.i, (2 * axis + 1) * stride + at.i);
+        let first = [Lanes::load(simd, at.node_lines[0], high), Lanes::load(simd, at.node_lines[0], low)];
+        let mut v = [zero; PLACES];
+        for corner in 1..PLACES {
+            let (line, beside) = (at.node_lines[corner / 2], corner % 2);
+            v[corner] = (Lanes::load(simd, line, high + beside) - first[0])
+                + (Lanes::load(simd, line, low + beside) - first[1]);
+        }
+        modes[axis] = hadamard(v);
+    }
+    let mut h = [[zero; 3]; 3];
+    for b in 0..3 {
+        for axis in 0..3 {
+            h[b][axis] = modes[axis][1 << b] * quarter[b];
+        }
+    }
+    let Some(state) = Regular::new(h) else { return false };
+    let intact = Lanes::load(simd, at.intact, at.i);
+    let bulk = Lanes::splat(simd, material.bulk_modulus as f32);
+    let p = state.stress(&material.law, bulk * state.dj);
+    let volume = Lanes::load(simd, &grid.x.length, at.i) * Lanes::splat(simd, ey.length * ez.length);
+    let edge = Lanes::load(simd, &grid.x.cube_root, at.i) * Lanes::splat(simd, ey.cube_root * ez.cube_root);
+    let inverse_square =
+        Lanes::load(simd, &grid.x.inverse_square, at.i) * Lanes::splat(simd, ey.inverse_square * ez.inverse_square);
+    // Hourglass modes: products of two and of three signs; an eighth of the sums.
+    let mut q2 = zero;
+    for mode in &modes {
+        for bits in HOURGLASS {
+            q2 = mode[bits].mul_add(mode[bits], q2);
+        }
+    }
+    let q2 = q2 * Lanes::splat(simd, 1.0 / 64.0);
+    let folding = Lanes::splat(simd, grid.quartic as f32) * q2 * inverse_square;
+    let hourglass = Lanes::splat(simd, material.hourglass as f32) * edge;
+    let kh = intact * hourglass * (one + folding) * Lanes::splat(simd, 1.0 / 64.0);
+    let by_stress = intact * volume;
+    for axis in 0..3 {
+        let mut v = [zero; PLACES];
+        for b in 0..3 {
+            v[1 << b] = p[b][axis] * (by_stress * quarter[b]);
+        }
+        for bits in HOURGLASS {
+            v[bits] = modes[axis][bits] * kh;
+        }
+        let v = spread(v);
+        for corner in 0..PLACES {
+            let place = forces.place(corner, axis, at.i);
+            v[corner].store(&mut forces.values, place);
+        }
+    }
+    let [straight, turned] = state.tangent_bound(&material.law, bulk);
+    let mut cof = state.cofactor();
+    for b in 0..3 {
+        for axis in 0..3 {
+            cof[b][axis] = cof[b][axis] * quarter[b];
+        }
+    }
+    let (xx, yy, zz) = (dot(cof[0], cof[0]), dot(cof[1], cof[1]), dot(cof[2], cof[2]));
+    let (xy, yz, zx) = (dot(cof[0], cof[1]).size(), dot(cof[1], cof[2]).size(), dot(cof[2], cof[0]).size());
+    let mut turning = (xx + xy + zx).larger(yy + xy + yz).larger(zz + yz + zx);
+    let [bx, by, bz] = [quarter[0] * quarter[0], quarter[1] * quarter[1], quarter[2] * quarter[2]];
+    let mut shearing = bx.larger(by).larger(bz);
+    if let Some(on_edge) = at.on_edge {
+        let on_edge = Lanes::load(simd, on_edge, at.i);
+        let all = xx + yy + zz + Lanes::splat(simd, 2.0) * (xy + yz + zx);
+        turning = on_edge.mul_add(all - turning, turning);
+        shearing = on_edge.mul_add(bx + by + bz - shearing, shearing);
+    }
+    let of_modes = hourglass * (one + Lanes::splat(simd, 3.0) * folding) * Lanes::splat(simd, 0.125);
+    let stiff = (bulk + turned) * turning + straight * shearing;
+    let bound = intact * (Lanes::splat(simd, 8.0) * volume).mul_add(stiff, of_modes);
+    let place = forces.bound(at.i);
+    bound.store(&mut forces.values, place);
+    true
+}
+
+/// The same in f64.
+#[cold]
+fn cells_one_by_one(rows: &CellRows, first_cell: usize, cells: std::ops::Range<usize>, forces: &mut RowForces) {
+    // Corner of `CORNERS` by its bits.
+    let numbers = CORNERS.map(|c| (0..3).map(|a| usize::from(c[a] > 0.0) << a).sum::<usize>());
+    for i in cells {
+        let cell = first_cell + i;
+        let remaining = rows.stiffness.get(cell).copied().unwrap_or(1.0);
+        let input = CellInput { averaged: None, remaining, point: None, advance: None };
+        let (of_cell, _) = rows.elements.corner_forces(rows.model, cell, rows.displacement, input);
+        for (corner, force) in numbers.into_iter().zip(of_cell.force) {
+            for axis in 0..3 {
+                let place = forces.place(corner, axis, i);
+                forces.values[place] = force[axis] as f32;
+            }
+        }
+        let place = forces.bound(i);
+        forces.values[place] = of_cell.bound[0] as f32;
+    }
+}
+
+/// Adds up along x: the near corner of a cell and the far one of the cell before it meet in a node.
+#[inline(always)]
+fn add_up<S: Simd>(simd: S, forces: &RowForces, stride: usize, lines: &mut [f32]) {
+    for line in 0..4 {
+        for axis in 0..3 {
+            let (near, far) = (forces.place(2 * line, axis, 0), forces.place(2 * line + 1, axis, 0));
+            for i in (0..stride).step_by(Lanes::<S>::COUNT) {
+                let sum = Lanes::load(simd, &forces.values, near + i) + Lanes::load(simd, &forces.values, far + i - 1);
+                sum.store(lines, (3 * line + axis) * stride + i);
+            }
+        }
+    }
+    let bound = forces.bound(0);
+    for i in (0..stride).step_by(Lanes::<S>::COUNT) {
+        let sum = Lanes::load(simd, &forces.values, bound + i) + Lanes::load(simd, &forces.values, bound + i - 1);
+        sum.store(lines, 12 * stride + i);
+    }
+}
+
+/// Adds up what the rows of cells around every line of nodes from `first` on do to it: -f_int, and the bound.
+pub(super) fn gather_rows(grid: &Grid, lines: &[f32], first: usize, nodes: &mut [f32]) {
+    grid.arch.dispatch(Gathered { grid, lines, first, nodes });
+}
+
+struct Gathered<'a> {
+    grid: &'a Grid,
+    lines: &'a [f32],
+    first: usize,
+    nodes: &'a mut [f32],
+}
+
+impl WithSimd for Gathered<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Gathered { grid, lines, first, nodes } = self;
+        let (stride, [_, ny, nz]) = (grid.stride, grid.cells);
+        for (i, node) in nodes.chunks_exact_mut(NODE * stride).enumerate() {
+            let (j, k) = ((first + i) % (ny + 1), (first + i) / (ny + 1));
+            // Rows of cells beside this line, and which of their four lines it is.
+            let mut around: [Option<(&[f32], usize)>; 4] = [None; 4];
+            for (number, around) in around.iter_mut().enumerate() {
+                let (far_y, far_z) = (number & 1, number >> 1);
+                if let (Some(j), Some(k)) = (j.checked_sub(far_y), k.checked_sub(far_z))
+                    && j < ny
+                    && k < nz
+                {
+                    *around = Some((&lines[(k * ny + j) * LINES * stride..][..LINES * stride], number));
+                }
+            }
+            for number in 0..NODE {
+                for i in (0..stride).step_by(Lanes::<S>::COUNT) {
+                    let mut sum = Lanes::splat(simd, 0.0);
+                    for (row, line) in around.iter().flatten() {
+                        let which = if number == 3 { 12 } else { 3 * line + number };
+                        let value = Lanes::load(simd, row, which * stride + i);
+                        sum = if number == 3 { sum + value } else { sum - value };
+                    }
+                    sum.store(node, number * stride + i);
+                }
+            }
+        }
+    }
+}

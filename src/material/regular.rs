@@ -1,0 +1,299 @@
+//! Laws of the invariants where a cell keeps most of its volume, for any [`Number`]: stress without cancellation and the bound of the
+//! tangent. The same equations as `invariants`, written in H = F - I, so that f32 keeps its digits at small strain:
+//! ```text
+//! K = cof F - I = tr H I - H^T + cof H,  E = C - I = H + H^T + H^T H
+//! e1 = I1 - 3 = tr E,  e2 = I2 - 3 = 2 e1 + tr cof E,  dj = J - 1 = tr H + tr cof H + det H
+//! P_iso = 2 w1 J^(-2/3) (H - s1 K + (1 - s1) I),                          s1 = I1/(3 J)
+//!       + 2 w2 J^(-4/3) (2 H + e1 F - F E - s2 K + (2 - s2) I),           s2 = 2 I2/(3 J)
+//! ```
+
+// Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
+#![allow(clippy::needless_range_loop)]
+
+use super::number::Number;
+
+/// J between which the forms of this file hold to the last digits of f32.
+pub const LEAST_J: f64 = 0.4;
+/// See [`LEAST_J`].
+pub const LARGEST_J: f64 = 2.2;
+
+/// A second-order tensor by its columns.
+pub type Tensor<N> = [[N; 3]; 3];
+
+/// `W_iso = c1 e + c2 e^2 + c3 e^3 + c01 (I2bar - 3)` with `e = I1bar - 3` [Pa]: neo-Hooke, Mooney-Rivlin and Yeoh.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Polynomial {
+    pub c1: f64,
+    pub c2: f64,
+    pub c3: f64,
+    pub c01: f64,
+}
+
+/// A state and what its stress and its bound share.
+#[derive(Debug, Clone, Copy)]
+pub struct Regular<N> {
+    h: Tensor<N>,
+    /// E: diagonal, then yz, zx, xy.
+    strain: [N; 6],
+    /// cof F - I.
+    cofactor_less_one: Tensor<N>,
+    /// J - 1, J, J^(-1/3).
+    pub dj: N,
+    j: N,
+    root: N,
+    e1: N,
+    e2: N,
+}
+
+/// Of two vectors.
+#[inline(always)]
+pub fn dot<N: Number>(a: [N; 3], b: [N; 3]) -> N {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
+}
+
+#[inline(always)]
+fn cross<N: Number>(a: [N; 3], b: [N; 3]) -> [N; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline(always)]
+fn largest_of<N: Number>(a: N, b: N, c: N) -> N {
+    a.larger(b).larger(c)
+}
+
+/// Largest sum of absolute values of a row.
+#[inline(always)]
+fn largest_row<N: Number>(m: Tensor<N>) -> N {
+    largest_of(
+        m[0][0].size() + m[0][1].size() + m[0][2].size(),
+        m[1][0].size() + m[1][1].size() + m[1][2].size(),
+        m[2][0].size() + m[2][1].size() + m[2][2].size(),
+    )
+}
+
+impl<N: Number> Regular<N> {
+    /// The state of H; `None` where a lane has left the range of this file.
+    #[inline(always)]
+    pub fn new(h: Tensor<N>) -> Option<Self> {
+        let cof_h = [cross(h[1], h[2]), cross(h[2], h[0]), cross(h[0], h[1])];
+        let trace = h[0][0] + h[1][1] + h[2][2];
+        let dj = trace + (cof_h[0][0] + cof_h[1][1] + cof_h[2][2]) + dot(h[0], cof_h[0]);
+        if !dj.is_within(LEAST_J - 1.0, LARGEST_J - 1.0) {
+            return None;
+        }
+        let one = dj.of(1.0);
+        let j = dj + one;
+        let two = dj.of(2.0);
+        let strain = [
+            two.mul_add(h[0][0], dot(h[0], h[0])),
+            two.mul_add(h[1][1], dot(h[1], h[1])),
+            two.mul_add(h[2][2], dot(h[2], h[2])),
+            h[1][2] + h[2][1] + dot(h[1], h[2]),
+            h[2][0] + h[0][2] + dot(h[2], h[0]),
+            h[0][1] + h[1][0] + dot(h[0], h[1]),
+        ];
+        let [xx, yy, zz, yz, zx, xy] = strain;
+        let e1 = xx + yy + zz;
+        let e2 = two.mul_add(e1, (yy * zz - yz * yz) + (zz * xx - zx * zx) + (xx * yy - xy * xy));
+        let mut k = cof_h;
+        for a in 0..3 {
+            for b in 0..3 {
+                k[a][b] = k[a][b] - h[b][a];
+            }
+            k[a][a] = k[a][a] + trace;
+        }
+        Some(Regular { h, strain, cofactor_less_one: k, dj, j, root: j.inverse_cube_root(), e1, e2 })
+    }
+
+    /// Slopes w1, w2 and w11 of the law.
+    #[inline(always)]
+    fn slopes(&self, law: &Polynomial) -> [N; 3] {
+        let n = self.dj;
+        if law.c2 == 0.0 && law.c3 == 0.0 {
+            return [n.of(law.c1), n.of(law.c01), n.of(0.0)];
+        }
+        // I1bar - 3 = J^(-2/3) (e1 + 3 - 3 J^(2/3)): the strain of a polynomial law is not small where it matters.
+        let e = self.root * self.root * (self.e1 + n.of(3.0)) - n.of(3.0);
+        let w1 = e.mul_add(e.mul_add(n.of(3.0 * law.c3), n.of(2.0 * law.c2)), n.of(law.c1));
+        [w1, n.of(law.c01), e.mul_add(n.of(6.0 * law.c3), n.of(2.0 * law.c2))]
+    }
+
+    /// cof F.
+    #[inline(always)]
+    pub fn cofactor(&self) -> Tensor<N> {
+        let mut cof = self.cofactor_less_one;
+        let one = self.dj.of(1.0);
+        for a in 0..3 {
+            cof[a][a] = cof[a][a] + one;
+        }
+        cof
+    }
+
+    /// P_iso + p cof F [Pa].
+    #[inline(always)]
+    pub fn stress(&self, law: &Polynomial, pressure: N) -> Tensor<N> {
+        let Regular { h, cofactor_less_one: k, dj, root, e1, e2, .. } = *self;
+        let n = dj;
+        let [w1, w2, _] = self.slopes(law);
+        let r2 = root * root;
+        // 1/(3 J)
+        let third = r2 * root * n.of(1.0 / 3.0);
+        let first = n.of(2.0) * w1 * r2;
+        let s1 = (e1 + n.of(3.0)) * third;
+        let one_less = (n.of(3.0) * dj - e1) * third;
+        let mut by_h = first;
+        let mut by_k = pressure - first * s1;
+        let mut by_one = first.mul_add(one_less, pressure);
+        let mut p = [[n.of(0.0); 3]; 3];
+        if law.c01 != 0.0 {
+            let second = n.of(2.0) * w2 * r2 * r2;
+            let s2 = (e2 + n.of(3.0)) * third * n.of(2.0);
+            let two_less = n.of(2.0) * (n.of(3.0) * dj - e2) * third;
+            by_h = second.mul_add(n.of(2.0) + e1, by_h);
+            by_k = by_k - second * s2;
+            by_one = second.mul_add(two_less + e1, by_one);
+            // F E = E + H E.
+            let [xx, yy, zz, yz, zx, xy] = self.strain;
+            let e = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
+            for a in 0..3 {
+                for b in 0..3 {
+                    let he = h[0][b].mul_add(e[a][0], h[1][b].mul_add(e[a][1], h[2][b].mul_add(e[a][2], e[a][b])));
+                    p[a][b] = n.of(0.0) - second * he;
+                }
+            }
+        }
+        for a in 0..3 {
+            for b in 0..3 {
+                p[a][b] = h[a][b].mul_add(by_h, k[a][b].mul_add(by_k, p[a][b]));
+            }
+            p[a][a] = p[a][a] + by_one;
+        }
+        p
+    }
+
+    /// Bound of the isochoric tangent, straight and turned, of `InvariantLaw::tangent_bound` [Pa].
+    #[inline(always)]
+    pub fn tangent_bound(&self, law: &Polynomial, bulk_modulus: N) -> [N; 2] {
+        let Regular { j, root, dj, .. } = *self;
+        let n = dj;
+        let [xx, yy, zz, yz, zx, xy] = self.strain;
+        let [w1, w2, w11] = self.slopes(law);
+        let (i1, i2) = (self.e1 + n.of(3.0), self.e2 + n.of(3.0));
+        let r2 = root * root;
+        let (a, b, over_j) = (r2, r2 * r2, r2 * root);
+        let stiffening = if law.c2 == 0.0 && law.c3 == 0.0 {
+            n.of(0.0)
+        } else {
+            let by_j = n.of(-2.0 / 3.0) * a * i1 * over_j;
+            let squared = n.of(4.0) * a * (a * i1 + n.of(3.0) * by_j * j) + by_j * by_j * i2;
+            w11.larger(n.of(0.0)) * squared.larger(n.of(0.0))
+        };
+        let strain =
+            largest_of(xx.size(), yy.size(), zz.size()) + n.of(2.0) * largest_of(yz.size(), zx.size(), xy.size());
+        let w = w1.size() + w2.size();
+        let small_turned = n.of(8.0 / 3.0) * (w1 + w2 + n.of(6.0) * strain * w);
+        let small_straight = n.of(3.2) * strain * w;
+        if strain.is_within(0.0, super::invariants::SMALL_STRAIN) {
+            return [small_straight + stiffening, small_turned];
+        }
+        let one = n.of(1.0);
+        let c = [[xx + one, xy, zx], [xy, yy + one, yz], [zx, yz, zz + one]];
+        let cof = self.cofactor();
+        let (gyz, gzx, gxy) = (dot(cof[1], cof[2]), dot(cof[2], cof[0]), dot(cof[0], cof[1]));
+        let gram = [[dot(cof[0], cof[0]), gxy, gzx], [gxy, dot(cof[1], cof[1]), gyz], [gzx, gyz, dot(cof[2], cof[2])]];
+        let most = largest_row(c).smaller(i1);
+        let area = largest_row(gram).smaller(i2).larger(n.of(1e-12));
+        let least = (j * j).over(area).smaller(most);
+        let middle = (i1 - most - least).larger(least).smaller(most);
+        let (fall_a, fall_b) = (n.of(2.0 / 3.0) * a * over_j, n.of(4.0 / 3.0) * b * over_j);
+        let c1 = n.of(2.0) * a - n.of(4.0) * fall_a * j;
+        let c2 = n.of(2.0) * b - n.of(4.0) * fall_b * j;
+        let (by_jj1, by_jj2) = (n.of(5.0 / 3.0) * fall_a * over_j * i1, n.of(7.0 / 3.0) * fall_b * over_j * i2);
+        let over_area = one.over(area);
+        let none = n.of(0.0);
+        let turned =
+            w1 * (by_jj1 + c1.smaller(none) * over_area) + w2 * (by_jj2 + c2.smaller(none) * (i1 - most) * over_area);
+        let turned = turned.larger(none);
+        let [l1, l2, l3] = [most.root(), middle.root(), least.root()];
+        let across = largest_of(
+            (most - least) * (l2 * l2 * l2),
+            (middle - least) * (l1 * l1 * l1),
+            (most - middle) * (l3 * l3 * l3),
+        );
+        let sideways = n.of(2.0) * w1 * a + n.of(2.0) * w2 * b * most;
+        let straight = w1.size() * fall_a * (most - least) * l2
+            + n.of(1.16) * w2.size() * fall_b * across
+            + w1 * c1.larger(none)
+            + w2 * c2.larger(none) * (i1 - least)
+            + (sideways - (bulk_modulus + turned) * (j * j).over(most.larger(n.of(1e-12)))).larger(none);
+        let limit = n.of(super::invariants::SMALL_STRAIN);
+        [
+            strain.choose(limit, small_straight, straight.larger(none)) + stiffening,
+            strain.choose(limit, small_turned, turned),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::material::kinematics::{cofactor, jacobian_minus_one};
+    use crate::material::law::IsochoricLaw;
+    use crate::material::{LAWS, LawWord};
+
+    /// Displacement gradients from tiny to large, all of them in the range.
+    fn gradients() -> Vec<DMat3> {
+        let mut seed = 0x9e37_79b9_7f4a_7c15u64;
+        let mut random = move || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let mut vector = move || DVec3::new(random(), random(), random());
+        let sizes = [1e-7, 1e-4, 1e-2, 0.05, 0.2, 0.4];
+        let all = sizes
+            .into_iter()
+            .flat_map(|size| [size; 40])
+            .map(|size| DMat3::from_cols(vector(), vector(), vector()) * size);
+        let within = |h: &DMat3| (LEAST_J - 1.0..LARGEST_J - 1.0).contains(&jacobian_minus_one(*h));
+        all.filter(within).collect()
+    }
+
+    fn entries(m: DMat3) -> f64 {
+        m.to_cols_array().iter().fold(0.0, |most: f64, x| most.max(x.abs()))
+    }
+
+    #[test]
+    fn stress_and_bound_are_those_of_the_laws() {
+        const BULK: f64 = 5.0e5;
+        let mut known = 0;
+        for word in LawWord::ALL {
+            let law = (word.law().build)(LAWS[word as usize].example);
+            let Some(polynomial) = law.polynomial() else { continue };
+            known += 1;
+            for h in gradients() {
+                let state = Regular::new(h.to_cols_array_2d()).unwrap();
+                let p = BULK * jacobian_minus_one(h);
+                let exact = law.isochoric_stress(h) + cofactor(DMat3::IDENTITY + h) * p;
+                let found = DMat3::from_cols_array_2d(&state.stress(&polynomial, p));
+                // The laws themselves lose 1e-16 of the modulus to cancellation.
+                let allowed = 1e-12 * entries(exact) + 1e-15 * law.shear_modulus() * 10.0;
+                assert!(entries(found - exact) < allowed, "{word:?} at {h}: {found} {exact}");
+                let bound = law.tangent_bound(h, BULK);
+                let [straight, turned] = state.tangent_bound(&polynomial, BULK);
+                let close = |a: f64, b: f64| (a - b).abs() <= 1e-11 * (BULK + b.abs());
+                assert!(close(straight, bound.straight) && close(turned, bound.turned), "{word:?} at {h}");
+            }
+        }
+        assert_eq!(known, 3);
+    }
+
+    #[test]
+    fn what_has_left_the_range_is_refused() {
+        for stretch in [0.7, -1.0, 1.4, f64::NAN] {
+            let h = DMat3::from_diagonal(DVec3::splat(stretch - 1.0));
+            assert!(Regular::new(h.to_cols_array_2d()).is_none(), "{stretch}");
+        }
+    }
+}
