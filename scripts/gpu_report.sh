@@ -33,6 +33,7 @@ step compare 90 "$program" compare-adapters --set motion.phase.0.depth_mm=4.0
 step bench 150 "$program" bench --engine gpu --max-cells 2000000
 step bench_processor 60 "$program" bench --engine cpu --max-cells 25000
 step stages 60 "$program" bench --stages --engine gpu
+step roofline 60 "$program" bench --roofline --engine gpu
 step effects 120 "$program" bench --effects --engine gpu
 step stability 120 "$program" stability --short --engine gpu --out "$folder/stability"
 {
@@ -41,7 +42,7 @@ step stability 120 "$program" stability --short --engine gpu --out "$folder/stab
     echo "stylet $("$program" --version | cut -d' ' -f2), commit $(git rev-parse --short HEAD 2>/dev/null || echo unknown)"
     printf '\n| step | ended | took | command |\n|---|---|---|---|\n'
     cat "$folder/steps.md"
-    for name in adapters main_job opening compare bench bench_processor stages effects stability; do
+    for name in adapters main_job opening compare bench bench_processor stages roofline effects stability; do
         printf '\n## %s\n\n```text\n' "$name"
         cat "$folder/$name.txt"
         echo '```'

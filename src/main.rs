@@ -17,7 +17,7 @@ use stylet::commands::run::{self, RunArgs};
 use stylet::commands::stability::{StabilityArgs, stability};
 use stylet::commands::study::{self, StudyArgs};
 use stylet::commands::view::{self, ViewArgs};
-use stylet::commands::{adapters, bench_effects, bench_stages, schema, until_ended};
+use stylet::commands::{adapters, bench_effects, bench_roofline, bench_stages, schema, until_ended};
 use stylet::error::{Error, Result, brief};
 use stylet::simulation::EngineChoice;
 use stylet::{ending, eprintln, println, terminal};
@@ -81,6 +81,7 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
         Command::Check(args) => return check::execute(&args),
         Command::Bench(args) if args.effects => return bench_effects::execute(&args),
         Command::Bench(args) if args.stages => return bench_stages::execute(&args),
+        Command::Bench(args) if args.roofline => return bench_roofline::execute(&args),
         Command::Bench(args) => return bench::execute(&args),
         Command::Fit(args) => return fit_args::execute(args),
         Command::Report(args) => return report::execute(&args),

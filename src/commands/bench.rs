@@ -44,13 +44,16 @@ pub struct BenchArgs {
     /// Measure what every stage of a step costs instead
     #[arg(long, conflicts_with = "effects")]
     pub stages: bool,
+    /// Count what every stage moves and computes, beside what this adapter can
+    #[arg(long, conflicts_with_all = ["effects", "stages"])]
+    pub roofline: bool,
     /// Largest number of cells
     #[arg(long, default_value_t = 500_000)]
     pub max_cells: usize,
 }
 
 /// Cells along x, y, z of the measured blocks, edges of 0.8 mm.
-const SIZES: [[usize; 3]; 5] = [[17, 17, 17], [28, 28, 26], [46, 46, 47], [79, 79, 80], [100, 100, 100]];
+pub(super) const SIZES: [[usize; 3]; 5] = [[17, 17, 17], [28, 28, 26], [46, 46, 47], [79, 79, 80], [100, 100, 100]];
 
 /// Rounds per figure; the smallest counts.
 const ROUNDS: usize = 3;
@@ -354,7 +357,7 @@ fn main_job(engine: EngineChoice) -> Result<f64> {
 }
 
 /// Bytes per second of a device-to-device copy, read and written counted, from buffers of 128 MiB.
-fn copy_bandwidth(gpu: &Gpu) -> Result<f64> {
+pub(super) fn copy_bandwidth(gpu: &Gpu) -> Result<f64> {
     const SIZE: u64 = 128 << 20;
     let buffer = || {
         gpu.device.create_buffer(&wgpu::BufferDescriptor {

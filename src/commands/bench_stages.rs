@@ -69,9 +69,14 @@ pub(super) fn subject(scheme: Option<SchemeWord>) -> Model {
 }
 
 fn costs(name: &'static str, scheme: Option<SchemeWord>, gpu: &Gpu) -> Result<SubjectCosts> {
-    let model = Arc::new(subject(scheme));
+    let (_, stages) = timed(Arc::new(subject(scheme)), gpu)?;
+    Ok(SubjectCosts { subject: name, stages })
+}
+
+/// The engine of a model, and what its stages cost where its needle, if it has one, is [`DEPTH`] deep.
+pub(super) fn timed(model: Arc<Model>, gpu: &Gpu) -> Result<(GpuEngine, Vec<StageCost>)> {
     let mut subject = Subject::of_model(model.clone(), &Place { gpu: Some(gpu.clone()), lanes: false }, STEPS)?;
-    subject.advance_tool(if scheme.is_some() { DEPTH } else { 0.0 }, STEPS)?;
+    subject.advance_tool(if model.puncture.is_some() { DEPTH } else { 0.0 }, STEPS)?;
     subject.frame(STEPS, 1.0)?;
     let state = subject.engine.read_state()?;
     // The engine of the subject is known only as a trait: timing by stage needs the real one.
@@ -104,7 +109,7 @@ fn costs(name: &'static str, scheme: Option<SchemeWord>, gpu: &Gpu) -> Result<Su
             once_per_frame: s.once_per_frame(),
         })
         .collect();
-    Ok(SubjectCosts { subject: name, stages })
+    Ok((engine, stages))
 }
 
 /// The command: prints the table.

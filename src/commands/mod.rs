@@ -3,6 +3,7 @@
 pub mod advise;
 pub mod bench;
 pub mod bench_effects;
+pub mod bench_roofline;
 pub mod bench_stages;
 pub mod check;
 pub mod check_penetration;

@@ -40,6 +40,9 @@ pub struct ViewArgs {
     /// Size of the window in points
     #[arg(long, value_names = ["WIDTH", "HEIGHT"], num_args = 2)]
     pub size: Option<Vec<u32>>,
+    /// Put a band around the force from the start on, by a companion with twice the cell edge
+    #[arg(long)]
+    pub error_bar: bool,
     /// Show an ultrasound-like slice from the start on
     #[arg(long)]
     pub ultrasound: bool,

@@ -9,6 +9,7 @@ mod layout;
 mod memory;
 mod pace;
 pub mod plan;
+pub mod roofline;
 pub mod structs;
 pub mod texels;
 mod workers;

@@ -143,6 +143,9 @@ pub struct FrameRecord {
     pub phase: usize,
     /// Means over the frame.
     pub force: ForceParts,
+    /// Half-width of the band of the axial force, see [`error_bar`]; with a companion run only [N].
+    #[serde(default)]
+    pub force_error: Option<f64>,
     /// Material coordinate of the tip along its path, a [m].
     pub tip_coordinate: f64,
     /// What each face exerts on the tissue at the end of the frame, indexed by `Face` [N]; zero without driven faces.
@@ -202,6 +205,7 @@ pub struct FieldSnapshot {
 }
 
 mod core_sample;
+pub mod error_bar;
 #[allow(missing_docs)]
 pub mod field;
 #[allow(missing_docs)]

@@ -187,6 +187,8 @@ pub static FORCE: LazyLock<Vec<Quantity<FrameRecord>>> = LazyLock::new(|| {
     let mut table = Vec::from(place());
     table.push(count("phase", Last, "number of the phase of the motion, from 0", |r| r.phase as u32));
     table.push(number("axial_force_n", NEWTON, Largest, "sum of the parts", |r| r.force.axial));
+    let band = "half-width of the band around the axial force, with a companion run (`--error-bar`) only";
+    table.push(known("force_error_n", NEWTON, Largest, band, |r| r.force_error));
     let part: fn(&FrameRecord, usize) -> f64 = |r, n| (ForceParts::PARTS[n].of)(&r.force);
     let parts = ForceParts::PARTS.iter().enumerate();
     table.extend(parts.map(|(n, p)| at(p.column, NEWTON, Largest, p.meaning, part, n)));

@@ -66,6 +66,7 @@ impl Recorder {
             depth: mean_pose.map_or(0.0, |p| p.depth),
             phase: mean_pose.map_or(0, |p| p.phase),
             force: parts,
+            force_error: None,
             tip_coordinate: sums.tip_coordinate,
             reactions: sums.reactions,
             face_moments: sums.face_moments,

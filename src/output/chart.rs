@@ -22,6 +22,8 @@ pub(crate) const HEAD: u32 = 84;
 // Colours that people with colour-blindness tell apart (Okabe and Ito 2008), each with its own dash or width.
 pub(crate) const INWARD: RGBColor = RGBColor(0, 114, 178);
 pub(crate) const OUTWARD: RGBColor = RGBColor(213, 94, 0);
+/// Of the band around the inward curve: its colour, pale enough for the lines upon it.
+const BAND: RGBColor = RGBColor(190, 220, 238);
 pub(crate) const PINK: RGBColor = RGBColor(204, 121, 167);
 pub(crate) const GREEN: RGBColor = RGBColor(0, 158, 115);
 pub(crate) const ORANGE: RGBColor = RGBColor(230, 159, 0);
@@ -61,10 +63,11 @@ pub fn force_chart(
         records.iter().filter(|r| r.depth.is_finite() && r.time.is_finite() && r.force.axial.is_finite()).collect();
     let over_depth = range(finite.iter().map(|r| r.depth)).is_some_and(|(a, b)| b - a > LEAST_TRAVEL);
     let abscissa = |r: &FrameRecord| if over_depth { r.depth * 1e3 } else { r.time };
-    let curves = curves(&finite, over_depth, abscissa);
+    let mut curves = curves(&finite, over_depth, abscissa);
+    let band = band(&finite, over_depth, abscissa);
 
     let xs = curves.iter().flat_map(|c| c.points.iter().map(|p| p.0));
-    let ys = curves.iter().flat_map(|c| c.points.iter().map(|p| p.1));
+    let ys = curves.iter().flat_map(|c| c.points.iter()).chain(&band).map(|p| p.1);
     let (x_min, x_max) = range(xs).unwrap_or((0.0, 1.0));
     let (y_min, y_max) = range(ys).unwrap_or((0.0, 1.0));
     let (x_min, x_max) = widened(x_min.min(0.0), x_max, 0.02);
@@ -75,6 +78,12 @@ pub fn force_chart(
         let root = SVGBackend::with_string(&mut text, (fine(SIZE.0), fine(SIZE.1))).into_drawing_area();
         root.fill(&WHITE)?;
         let (head, body) = root.split_vertically(fine(HEAD));
+        if !band.is_empty() {
+            // Its place in the legend; it is drawn below the others.
+            let last = curves.len() - 1;
+            let (label, width) = ("error of the cells", FINER * 10);
+            curves.insert(last, Curve { label, colour: BAND, width, dash: None, points: Vec::new() });
+        }
         draw_head(&head, title, &curves)?;
 
         let mut chart = ChartBuilder::on(&body)
@@ -92,6 +101,9 @@ pub fn force_chart(
             .x_label_formatter(&|v| tick(*v, x_max - x_min))
             .y_label_formatter(&|v| tick(*v, y_max - y_min))
             .draw()?;
+        if !band.is_empty() {
+            chart.draw_series([Polygon::new(band, BAND.filled())])?;
+        }
         chart.draw_series(LineSeries::new([(x_min, 0.0), (x_max, 0.0)], BLACK.mix(0.6).stroke_width(fine(1))))?;
         for curve in &curves {
             let style = curve.colour.stroke_width(curve.width);
@@ -128,13 +140,27 @@ pub fn force_chart(
     Ok(text.replacen(&drawn, &shown, 1))
 }
 
+/// Where the way in ends: at the deepest frame, without an insertion at the last one.
+fn turn(records: &[&FrameRecord], over_depth: bool) -> usize {
+    let deeper =
+        |a: &(usize, &&FrameRecord), b: &(usize, &&FrameRecord)| a.1.depth.total_cmp(&b.1.depth).then(b.0.cmp(&a.0));
+    let deepest = records.iter().enumerate().max_by(deeper).map_or(0, |(i, _)| i);
+    if over_depth { deepest } else { records.len().saturating_sub(1) }
+}
+
+/// Outline of the band around the axial force on the way in; empty without one.
+fn band(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRecord) -> f64) -> Vec<(f64, f64)> {
+    let inward = records.get(..=turn(records, over_depth)).unwrap_or(&[]);
+    let edge = |r: &&FrameRecord, side: f64| {
+        let error = r.force_error.filter(|error| error.is_finite())?;
+        Some((abscissa(r), r.force.axial + side * error))
+    };
+    let upper = inward.iter().filter_map(|r| edge(r, 1.0));
+    upper.chain(inward.iter().rev().filter_map(|r| edge(r, -1.0))).collect()
+}
+
 fn curves(records: &[&FrameRecord], over_depth: bool, abscissa: impl Fn(&FrameRecord) -> f64) -> Vec<Curve> {
-    let deepest = records
-        .iter()
-        .enumerate()
-        .max_by(|a, b| a.1.depth.total_cmp(&b.1.depth).then(b.0.cmp(&a.0)))
-        .map_or(0, |(i, _)| i);
-    let turn = if over_depth { deepest } else { records.len().saturating_sub(1) };
+    let turn = turn(records, over_depth);
     let inward = records.get(..=turn).unwrap_or(&[]);
     let outward = records.get(turn..).filter(|rest| rest.len() > 1).unwrap_or(&[]);
     let axial = |label, colour, dash, records: &[&FrameRecord]| Curve {

@@ -33,7 +33,7 @@ pub use parts_chart::write_parts_chart;
 pub use progress::Progress;
 pub use sample::DrivenFace;
 pub use sample_chart::write_sample_chart;
-pub use summary::{Status, Summary};
+pub use summary::{Band, Status, Summary};
 pub use tables::Tables;
 pub use target::TargetFigures;
 pub use vtu::FieldFiles;

@@ -164,6 +164,27 @@ pub struct Summary {
     pub raised_mass_share: f64,
     /// Cell steps whose return mapping did not meet the yield condition.
     pub return_failures: u64,
+    /// What a companion run with wider cells told; absent without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error_bar: Option<Band>,
+}
+
+/// The band around the force, from a companion run with wider cells.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Band {
+    pub companion_cell_mm: f64,
+    pub companion_cells: u64,
+    /// Wall time of the companion [s]; it is no part of that of the run.
+    pub companion_wall_s: f64,
+    /// Order of the error in the cell edge, and whether a study has observed it; else it is assumed.
+    pub order: f64,
+    pub order_observed: bool,
+    /// Mean difference of the two runs on the way in, times the factor of the band, over the mean force.
+    pub mean_error: Option<f64>,
+    /// Half-width of the band at the deepest point on the way in [N].
+    pub force_error_at_max_depth_n: Option<f64>,
+    /// The same of the depth of the puncture [m]; `null` where one of the two runs has none.
+    pub puncture_depth_error_m: Option<f64>,
 }
 
 /// JSON has no NaN; it is written as `null`.

@@ -20,6 +20,7 @@ pub mod presets;
 pub mod task;
 #[allow(missing_docs)]
 pub mod tissue_preset;
+mod wider_cells;
 mod words;
 
 use std::path::{Path, PathBuf};

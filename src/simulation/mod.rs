@@ -10,6 +10,7 @@ pub mod advice;
 pub mod change;
 #[allow(missing_docs)]
 pub mod checkpoint;
+pub mod companion;
 pub mod fields;
 pub mod flexible_needle;
 #[allow(missing_docs)]

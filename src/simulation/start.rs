@@ -104,11 +104,15 @@ impl Simulation {
         }
         let mesh = Mesh::of_scene(&scene);
         let mut simulation = Self::prepare(scene, mesh, device, Vec::new(), MOST_STEPS_PER_FRAME, purpose)?;
-        // A needle that bends is solved one frame ahead: it follows the hand a frame later.
-        if let (Some(_), Some(pose)) = (&simulation.needle, simulation.hand()) {
-            simulation.lead(&pose);
-        }
+        simulation.lead_ahead();
         Ok(simulation)
+    }
+
+    /// A needle that bends is solved one frame ahead: it follows the hand a frame later.
+    pub(super) fn lead_ahead(&mut self) {
+        if let (Some(_), Some(pose)) = (&self.needle, self.hand()) {
+            self.lead(&pose);
+        }
     }
 
     /// The device of a choice, and what is to be said about it; no device: the CPU engine.

@@ -52,6 +52,20 @@ pub fn curve_error(curve: &[(f64, f64)], reference: &[(f64, f64)]) -> Option<f64
     (scale > 0.0).then(|| (difference / scale).sqrt())
 }
 
+/// Mean over depth of the difference of two curves (depth, force), depths ascending, over the mean force of the reference: the trapezoidal rule
+/// over the depths of the reference that both hold. `None` where they share fewer than two.
+pub fn mean_error(curve: &[(f64, f64)], reference: &[(f64, f64)]) -> Option<f64> {
+    let shared: Vec<(f64, f64, f64)> =
+        reference.iter().filter_map(|(depth, force)| Some((*depth, *force, interpolated(curve, *depth)?))).collect();
+    let (mut difference, mut scale) = (0.0, 0.0);
+    for pair in shared.windows(2) {
+        let half = 0.5 * (pair[1].0 - pair[0].0);
+        difference += half * pair.iter().map(|(_, r, f)| (f - r).abs()).sum::<f64>();
+        scale += half * pair.iter().map(|(_, r, _)| r.abs()).sum::<f64>();
+    }
+    (scale > 0.0).then(|| difference / scale)
+}
+
 /// Relative L2 norm of the difference of two fields at the same points; `None` for other points, none, or a field at rest.
 pub fn field_error(field: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<f64> {
     if field.len() != reference.len() || field.is_empty() {

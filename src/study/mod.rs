@@ -4,6 +4,7 @@
 //! [`subject`] reads the scene, [`plan`] chooses the runs that a budget of time allows, [`runner`] measures and runs them,
 //! [`store`] keeps each finished run, [`analysis`] turns them into errors ([`metrics`]), fronts ([`pareto`]) and orders
 //! ([`order`]), [`tables`] and [`page`] write them down, [`advice`] looks up what they mean for a frame rate.
+//! [`precision`] chooses cells and mass scaling for a wanted error, from a few coarse runs of its own.
 
 pub mod advice;
 pub mod analysis;
@@ -12,6 +13,7 @@ pub mod order;
 pub mod page;
 pub mod pareto;
 pub mod plan;
+pub mod precision;
 pub mod runner;
 pub mod store;
 pub mod subject;

@@ -10,6 +10,7 @@
 pub mod accuracy;
 pub mod app;
 pub mod appearance;
+mod band;
 pub mod camera;
 pub mod devices;
 pub mod effects_panel;

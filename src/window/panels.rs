@@ -1,6 +1,6 @@
 //! The panels around the view: what is shown, who leads, forces, energies, health and times.
 
-use egui_plot::{AxisHints, Corner, GridInput, GridMark, Legend, Line, Plot, PlotPoints};
+use egui_plot::{AxisHints, Corner, FilledArea, GridInput, GridMark, Legend, Line, Plot, PlotPoints};
 
 use super::accuracy::Accuracy;
 use super::appearance::{self, ColourMap, Look};
@@ -12,6 +12,7 @@ use super::texts;
 use crate::haptic::LoopTiming;
 use crate::observables::field::{Field, Range, VON_MISES};
 use crate::observables::{ForceParts, FrameRecord};
+use crate::output::curve::frames_on_the_way_in;
 use crate::training::score::Score;
 
 /// What the user has chosen.
@@ -24,6 +25,8 @@ pub struct Choices {
     /// Simulated time over wall time that is aimed at.
     pub pace: f64,
     pub show_parts: bool,
+    /// A band around the force.
+    pub error_bar: bool,
     /// File that the scene is saved as; empty: beside the one that runs.
     pub save_as: String,
     /// Made when it is looked at first.
@@ -39,6 +42,7 @@ impl Choices {
             cut,
             pace,
             show_parts: false,
+            error_bar: false,
             save_as: String::new(),
             accuracy: None,
             look: Look::default(),
@@ -274,10 +278,15 @@ pub fn readings(
         return;
     };
     ui.horizontal(|ui| {
-        ui.heading(format!("{:.3} N", record.force.axial));
+        let error = record.force_error.map_or(String::new(), |e| format!(" \u{b1} {e:.3}"));
+        ui.heading(format!("{:.3}{error} N", record.force.axial));
         ui.label(format!("{} {:.2} mm", texts::AT_DEPTH, record.depth * 1e3));
     });
     ui.checkbox(&mut choices.show_parts, texts::PARTS);
+    ui.checkbox(&mut choices.error_bar, texts::ERROR_BAR);
+    if let Some(why) = &practice.no_band {
+        ui.label(why);
+    }
     force_plot(ui, practice, choices.show_parts, reference);
     numbers(ui, practice, record, haptic);
     lights(ui, record);
@@ -318,6 +327,10 @@ fn force_plot(ui: &mut egui::Ui, practice: &Practice, show_parts: bool, referenc
         .allow_zoom(false)
         .allow_scroll(false)
         .show(ui, |plot| {
+            for [depths, lower, upper] in band(&practice.records) {
+                let area = FilledArea::new(texts::BAND, &depths, &lower, &upper);
+                plot.add(area.fill_color(egui::Color32::from_rgba_unmultiplied(0, 114, 178, 90)));
+            }
             for curve in reference {
                 let line = Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone()));
                 plot.line(line.color(egui::Color32::GRAY).width(1.5));
@@ -331,6 +344,26 @@ fn force_plot(ui: &mut egui::Ui, practice: &Practice, show_parts: bool, referenc
                 }
             }
         });
+}
+
+/// Depth [mm] and both edges of the band on the way in, in stretches without a gap.
+fn band(records: &[FrameRecord]) -> Vec<[Vec<f64>; 3]> {
+    let inward: Vec<&FrameRecord> = frames_on_the_way_in(records).collect();
+    let every = inward.len().div_ceil(500).max(1);
+    let mut stretches = vec![<[Vec<f64>; 3]>::default()];
+    for record in inward.into_iter().step_by(every) {
+        match (record.force_error, stretches.last_mut()) {
+            (Some(error), Some([depths, lower, upper])) => {
+                depths.push(record.depth * 1e3);
+                lower.push(record.force.axial - error);
+                upper.push(record.force.axial + error);
+            }
+            (None, Some([depths, ..])) if !depths.is_empty() => stretches.push(Default::default()),
+            _ => {}
+        }
+    }
+    stretches.retain(|[depths, ..]| !depths.is_empty());
+    stretches
 }
 
 /// What the last frame has, and how fast the run goes.

@@ -8,9 +8,11 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::band::Band;
 use super::hand::InputDevice;
 use super::reach::Reach;
 use super::source::Source;
+use super::texts;
 use super::tuning::{Taken, Tuning};
 use crate::gpu::Gpu;
 use crate::needle::motion::HandPose;
@@ -175,6 +177,10 @@ pub struct Practice {
     freshly_changed: bool,
     /// Moments of a script that one can go back to.
     marks: Vec<Checkpoint>,
+    /// The user wants a band around the force; why there is none, where there cannot be one.
+    wants_band: bool,
+    band: Option<Band>,
+    pub no_band: Option<String>,
     last_drawn: Option<Instant>,
 }
 
@@ -244,9 +250,38 @@ impl Practice {
             latency: Latency::default(),
             freshly_changed: false,
             marks: Vec::new(),
+            wants_band: false,
+            band: None,
+            no_band: None,
             last_drawn: None,
             scene,
         })
+    }
+
+    /// Switches the band around the force on or off, from the next frame on; frames that went before get theirs by and by.
+    pub fn show_band(&mut self, on: bool) {
+        if on == self.wants_band {
+            return;
+        }
+        (self.wants_band, self.band, self.no_band) = (on, None, None);
+        if !on {
+            return;
+        }
+        if !self.session.changes.is_empty() {
+            self.no_band = Some(texts::BAND_ENDED.into());
+            return;
+        }
+        match Band::of(&self.simulation, &self.tuning.source, &self.session.poses) {
+            Ok(band) => self.band = Some(band),
+            Err(error) => self.no_band = Some(error.to_string()),
+        }
+    }
+
+    /// The companion does not know what was changed in a scene that runs.
+    fn end_band(&mut self) {
+        if self.band.take().is_some() {
+            self.no_band = Some(texts::BAND_ENDED.into());
+        }
     }
 
     /// The same from the beginning.
@@ -274,6 +309,7 @@ impl Practice {
         let first = self.tuning.opened_with();
         let mut next = Practice::with(simulation, scene, source, gpu, leader, folder.as_deref(), true)?;
         next.tuning.set_opened_with(first);
+        next.show_band(self.wants_band);
         *self = Practice { out, attempt, latency: self.latency, ..next };
         Ok(())
     }
@@ -290,6 +326,7 @@ impl Practice {
         session.change(&mut self.simulation, frame)?;
         self.tuning.source.overrides.clone_from(&last.overrides);
         self.session.changes.extend(session.changes.iter().filter(|change| change.frame == frame).cloned());
+        self.end_band();
         self.scene = self.tuning.source.scene()?;
         self.timing.simulated = self.simulation.steps_per_frame() as f64 * self.simulation.dt();
         Ok(Renewed::Buffers)
@@ -332,6 +369,7 @@ impl Practice {
         };
         // The session says which frame is the first that has it.
         let frame = self.session.poses.len() as u64;
+        self.end_band();
         self.session.changes.push(SceneChange { frame, overrides: self.tuning.source.overrides.clone() });
         self.scene = self.tuning.source.scene()?;
         self.speed_limit = speed_limit(&self.simulation);
@@ -376,6 +414,9 @@ impl Practice {
             let pose = self.within_reach(&now, wanted, duration);
             self.session.poses.push(pose);
             self.simulation.lead(&pose);
+            if let Some(band) = &mut self.band {
+                band.lead(&pose);
+            }
         }
         self.started = Some(Instant::now());
         self.simulation.start_frames()
@@ -405,12 +446,14 @@ impl Practice {
                 if let Some((since, frames)) = self.fresh.take() {
                     self.latency.add(self.records.len() as u64 + 1 - frames, since.elapsed().as_secs_f64());
                 }
-                if let Some(written) = self.written.as_mut().filter(|_| self.unwritten.is_none())
-                    && let Err(error) = written.tables.append(&record).and_then(|()| self.save())
+                self.records.push(record);
+                self.fill_band();
+                if let Some((written, record)) = self.written.as_mut().zip(self.records.last())
+                    && self.unwritten.is_none()
+                    && let Err(error) = written.tables.append(record).and_then(|()| self.save())
                 {
                     self.hold_back(error);
                 }
-                self.records.push(record);
                 self.timing.done += self.timing.simulated;
                 self.mark()?;
                 if let Some(begin) = self.started.take() {
@@ -428,6 +471,14 @@ impl Practice {
             Err(error) => return Err(error),
         }
         Ok(())
+    }
+
+    /// The band of the last frame, and of some that still lack it.
+    fn fill_band(&mut self) {
+        if let Some(band) = &mut self.band {
+            band.fill(&mut self.records);
+            self.no_band = band.stopped().map(str::to_string);
+        }
     }
 
     /// The folder takes nothing more: the run waits for the user, and goes on in memory.
@@ -492,6 +543,9 @@ impl Practice {
         self.marks.truncate(index + 1);
         self.simulation.resume(&self.marks[index])?;
         self.records.truncate(place(&self.marks[index]));
+        if let Some(band) = &mut self.band {
+            band.go_back(&mut self.records);
+        }
         if matches!(self.state, State::Ended | State::Stopped(_)) {
             self.state = State::Paused;
         }

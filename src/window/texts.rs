@@ -37,6 +37,10 @@ pub const AFTER_THE_FIRST_FRAME: &str = "known after the first frame";
 pub const APPLY: &str = "apply";
 pub const APPLY_ANEW: &str = "apply (begins anew)";
 pub const ERROR: &str = "error of the force";
+pub const ERROR_BAR: &str = "error bar (companion with twice the cell edge)";
+pub const BAND: &str = "error of the cells";
+pub const BAND_ENDED: &str =
+    "The companion does not follow a change of the scene: the error bar comes back with the next attempt.";
 pub const MEASURED_AT: &str = "by the study with";
 pub const NO_STUDY: &str = "The error is not known here; this measures it:";
 pub const MOMENT: &str = "time, s";

@@ -6,6 +6,8 @@ mod change;
 mod checkpoint;
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../error_bar.rs"]
+mod error_bar;
 #[path = "../scenes/main.rs"]
 mod scenes;
 #[path = "../session.rs"]

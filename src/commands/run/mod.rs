@@ -1,6 +1,7 @@
 //! `stylet run`: from a scene to a folder of results.
 
 mod clock;
+mod error_bar;
 mod trouble;
 mod words;
 
@@ -12,6 +13,7 @@ use std::time::Instant;
 use clap::Args;
 
 use self::clock::Clock;
+use self::error_bar::Beside;
 pub use self::words::describe;
 use self::words::reason_of;
 use super::SceneArgs;
@@ -55,6 +57,15 @@ pub struct RunArgs {
     /// Print by which bounds a run is ok, doubtful or stopped
     #[arg(long)]
     pub explain: bool,
+    /// Run a companion with twice the cell edge beside it, and put a band around the force
+    #[arg(long)]
+    pub error_bar: bool,
+    /// Choose cell edge and mass scaling for this error of the force, e.g. 5%, at the least time; with the error bar
+    #[arg(long, value_name = "ERROR", conflicts_with = "resume")]
+    pub error: Option<String>,
+    /// Order of the error in the cell edge that the band counts with, where it is known.
+    #[arg(skip)]
+    pub order: Option<f64>,
     /// Go on with the run in this folder, which was stopped; scene and overrides are those of the run
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "force", "overrides"])]
     pub resume: Option<PathBuf>,
@@ -75,6 +86,7 @@ impl RunArgs {
         };
         args.out = Some(folder.to_path_buf());
         args.scene.overrides = checkpoint.overrides.clone();
+        args.error_bar |= checkpoint.records.iter().any(|record| record.force_error.is_some());
         args
     }
 }
@@ -104,6 +116,7 @@ struct Run<'a> {
     args: &'a RunArgs,
     scene: Scene,
     simulation: Simulation,
+    beside: Option<Beside>,
     info: EngineInfo,
     device: Option<Gpu>,
     output: OutputFolder,
@@ -143,7 +156,11 @@ pub fn execute(args: &RunArgs, start: Instant) -> Result<u8> {
             let args = args.of_resumed(folder, &checkpoint);
             run(checkpoint.load_scene()?, &args, Some(&checkpoint), start, asked)
         }
-        None => run(args.scene.load()?, args, None, start, asked),
+        None => {
+            let chosen = args.error.as_deref().map(|error| error_bar::choose(error, args, asked)).transpose()?;
+            let args = chosen.as_ref().unwrap_or(args);
+            run(args.scene.load()?, args, None, start, asked)
+        }
     };
     let code = exit_code(&outcome, args.strict);
     match outcome {
@@ -194,6 +211,7 @@ impl<'a> Run<'a> {
     fn new(scene: Scene, args: &'a RunArgs, resumed: Option<&RunCheckpoint>) -> Result<Self> {
         let mut simulation = Simulation::new(scene, args.engine)?;
         let scene = simulation.model.scene.clone();
+        let beside = args.error_bar.then(|| Beside::of(&simulation, args)).transpose()?;
         // From here on there is something to keep.
         ending::begin();
         let resumed = resumed.zip(args.out.as_deref());
@@ -222,11 +240,13 @@ impl<'a> Run<'a> {
             args,
             scene,
             simulation,
+            beside,
             info,
             output,
             driven,
             tables,
         };
+        run.follow_again();
         if let Some((checkpoint, _)) = resumed {
             eprintln!("going on at {:.3} s", checkpoint.records.last().map_or(0.0, |r| r.time));
             if checkpoint.adapter != run.info.adapter {
@@ -375,7 +395,10 @@ impl<'a> Run<'a> {
 
     /// One frame with all that is due at its end; its number, `None` after the last one.
     fn advance(&mut self, progress: &Progress) -> Result<Option<u64>> {
-        let Some(record) = self.simulation.next_frame()? else { return Ok(None) };
+        let Some(mut record) = self.simulation.next_frame()? else { return Ok(None) };
+        if let Some(beside) = &mut self.beside {
+            record.force_error = self.clock.aside(|| beside.error_of(&record));
+        }
         self.tables.append(&record)?;
         progress.update(&record, record.time / self.clock.here().max(1e-9));
         let frame = record.frame;
@@ -395,6 +418,14 @@ impl<'a> Run<'a> {
             self.keep_image()?;
         }
         Ok(Some(frame))
+    }
+
+    /// Takes the companion to where a run is that has gone on or back.
+    fn follow_again(&mut self) {
+        let (records, beside) = (&self.records, &mut self.beside);
+        if let Some(beside) = beside {
+            self.clock.aside(|| beside.follow(records));
+        }
     }
 
     fn keep_image(&mut self) -> Result<()> {
@@ -496,6 +527,7 @@ impl<'a> Run<'a> {
         summary.take_frames(records);
         summary.take_sample(&self.driven, records);
         summary.targets = TargetFigures::of_run(&scene.targets, records);
+        summary.error_bar = self.beside.as_ref().map(|beside| beside.band(records));
         let mut written = write_charts(scene, records, &self.driven, output);
         written.push(summary.write(&output.file(folder::SUMMARY)));
         let mut missing: Vec<Error> = written.into_iter().filter_map(Result::err).collect();

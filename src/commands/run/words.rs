@@ -22,14 +22,20 @@ pub fn describe(summary: &Summary) -> String {
         summary.wall_s,
         summary.real_time_factor
     );
+    let band = summary.error_bar.as_ref();
     if let (Some(peak), Some(depth)) = (summary.puncture_force_n, summary.puncture_depth_m) {
         let after = newton(summary.force_after_puncture_n);
-        text += &format!("puncture: {peak:.3} N at {:.2} mm, then {after}\n", depth * 1e3);
+        let error = band.map_or(String::new(), |b| match b.puncture_depth_error_m {
+            Some(error) => format!(" +- {:.2}", error * 1e3),
+            None => " (the companion has no puncture)".into(),
+        });
+        text += &format!("puncture: {peak:.3} N at {:.2}{error} mm, then {after}\n", depth * 1e3);
     }
     if summary.peak_force_n.is_some_and(|f| f != 0.0) {
         text += &format!(
-            "force: {} at {}; largest {}\n",
+            "force: {}{} at {}; largest {}\n",
             newton(summary.force_at_max_depth_n),
+            band.and_then(|b| b.force_error_at_max_depth_n).map_or(String::new(), |e| format!(" +- {e:.3} N")),
             mm(summary.max_depth_m),
             newton(summary.peak_force_n),
         );
@@ -54,6 +60,17 @@ pub fn describe(summary: &Summary) -> String {
         );
     }
     text += &describe_targets(summary);
+    if let Some(band) = band {
+        text += &format!(
+            "error bar: {} of the force, mean over the way in; companion: {} cells of {:.3} mm, {:.2} s, {:.0} % of the run's \
+             own time\n",
+            band.mean_error.map_or("-".into(), |e| format!("{:.1} %", 100.0 * e)),
+            band.companion_cells,
+            band.companion_cell_mm,
+            band.companion_wall_s,
+            100.0 * band.companion_wall_s / summary.wall_s.max(1e-9)
+        );
+    }
     if let Some(count) = summary.cells_in_needle {
         text += &format!(
             "needle: {count} cells of tissue within its wall at most, over the times of pictures and fields\n"

@@ -258,6 +258,7 @@ impl App {
     fn picture(&mut self) -> Result<()> {
         let Some(open) = &mut self.open else { return Ok(()) };
         let wishes = open.picture(&self.reference)?;
+        open.practice.show_band(open.choices.error_bar);
         if open.pictures == 1 {
             self.outcome.first_picture = self.program_start.elapsed().as_secs_f64();
         }

@@ -92,7 +92,7 @@ impl App {
             devices,
             recording: self.recorded.as_ref().map(|session| Recording::new(session.poses.clone())),
             recorded: self.recorded.clone(),
-            choices: Choices::new(Some((1, at)), self.options.pace),
+            choices: Choices { error_bar: self.options.error_bar, ..Choices::new(Some((1, at)), self.options.pace) },
             camera,
             ahead: false,
             due: 0.0,
