@@ -1,4 +1,4 @@
-//! Cells in lanes of f32 beside the f64 engine: forces, bounds, whole runs, any number of threads, and what lanes do not know.
+//! Cells of a block in lanes of f32 beside the f64 engine: forces, bounds, whole runs, any number of threads, and what lanes do not know.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -162,8 +162,10 @@ fn no_bit_hangs_on_the_number_of_threads() {
     let state = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut simulation = run(scene("muscle_biopsy.toml", &["tissue.cell_size_mm=1.2"]), EngineChoice::Cpu);
-            let records: Vec<_> = (0..12).map(|_| simulation.next_frame().unwrap()).collect();
+            // Cells enough for seven threads.
+            let mut simulation = run(scene("muscle_biopsy.toml", &["tissue.cell_size_mm=0.65"]), EngineChoice::Cpu);
+            assert!(simulation.model.mesh.cell_count() > 7 * 800);
+            let records: Vec<_> = (0..8).map(|_| simulation.next_frame().unwrap()).collect();
             (simulation.engine().read_state().unwrap(), records)
         })
     };

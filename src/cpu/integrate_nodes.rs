@@ -53,6 +53,8 @@ pub(super) struct NodeStep<'a> {
     pub dt: f64,
     /// Largest speed [m/s].
     pub limit: f64,
+    /// Of the faces at rest [m].
+    pub face_centres: &'a [DVec3; 6],
     pub gravity: DVec3,
     pub external: &'a [DVec3],
     pub added_bound: &'a [f64],
@@ -66,7 +68,8 @@ impl CpuEngine {
             model,
             input,
             dt: self.dt,
-            limit: model.speed_limit(self.dt),
+            limit: self.speed_limit,
+            face_centres: &self.face_centres,
             gravity: model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling()),
             external: &self.external,
             added_bound: &self.added_bound,
@@ -135,7 +138,7 @@ impl NodeStep<'_> {
 
 /// Moves a node by one step, no faster than the limit; displacement and velocity [m, m/s].
 fn advance_node(step: &NodeStep, node: usize, acting: &Acting, (u, v): (&mut DVec3, &mut DVec3)) -> NodeSums {
-    let NodeStep { model, input, dt, limit, .. } = *step;
+    let NodeStep { model, dt, limit, .. } = *step;
     let Acting { force, load, bound, mass: scaled, share } = *acting;
     let alpha = model.scene.solver.mass_damping;
     let mass = if model.effects.mass_scaling.is_some() { stable_mass(scaled, bound, dt) } else { scaled };
@@ -158,7 +161,7 @@ fn advance_node(step: &NodeStep, node: usize, acting: &Acting, (u, v): (&mut DVe
     let mut free_mid = 0.5 * (old + new);
     let mut work = 0.0;
     if fixed.contains(&true) {
-        let prescribed = prescribed_velocity(model, node, input, dt);
+        let prescribed = prescribed_velocity(step, node);
         for a in 0..3 {
             if fixed[a] {
                 // Reaction: what the support must add to move the node as prescribed.
@@ -188,7 +191,8 @@ fn advance_node(step: &NodeStep, node: usize, acting: &Acting, (u, v): (&mut DVe
 }
 
 /// Velocity that the driven faces prescribe at a node (zero where a face only holds) [m/s].
-fn prescribed_velocity(model: &Model, node: usize, input: &StepInput, dt: f64) -> DVec3 {
+fn prescribed_velocity(step: &NodeStep, node: usize) -> DVec3 {
+    let NodeStep { model, input, dt, face_centres, .. } = *step;
     let mut velocity = DVec3::ZERO;
     for face in Face::ALL {
         if !model.lies_on(node, face) || model.faces()[face as usize].drive.is_none() {
@@ -196,7 +200,7 @@ fn prescribed_velocity(model: &Model, node: usize, input: &StepInput, dt: f64) -
         }
         let axis = face.axis();
         let drive = input.drives[face as usize];
-        let arm = model.mesh.rest_position(node) - model.face_centre(face);
+        let arm = model.mesh.rest_position(node) - face_centres[face as usize];
         let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut du = drive.translation;
         du[b] += drive.cosine * arm[b] - drive.sine * arm[c];

@@ -15,7 +15,7 @@ mod tip;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
-use lanes::LaneBlock;
+use lanes::LaneCells;
 pub use lanes::unknown_to_lanes;
 use rayon::prelude::*;
 
@@ -57,11 +57,14 @@ pub struct CpuEngine {
     model: Arc<Model>,
     elements: Elements,
     dt: f64,
+    /// Largest nodal speed [m/s] and centres of the faces at rest [m], which look at all of a mesh of tetrahedra.
+    speed_limit: f64,
+    face_centres: [DVec3; 6],
     info: EngineInfo,
     state: State,
     /// True where lanes were asked for; cells in lanes; without them they are in `cells`.
     wants_lanes: bool,
-    lanes: Option<LaneBlock>,
+    lanes: Option<LaneCells>,
     cells: Vec<CellForces>,
     external: Vec<DVec3>,
     /// Stiffness bound that cohesive faces add at a node [N/m].
@@ -123,21 +126,23 @@ impl CpuEngine {
         let (nodes, cells) = (model.mesh.node_count(), model.mesh.cell_count());
         let state = Self::new_state(&model);
         let elements = Elements::new(&model);
-        let lanes = if wants_lanes { LaneBlock::new(&model, &elements) } else { Err(String::new()) };
+        let lanes = if wants_lanes { LaneCells::new(&model, &elements) } else { Err(String::new()) };
         let arithmetic = match &lanes {
-            Ok(lanes) => format!("cells in {} lanes of f32", lanes.width()),
+            Ok(_) => format!("cells in {} lanes of f32", lanes::width()),
             Err(unknown) if unknown.is_empty() => "f64".into(),
             Err(unknown) => format!("f64: lanes do not know {unknown}"),
         };
         let lanes = lanes.ok();
         let bytes = nodes * (3 * size_of::<DVec3>() + 8)
-            + lanes.as_ref().map_or(cells * size_of::<CellForces>(), LaneBlock::bytes)
+            + lanes.as_ref().map_or(cells * size_of::<CellForces>(), LaneCells::bytes)
             + state.stiffness.len() * 8
             + state.points.len() * (size_of::<PointState>() + model.prony_term_count() * size_of::<DMat3>())
             + state.contact.len() * (size_of::<ContactState>() + size_of::<ContactSums>());
         CpuEngine {
             wants_lanes,
             dt,
+            speed_limit: model.speed_limit(dt),
+            face_centres: Face::ALL.map(|face| model.face_centre(face)),
             info: EngineInfo {
                 engine: if wants_lanes { "cpu" } else { "cpu64" }.into(),
                 adapter: format!("{} CPU threads, {arithmetic}", rayon::current_num_threads()),
@@ -412,11 +417,12 @@ pub fn face_reactions(model: &Model, internal_force: &[DVec3]) -> [DVec3; 6] {
 
 /// Moment of the same about the axis along the normal of each face through the centre of the tissue at rest [N m].
 pub fn face_moments(model: &Model, internal_force: &[DVec3], displacement: &[DVec3]) -> [f64; 6] {
+    let centres = Face::ALL.map(|face| model.face_centre(face));
     let mut moments = [0.0; 6];
     for (node, (force, u)) in internal_force.iter().zip(displacement).enumerate() {
         for face in Face::ALL {
             if model.lies_on(node, face) {
-                let arm = model.mesh.rest_position(node) + *u - model.face_centre(face);
+                let arm = model.mesh.rest_position(node) + *u - centres[face as usize];
                 moments[face as usize] += arm.cross(*force)[face.axis()];
             }
         }

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::lanes::LaneBlock;
+use super::lanes::LaneCells;
 use super::{ContactSums, CpuEngine};
 use crate::engine::elements::{CellForces, CellShape};
 use crate::material::TangentBound;
@@ -108,7 +108,7 @@ impl CpuEngine {
         // Points: every station its own.
         let displacement = &self.state.displacement;
         let (lanes, measures) = (&self.lanes, self.measures);
-        let shape = |lanes: &Option<LaneBlock>, cell: u32| Shape {
+        let shape = |lanes: &Option<LaneCells>, cell: u32| Shape {
             material: model.material(cell as usize),
             regular: lanes.as_ref().map(|lanes| lanes.law(model.material_index(cell as usize))),
             measures,

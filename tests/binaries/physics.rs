@@ -12,6 +12,8 @@ mod fields;
 mod indentation;
 #[path = "../lanes.rs"]
 mod lanes;
+#[path = "../lanes_tets.rs"]
+mod lanes_tets;
 #[path = "../material/main.rs"]
 mod material;
 #[path = "../material_point/main.rs"]

@@ -1,57 +1,125 @@
-//! The step of the nodes of a block in lanes, line by line.
+//! The step of the nodes of cells in lanes, line by line.
 //!
 //! Most nodes are free, carry no load, are tied to nothing and stay below the limits. Their step is
 //! `v+ = (a v + kick) c, u+ = u + dt v+` with `kick = f dt/m`: one loop over the components of a line. All others of the line take the step
 //! of the f64 engine afterwards.
 
 use glam::DVec3;
-use pulp::{Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
-use super::{LaneBlock, NODE, NodeLine};
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
+use crate::cpu::team::Team;
 use crate::effects::mass_scaling::{MOST_RAISED, RAISED_STEP_RATIO};
 use crate::engine::WATCHED_STEP_RATIO;
+use crate::engine::elements::CellForces;
 use crate::model::HELD;
 
-impl LaneBlock {
-    /// Moves all nodes; sums of the parts of the team, in their order.
-    pub(in crate::cpu) fn integrate(
-        &mut self,
+/// f32 per node: force of every axis, and the bound.
+pub(super) const NODE: usize = 4;
+
+/// Force (-f_int) [N] and stiffness bound [N/m] of every node, in lines of nodes: a row of every number per line.
+pub(super) struct NodeLines {
+    /// Nodes of a line (fewer in the last, where they do not fill it), and f32 of a row.
+    width: usize,
+    stride: usize,
+    pub numbers: Vec<f32>,
+}
+
+impl NodeLines {
+    pub fn new(nodes: usize, width: usize, stride: usize) -> Self {
+        NodeLines { width, stride, numbers: vec![0.0; nodes.div_ceil(width) * NODE * stride] }
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.numbers.as_slice())
+    }
+
+    /// Where the first number of a node stands; the next follow a row later each.
+    fn first_number(&self, node: usize) -> usize {
+        node / self.width * NODE * self.stride + node % self.width
+    }
+
+    /// Force on a node (-f_int) [N] and its stiffness bound [N/m].
+    pub fn at(&self, node: usize) -> (DVec3, f64) {
+        let first = self.first_number(node);
+        let value = |number: usize| f64::from(self.numbers[first + number * self.stride]);
+        (DVec3::new(value(0), value(1), value(2)), value(3))
+    }
+
+    /// Adds forces of a cell (with the sign of f_int) and its bounds.
+    pub fn add(&mut self, nodes: &[usize], forces: &CellForces) {
+        for (corner, node) in nodes.iter().enumerate() {
+            let first = self.first_number(*node);
+            for axis in 0..3 {
+                self.numbers[first + axis * self.stride] -= forces.force[corner][axis] as f32;
+            }
+            self.numbers[first + 3 * self.stride] += forces.bound[corner] as f32;
+        }
+    }
+
+    /// Moves all nodes, displacement and velocity; sums of the lines, in their order: those of parts would hang on the size of the team.
+    /// `places`: what cells read of the displacement of every line, and what brings it up to date.
+    pub fn integrate<P: Send>(
+        &self,
+        arch: Arch,
+        team: &Team,
         step: &NodeStep,
-        displacement: &mut [DVec3],
-        velocity: &mut [DVec3],
+        (displacement, velocity): (&mut [DVec3], &mut [DVec3]),
+        (mut places, keep): (Vec<&mut [P]>, impl Fn(&mut [P], &[DVec3]) + Sync),
     ) -> Vec<NodeSums> {
-        let (grid, all) = (&self.grid, &self.nodes);
-        let (arch, stride, width) = (grid.arch, grid.stride, grid.cells[0] + 1);
+        let (width, stride) = (self.width, self.stride);
         // Copies that are tied stand in other lines.
-        let any = |node: usize| grid.node_at(all, node);
+        let any = |node: usize| self.at(node);
         let is_plain =
             step.gravity == DVec3::ZERO && step.model.node_load.is_empty() && step.model.separation.ties.is_empty();
-        let part = self.team.part(displacement.len() / width);
+        let part = team.part(places.len());
         let nodes = displacement.chunks_mut(part * width).zip(velocity.chunks_mut(part * width));
-        let lines = self.places.chunks_mut(part * super::PLACE * stride).zip(all.chunks(part * NODE * stride));
+        let lines = places.chunks_mut(part).zip(self.numbers.chunks(part * NODE * stride));
         let items: Vec<_> = nodes.zip(lines).collect();
-        self.team.map(items, |number, ((u, v), (places, nodes))| {
+        let of_parts = team.map(items, |number, ((u, v), (places, numbers))| {
             let mut scratch = Scratch::new(width);
-            let mut sums = NodeSums::default();
-            let lines = places.chunks_exact_mut(super::PLACE * stride).zip(nodes.chunks_exact(NODE * stride));
-            for (i, ((places, nodes), (u, v))) in lines.zip(u.chunks_mut(width).zip(v.chunks_mut(width))).enumerate() {
+            let mut all = Vec::with_capacity(places.len());
+            let lines = places.iter_mut().zip(numbers.chunks_exact(NODE * stride));
+            for (i, ((places, numbers), (u, v))) in lines.zip(u.chunks_mut(width).zip(v.chunks_mut(width))).enumerate()
+            {
                 let first = (number * part + i) * width;
-                let mut line = NodeLine { stride, places, nodes };
+                let line = NodeLine { stride, numbers };
+                let mut sums = NodeSums::default();
                 if is_plain {
-                    arch.dispatch(PlainLine { step, first, line: &line, u, v, scratch: &mut scratch, sums: &mut sums });
+                    arch.dispatch(PlainLine { step, first, line, u, v, scratch: &mut scratch, sums: &mut sums });
                 } else {
                     scratch.others.clear();
-                    scratch.others.extend((0..width).map(|i| (i, u[i], v[i])));
+                    scratch.others.extend((0..u.len()).map(|i| (i, u[i], v[i])));
                 }
                 for (i, old_u, old_v) in scratch.others.drain(..) {
                     (u[i], v[i]) = (old_u, old_v);
                     sums.add(&step.advance(first + i, any, (&mut u[i], &mut v[i])));
                 }
-                line.set_places(u);
+                keep(places, u);
+                all.push(sums);
             }
-            sums
-        })
+            all
+        });
+        of_parts.into_iter().flatten().collect()
+    }
+}
+
+/// The numbers of one line.
+#[derive(Clone, Copy)]
+struct NodeLine<'a> {
+    stride: usize,
+    numbers: &'a [f32],
+}
+
+impl<'a> NodeLine<'a> {
+    /// Forces of the cells on its nodes (-f_int) [N], by axis, and their stiffness bounds [N/m].
+    #[inline(always)]
+    fn rows(&self, count: usize) -> [&'a [f32]; NODE] {
+        let mut rows = [&self.numbers[..count]; NODE];
+        for (number, row) in rows.iter_mut().enumerate() {
+            *row = &self.numbers[number * self.stride..][..count];
+        }
+        rows
     }
 }
 
@@ -79,7 +147,7 @@ fn load<S: Simd>(values: &[f64], at: usize) -> S::f64s {
 struct PlainLine<'a, 'b> {
     step: &'a NodeStep<'b>,
     first: usize,
-    line: &'a NodeLine<'a>,
+    line: NodeLine<'a>,
     u: &'a mut [DVec3],
     v: &'a mut [DVec3],
     scratch: &'a mut Scratch,
@@ -104,9 +172,11 @@ impl WithSimd for PlainLine<'_, '_> {
         let mut more = 0;
         let is_driven = model.has_driven_faces();
         let flags = &model.node_flags[first..first + count];
-        let [fx, fy, fz, bounds] = line.numbers(count);
-        let numbers =
-            kick.as_chunks_mut::<3>().0.iter_mut().zip(mass.as_chunks_mut::<3>().0).zip(raised.as_chunks_mut::<3>().0);
+        let [fx, fy, fz, bounds] = line.rows(count);
+        let numbers = kick.as_chunks_mut::<3>().0[..count]
+            .iter_mut()
+            .zip(mass.as_chunks_mut::<3>().0)
+            .zip(raised.as_chunks_mut::<3>().0);
         for (i, ((kick, mass), raised)) in numbers.enumerate() {
             let bound = f64::from(bounds[i]) + added_bound[i];
             let own = masses[i];

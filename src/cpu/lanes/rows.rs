@@ -6,8 +6,10 @@
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
+use super::block::{Grid, LINES, PLACE};
+use super::nodes::NODE;
 use super::number::Lanes;
-use super::{Grid, LINES, LaneMaterial, NODE, PLACE, WIDEST};
+use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, Elements};
 use crate::material::number::Number;
 use crate::material::regular::{Regular, dot};

@@ -1,0 +1,195 @@
+//! A structured block in lanes: cells side by side along x are one vector.
+//!
+//! Displacements stay f64. Each is split in two f32, `u = high + low`: high is a multiple of 2^-20 m and low of 2^-44 m, so that
+//! differences of neighbours are exact, as they are in the fixed point of the GPU engine; and none is so small that its square is denormal, which costs
+//! a processor a hundred times the time. What a row of cells does to its four lines of nodes is added up along the row;
+//! a second pass adds the four rows around every line.
+
+use glam::DVec3;
+use pulp::Arch;
+
+use super::nodes::{NODE, NodeLines};
+use super::rows::{CellRows, gather_rows};
+use super::{LaneMaterial, WIDEST, materials_of, threads_for};
+use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
+use crate::cpu::team::Team;
+use crate::engine::elements::Elements;
+use crate::material::regular::Polynomial;
+use crate::mesh::BlockMesh;
+use crate::model::Model;
+
+/// f32 per line of nodes in [`LaneBlock::places`]: high and low part of every axis.
+pub(super) const PLACE: usize = 6;
+/// f32 per row of cells in [`LaneBlock::lines`]: force of every axis on four lines of nodes, and the bound of all.
+pub(super) const LINES: usize = 13;
+/// What varies along x: an entry per cell, zeros behind the last and for gaps.
+#[derive(Debug, Default)]
+pub(super) struct EdgesX {
+    /// [m], 1/(4 d) [1/m], d^(1/3), d^(-2/3).
+    pub length: Vec<f32>,
+    pub quarter: Vec<f32>,
+    pub cube_root: Vec<f32>,
+    pub inverse_square: Vec<f32>,
+}
+
+/// The same of one cell along y or z.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Edge {
+    pub length: f32,
+    pub quarter: f32,
+    pub cube_root: f32,
+    pub inverse_square: f32,
+}
+
+impl Edge {
+    fn new(length: f64) -> Self {
+        let exact = |x: f64| if length > 0.0 { x as f32 } else { 0.0 };
+        Edge {
+            length: length as f32,
+            quarter: exact(0.25 / length),
+            cube_root: length.cbrt() as f32,
+            inverse_square: exact(length.powf(-2.0 / 3.0)),
+        }
+    }
+}
+
+/// What does not change.
+pub(super) struct Grid {
+    pub arch: Arch,
+    pub cells: [usize; 3],
+    /// f32 of a row.
+    pub stride: usize,
+    pub x: EdgesX,
+    pub y: Vec<Edge>,
+    pub z: Vec<Edge>,
+    pub materials: Vec<LaneMaterial>,
+    pub quartic: f64,
+    /// 1 for cells where open faces meet, in rows of `stride`; empty: none.
+    pub on_edge: Vec<f32>,
+}
+
+/// A block in lanes.
+pub struct LaneBlock {
+    grid: Grid,
+    team: Team,
+    places: Vec<f32>,
+    lines: Vec<f32>,
+    nodes: NodeLines,
+}
+
+impl LaneBlock {
+    pub fn new(model: &Model, block: &BlockMesh, elements: &Elements) -> Result<Self, String> {
+        let materials = materials_of(model, elements)?;
+        let cells = block.cells();
+        let [nx, ny, nz] = cells;
+        let stride = (nx + 1 + WIDEST).next_multiple_of(WIDEST);
+        let edges =
+            |axis: usize| -> Vec<Edge> { block.lines[axis].windows(2).map(|w| Edge::new(w[1] - w[0])).collect() };
+        let along_x = |value: fn(&Edge) -> f32| {
+            let mut values: Vec<f32> = edges(0).iter().map(value).collect();
+            values.resize(stride, 0.0);
+            values
+        };
+        let mut on_edge = vec![0.0; ny * nz * stride];
+        for cell in (0..block.cell_count()).filter(|c| elements.is_on_edge(model, *c)) {
+            let [i, j, k] = block.cell_coordinates(cell);
+            on_edge[(k * ny + j) * stride + i] = 1.0;
+        }
+        if on_edge.iter().all(|e| *e == 0.0) {
+            on_edge.clear();
+        }
+        let lines = (ny + 1) * (nz + 1) * stride;
+        Ok(LaneBlock {
+            grid: Grid {
+                arch: Arch::new(),
+                cells,
+                stride,
+                x: EdgesX {
+                    length: along_x(|e| e.length),
+                    quarter: along_x(|e| e.quarter),
+                    cube_root: along_x(|e| e.cube_root),
+                    inverse_square: along_x(|e| e.inverse_square),
+                },
+                y: edges(1),
+                z: edges(2),
+                materials,
+                quartic: elements.quartic(),
+                on_edge,
+            },
+            team: Team::new(threads_for(block.cell_count())),
+            places: vec![0.0; lines * PLACE],
+            lines: vec![0.0; ny * nz * LINES * stride],
+            nodes: NodeLines::new(block.node_count(), nx + 1, stride),
+        })
+    }
+
+    /// The threads that its stages share.
+    pub fn team(&self) -> &Team {
+        &self.team
+    }
+
+    /// Law of a material.
+    pub fn law(&self, material: usize) -> Polynomial {
+        self.grid.materials[material].law
+    }
+
+    /// Numbers of the nodes.
+    pub(super) fn nodes(&self) -> &NodeLines {
+        &self.nodes
+    }
+
+    /// The same, to be changed.
+    pub(super) fn nodes_mut(&mut self) -> &mut NodeLines {
+        &mut self.nodes
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        4 * (self.places.len() + self.lines.len() + self.grid.on_edge.len()) + self.nodes.bytes()
+    }
+
+    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it).
+    pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3], stiffness: &[f64]) {
+        let LaneBlock { grid, team, places, lines, nodes } = self;
+        let (stride, [_, ny, nz]) = (grid.stride, grid.cells);
+        let weakened = stiffness.iter().any(|s| *s != 1.0);
+        let stiffness = if weakened { stiffness } else { &[] };
+        let rows = CellRows { grid, places, model, elements, displacement, stiffness };
+        let part = team.part(ny * nz);
+        team.map(lines.chunks_mut(part * LINES * stride), |i, lines| rows.compute(i * part, lines));
+        let lines = lines.as_slice();
+        let part = team.part((ny + 1) * (nz + 1));
+        team.map(nodes.numbers.chunks_mut(part * NODE * stride), |i, nodes| gather_rows(grid, lines, i * part, nodes));
+    }
+
+    /// Takes in a displacement that the last step did not make.
+    pub fn take(&mut self, displacement: &[DVec3]) {
+        let (stride, width) = (self.grid.stride, self.grid.cells[0] + 1);
+        for (places, u) in self.places.chunks_exact_mut(PLACE * stride).zip(displacement.chunks(width)) {
+            set_places(stride, places, u);
+        }
+    }
+
+    /// Moves all nodes.
+    pub fn integrate(&mut self, step: &NodeStep, u: &mut [DVec3], v: &mut [DVec3]) -> Vec<NodeSums> {
+        let stride = self.grid.stride;
+        let places = self.places.chunks_exact_mut(PLACE * stride);
+        let keep = |places: &mut [f32], u: &[DVec3]| set_places(stride, places, u);
+        self.nodes.integrate(self.grid.arch, &self.team, step, (u, v), (places.collect(), keep))
+    }
+}
+
+/// Keeps the displacement of a line of nodes as `u = high + low`.
+fn set_places(stride: usize, places: &mut [f32], displacement: &[DVec3]) {
+    // Adding what has digits of 2^-20 m, and of 2^-44 m, rounds to them.
+    const ROUNDED: f32 = 12.0;
+    const FINE: f32 = 1.5 / (1 << 21) as f32;
+    for (axis, both) in places.chunks_exact_mut(2 * stride).enumerate() {
+        let (high, low) = both.split_at_mut(stride);
+        for ((high, low), u) in high.iter_mut().zip(low).zip(displacement) {
+            let u = u[axis];
+            *high = (u as f32 + ROUNDED) - ROUNDED;
+            *low = ((u - f64::from(*high)) as f32 + FINE) - FINE;
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! Tetrahedra in lanes: F and J of every cell, averaged pressure of every node, forces of every cell, sums at the nodes. Equations:
+//! `engine/elements.rs`.
+//!
+//! Nodes keep their displacement as a multiple of 2^-44 m in f64, so that differences along the edges of a cell are exact and, as in the
+//! block, none is so small that its square is denormal in f32. Cells are sorted by material, in the order of the mesh within each: a vector
+//! holds cells of one material, and the last group of each is filled up with cells that have no volume. Every node adds up what the cells
+//! around it hold, in the order of the mesh.
+
+use glam::DVec3;
+use pulp::Arch;
+
+use super::nodes::NodeLines;
+use super::tet_vectors::{Deformed, Forces};
+use super::{LaneMaterial, WIDEST, materials_of, threads_for};
+use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
+use crate::cpu::team::Team;
+use crate::engine::elements::{Elements, cells_of_nodes};
+use crate::material::regular::Polynomial;
+use crate::mesh::TetMesh;
+use crate::model::Model;
+
+/// f32 per cell in [`TetShapes::constants`]: `B_i` of the last three corners, length of all four, volume.
+pub(super) const SHAPE: usize = 14;
+/// f32 per cell in [`LaneTets::gradients`].
+pub(super) const GRADIENT: usize = 9;
+/// Nodes of a line, which one call moves.
+const LINE: usize = 64;
+/// In [`TetShapes::cells`]: no cell.
+pub(super) const NO_CELL: u32 = u32::MAX;
+
+/// Displacement of a node [m] as cells read it.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(32))]
+pub(super) struct Place(pub [f64; 4]);
+
+impl Place {
+    fn new(u: DVec3) -> Self {
+        // Adding what has digits of 2^-44 m rounds to them.
+        const FINE: f64 = 384.0;
+        Place([(u.x + FINE) - FINE, (u.y + FINE) - FINE, (u.z + FINE) - FINE, 0.0])
+    }
+}
+
+/// What does not change: slots of cells in groups of [`WIDEST`].
+pub(super) struct TetShapes {
+    pub arch: Arch,
+    /// Cell of every slot.
+    pub cells: Vec<u32>,
+    /// Nodes of every slot.
+    pub corners: Vec<[u32; 4]>,
+    /// By group, then by number, then by slot.
+    pub constants: Vec<f32>,
+    /// Material of every group.
+    pub group_material: Vec<u32>,
+    pub materials: Vec<LaneMaterial>,
+    /// Corners around every node in compressed rows: offsets, and four times the slot with the corner added.
+    offsets: Vec<u32>,
+    around: Vec<u32>,
+    /// `K_a/V_a` of every node [Pa/m^3].
+    stiffness: Vec<f32>,
+}
+
+impl TetShapes {
+    fn new(model: &Model, mesh: &TetMesh, materials: Vec<LaneMaterial>) -> Self {
+        let mut cells: Vec<u32> = Vec::new();
+        let mut group_material = Vec::new();
+        for material in 0..materials.len() {
+            cells.extend((0..mesh.tets.len() as u32).filter(|c| model.material_index(*c as usize) == material));
+            cells.resize(cells.len().next_multiple_of(WIDEST), NO_CELL);
+            group_material.resize(cells.len() / WIDEST, material as u32);
+        }
+        let mut slots = vec![0u32; mesh.tets.len()];
+        let mut corners = vec![[0u32; 4]; cells.len()];
+        let mut constants = vec![0.0f32; cells.len() * SHAPE];
+        for (slot, cell) in cells.iter().enumerate().filter(|(_, cell)| **cell != NO_CELL) {
+            let cell = *cell as usize;
+            (slots[cell], corners[slot]) = (slot as u32, mesh.tets[cell]);
+            let gradients = mesh.gradients(cell);
+            let of_corners = gradients[1..].iter().flat_map(|b| b.to_array());
+            let numbers = of_corners.chain(gradients.iter().map(|b| b.length())).chain([mesh.volume(cell)]);
+            let group = &mut constants[slot / WIDEST * SHAPE * WIDEST..];
+            for (number, value) in numbers.enumerate() {
+                group[number * WIDEST + slot % WIDEST] = value as f32;
+            }
+        }
+        let (offsets, cells_around) = cells_of_nodes(mesh);
+        let mut around = Vec::with_capacity(cells_around.len());
+        let mut stiffness = Vec::with_capacity(mesh.positions.len());
+        for (node, range) in offsets.windows(2).enumerate() {
+            let (mut volume, mut weighted) = (0.0, 0.0);
+            for cell in cells_around[range[0]..range[1]].iter().map(|c| *c as usize) {
+                let corner = mesh.tets[cell].iter().position(|n| *n as usize == node).unwrap_or(0);
+                around.push(4 * slots[cell] + corner as u32);
+                let share = 0.25 * mesh.volume(cell);
+                volume += share;
+                weighted += share * model.material(cell).law.bulk_modulus;
+            }
+            stiffness.push(if volume > 0.0 { (weighted / (volume * volume)) as f32 } else { 0.0 });
+        }
+        TetShapes {
+            arch: Arch::new(),
+            cells,
+            corners,
+            constants,
+            group_material,
+            materials,
+            offsets: offsets.into_iter().map(|o| o as u32).collect(),
+            around,
+            stiffness,
+        }
+    }
+
+    fn around(&self, node: usize) -> &[u32] {
+        &self.around[self.offsets[node] as usize..self.offsets[node + 1] as usize]
+    }
+
+    /// Pressure of the nodes from `first` on [Pa]: `K_a (Jbar_a - 1)`, from the volume changes `V_e/4 (J_e - 1)` of all slots.
+    fn average(&self, changes: &[f32], first: usize, pressures: &mut [f32]) {
+        for (i, pressure) in pressures.iter_mut().enumerate() {
+            let mut sum = 0.0;
+            for corner in self.around(first + i) {
+                sum += changes[*corner as usize / 4];
+            }
+            *pressure = sum * self.stiffness[first + i];
+        }
+    }
+
+    /// Adds up what the cells around every node do to it, for the lines of nodes from `first` on: -f_int, and the bound.
+    fn gather(&self, forces: &[[f32; 4]], first: usize, numbers: &mut [f32]) {
+        let nodes = self.stiffness.len();
+        for (line, numbers) in numbers.chunks_exact_mut(super::nodes::NODE * LINE).enumerate() {
+            let first = (first + line) * LINE;
+            for i in 0..LINE.min(nodes - first) {
+                let mut sum = [0.0f32; 4];
+                for corner in self.around(first + i) {
+                    let force = forces[*corner as usize];
+                    for number in 0..4 {
+                        sum[number] += force[number];
+                    }
+                }
+                for axis in 0..3 {
+                    numbers[axis * LINE + i] = -sum[axis];
+                }
+                numbers[3 * LINE + i] = sum[3];
+            }
+        }
+    }
+}
+
+/// Tetrahedra in lanes.
+pub struct LaneTets {
+    shapes: TetShapes,
+    team: Team,
+    places: Vec<Place>,
+    /// H by group, then by entry (column by column), then by slot.
+    gradients: Vec<f32>,
+    /// `V_e/4 (J_e - 1)` of every slot [m^3].
+    changes: Vec<f32>,
+    /// Of every node [Pa].
+    pressures: Vec<f32>,
+    /// Force (with the sign of f_int) and bound of the four corners of every slot.
+    forces: Vec<[f32; 4]>,
+    nodes: NodeLines,
+}
+
+impl LaneTets {
+    pub fn new(model: &Model, mesh: &TetMesh, elements: &Elements) -> Result<Self, String> {
+        let shapes = TetShapes::new(model, mesh, materials_of(model, elements)?);
+        let (slots, nodes) = (shapes.cells.len(), mesh.positions.len());
+        Ok(LaneTets {
+            team: Team::new(threads_for(mesh.tets.len())),
+            places: vec![Place::default(); nodes],
+            gradients: vec![0.0; slots * GRADIENT],
+            changes: vec![0.0; slots],
+            pressures: vec![0.0; nodes],
+            forces: vec![[0.0; 4]; 4 * slots],
+            nodes: NodeLines::new(nodes, LINE, LINE),
+            shapes,
+        })
+    }
+
+    /// The threads that its stages share.
+    pub fn team(&self) -> &Team {
+        &self.team
+    }
+
+    /// Law of a material.
+    pub fn law(&self, material: usize) -> Polynomial {
+        self.shapes.materials[material].law
+    }
+
+    /// Numbers of the nodes.
+    pub(super) fn nodes(&self) -> &NodeLines {
+        &self.nodes
+    }
+
+    /// The same, to be changed.
+    pub(super) fn nodes_mut(&mut self) -> &mut NodeLines {
+        &mut self.nodes
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        let TetShapes { cells, corners, constants, group_material, offsets, around, stiffness, .. } = &self.shapes;
+        let words = cells.len() + 4 * corners.len() + constants.len() + group_material.len() + offsets.len();
+        let changing = self.gradients.len() + self.changes.len() + self.pressures.len() + 4 * self.forces.len();
+        4 * (words + around.len() + stiffness.len() + changing)
+            + size_of_val(self.places.as_slice())
+            + self.nodes.bytes()
+    }
+
+    /// Forces and bounds of all cells at the nodes, for this displacement.
+    pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3]) {
+        let LaneTets { shapes, team, places, gradients, changes, pressures, forces, nodes } = self;
+        let part = team.part(shapes.group_material.len());
+        let parts = gradients.chunks_mut(part * WIDEST * GRADIENT).zip(changes.chunks_mut(part * WIDEST));
+        let deformed = Deformed { shapes, places, displacement, mesh: &model.mesh };
+        team.map(parts.collect::<Vec<_>>(), |i, (gradients, changes)| deformed.compute(i * part, gradients, changes));
+        let of_nodes = team.part(pressures.len());
+        team.map(pressures.chunks_mut(of_nodes), |i, p| shapes.average(changes, i * of_nodes, p));
+        let of_cells = Forces { shapes, gradients, pressures, model, elements, displacement };
+        team.map(forces.chunks_mut(part * WIDEST * 4), |i, forces| of_cells.compute(i * part, forces));
+        let forces = forces.as_slice();
+        let line = super::nodes::NODE * LINE;
+        let part = team.part(nodes.numbers.len() / line);
+        team.map(nodes.numbers.chunks_mut(part * line), |i, numbers| shapes.gather(forces, i * part, numbers));
+    }
+
+    /// Takes in a displacement that the last step did not make.
+    pub fn take(&mut self, displacement: &[DVec3]) {
+        set_places(&mut self.places, displacement);
+    }
+
+    /// Moves all nodes.
+    pub fn integrate(&mut self, step: &NodeStep, u: &mut [DVec3], v: &mut [DVec3]) -> Vec<NodeSums> {
+        let places = self.places.chunks_mut(LINE).collect();
+        self.nodes.integrate(self.shapes.arch, &self.team, step, (u, v), (places, set_places))
+    }
+}
+
+fn set_places(places: &mut [Place], displacement: &[DVec3]) {
+    for (place, u) in places.iter_mut().zip(displacement) {
+        *place = Place::new(*u);
+    }
+}
