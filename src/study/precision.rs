@@ -135,7 +135,7 @@ impl Search<'_> {
                 self.done.push(run.clone());
                 Ok(run)
             }
-            None => Err(Error::Ended("while cells were chosen".into())),
+            None => Err(Error::Ended("while cells were chosen")),
         }
     }
 
