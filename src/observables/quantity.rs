@@ -182,13 +182,16 @@ fn place() -> [Quantity<FrameRecord>; 2] {
 const TIP_COORDINATE: Quantity<FrameRecord> =
     number("tip_coordinate_m", METRE, Last, "how far the tip has cut, in the material", |r| r.tip_coordinate);
 
+/// Column of the band around the force. Runs without a companion leave it out: whoever reads a table of numbers meets no empty field.
+pub const FORCE_ERROR: &str = "force_error_n";
+
 /// `force.csv`, a row per frame. The parts of the axial force are those of [`ForceParts::PARTS`].
 pub static FORCE: LazyLock<Vec<Quantity<FrameRecord>>> = LazyLock::new(|| {
     let mut table = Vec::from(place());
     table.push(count("phase", Last, "number of the phase of the motion, from 0", |r| r.phase as u32));
     table.push(number("axial_force_n", NEWTON, Largest, "sum of the parts", |r| r.force.axial));
     let band = "half-width of the band around the axial force, with a companion run (`--error-bar`) only";
-    table.push(known("force_error_n", NEWTON, Largest, band, |r| r.force_error));
+    table.push(known(FORCE_ERROR, NEWTON, Largest, band, |r| r.force_error));
     let part: fn(&FrameRecord, usize) -> f64 = |r, n| (ForceParts::PARTS[n].of)(&r.force);
     let parts = ForceParts::PARTS.iter().enumerate();
     table.extend(parts.map(|(n, p)| at(p.column, NEWTON, Largest, p.meaning, part, n)));

@@ -14,7 +14,7 @@ use super::sample::{DrivenFace, SAMPLE, SampleRow};
 use super::target::{TARGETS, TargetRow};
 use crate::effects::own::Chosen;
 use crate::observables::FrameRecord;
-use crate::observables::quantity::{CORE, ENERGY, FORCE, Quantity, columns, own_columns, row};
+use crate::observables::quantity::{CORE, ENERGY, FORCE, FORCE_ERROR, Quantity, columns, own_columns, row};
 use crate::scene::Scene;
 use crate::whole_file;
 use crate::{Error, Result};
@@ -23,6 +23,8 @@ use crate::{Error, Result};
 #[derive(Debug)]
 pub struct Tables {
     force: Table,
+    /// With the band around the force.
+    band: bool,
     energy: Table,
     /// Further columns of it.
     own: Vec<Quantity<FrameRecord>>,
@@ -104,6 +106,19 @@ impl Tables {
         scene: &Scene,
         records: &[FrameRecord],
     ) -> Result<Self> {
+        let band = records.iter().any(|record| record.force_error.is_some());
+        Self::with_band(folder, driven, hollow, scene, records, band)
+    }
+
+    /// The same; `band`: with a column for the band around the force.
+    pub fn with_band(
+        folder: &OutputFolder,
+        driven: &[DrivenFace],
+        hollow: bool,
+        scene: &Scene,
+        records: &[FrameRecord],
+        band: bool,
+    ) -> Result<Self> {
         let sample = match driven {
             [] => None,
             driven => Some((driven.to_vec(), Table::new(folder.file(SAMPLE_TABLE), &columns(&SAMPLE))?)),
@@ -121,7 +136,8 @@ impl Tables {
             core,
             sample,
             targets,
-            force: Table::new(folder.file(FORCE_TABLE), &columns(&FORCE))?,
+            force: Table::new(folder.file(FORCE_TABLE), &force_fields(columns(&FORCE), band))?,
+            band,
             energy: Table::new(folder.file(ENERGY_TABLE), &[columns(&ENERGY), columns(&own)].concat())?,
             own,
         };
@@ -147,7 +163,7 @@ impl Tables {
     }
 
     fn rows(&mut self, record: &FrameRecord) -> Result<()> {
-        self.force.row(&row(&FORCE, record))?;
+        self.force.row(&force_fields(row(&FORCE, record), self.band))?;
         self.energy.row(&[row(&ENERGY, record), row(&self.own, record)].concat())?;
         if let Some(table) = self.core.as_mut().filter(|_| record.core.is_some()) {
             table.row(&row(&CORE, record))?;
@@ -164,6 +180,12 @@ impl Tables {
         }
         Ok(())
     }
+}
+
+/// Fields of [`FORCE`] that a run has.
+fn force_fields<T>(all: Vec<T>, band: bool) -> Vec<T> {
+    let named = all.into_iter().zip(FORCE.iter());
+    named.filter(|(_, quantity)| band || quantity.column != FORCE_ERROR).map(|(field, _)| field).collect()
 }
 
 /// Writes the energies of some frames to a file of their own.

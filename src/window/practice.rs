@@ -272,8 +272,22 @@ impl Practice {
             return;
         }
         match Band::of(&self.simulation, &self.tuning.source, &self.session.poses) {
-            Ok(band) => self.band = Some(band),
+            Ok(band) => {
+                self.band = Some(band);
+                self.add_column();
+            }
             Err(error) => self.no_band = Some(error.to_string()),
+        }
+    }
+
+    /// Begins the tables anew, with the column of the band.
+    fn add_column(&mut self) {
+        let Some(written) = self.written.as_mut().filter(|_| self.unwritten.is_none()) else { return };
+        let model = &self.simulation.model;
+        let driven = DrivenFace::of_scene(&self.scene.faces, &model.mesh);
+        match Tables::with_band(&written.folder, &driven, model.has_bore(), &self.scene, &self.records, true) {
+            Ok(tables) => written.tables = tables,
+            Err(error) => self.hold_back(error),
         }
     }
 
@@ -498,7 +512,8 @@ impl Practice {
         let model = &self.simulation.model;
         let driven = DrivenFace::of_scene(&self.scene.faces, &model.mesh);
         let folder = &written.folder;
-        let tables = Tables::with_records(folder, &driven, model.has_bore(), &self.scene, &self.records);
+        let band = self.band.is_some() || self.records.iter().any(|record| record.force_error.is_some());
+        let tables = Tables::with_band(folder, &driven, model.has_bore(), &self.scene, &self.records, band);
         let session = || session_file(folder, self.leader, &self.session);
         let done = tables.and_then(|tables| Ok((tables, session()?))).map(|(tables, session)| {
             if let Some(written) = &mut self.written {

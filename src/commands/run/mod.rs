@@ -226,7 +226,8 @@ impl<'a> Run<'a> {
         eprintln!("{}: {} on {} ({})", scene.name, info.engine, info.adapter, info.driver);
         let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
         let records = resumed.map_or(&[][..], |(checkpoint, _)| &checkpoint.records);
-        let tables = Tables::with_records(&output, &driven, simulation.model.has_bore(), &scene, records)?;
+        let hollow = simulation.model.has_bore();
+        let tables = Tables::with_band(&output, &driven, hollow, &scene, records, beside.is_some())?;
         let mut run = Run {
             moments: moments(&simulation),
             fields: FieldFiles::new(&output),
@@ -380,7 +381,8 @@ impl<'a> Run<'a> {
     /// Starts the tables anew with these records.
     fn keep_records(&mut self, records: Vec<FrameRecord>) -> Result<()> {
         let hollow = self.simulation.model.has_bore();
-        self.tables = Tables::with_records(&self.output, &self.driven, hollow, &self.scene, &records)?;
+        let band = self.beside.is_some();
+        self.tables = Tables::with_band(&self.output, &self.driven, hollow, &self.scene, &records, band)?;
         self.records = records;
         Ok(())
     }
