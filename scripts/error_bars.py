@@ -4,7 +4,7 @@
     python3 scripts/error_bars.py [--stylet target/release/stylet] [--out out/error_bars] [SCENE ...]
 
 Runs each scene with --error-bar, and once more with half the cell edge. Runs that the folder holds are not repeated. Prints the
-table of docs/verdict.md: rows of the way in within the band, the mean band over the largest force, and the force at the deepest point.
+table of docs/error-bar.md: rows of the way in within the band, the mean band over the largest force, and the force at the deepest point.
 Takes about half an hour on two cores.
 """
 

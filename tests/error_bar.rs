@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use stylet::Result;
 use stylet::commands::SceneArgs;
-use stylet::commands::run::{RunArgs, RunOutcome, run};
+use stylet::commands::run::{RunArgs, RunOutcome, execute, run};
 use stylet::observables::FrameRecord;
 use stylet::output::curve::interpolated;
 use stylet::output::folder::{FORCE_CHART, FORCE_TABLE};
@@ -87,6 +87,32 @@ fn a_run_that_went_back_has_the_same_band() {
     let mut late = Companion::of(&main, coarser, None).unwrap();
     let resumed: Vec<Option<f64>> = records.iter().map(|record| late.error_of(record)).collect();
     assert_eq!(first, resumed);
+}
+
+#[test]
+fn a_resumed_run_has_the_band_of_one_that_was_not_stopped() {
+    let base = tempfile::tempdir().unwrap();
+    let [whole, stopped, added] = ["whole", "stopped", "added"].map(|name| base.path().join(name));
+    let with = |error_bar: bool, out: &Path, stop: bool| {
+        let out = Some(out.to_path_buf());
+        let order = error_bar.then_some(Some(0.7));
+        let args = RunArgs { error_bar, order, out, ..args(SPHERE, &SMALL) };
+        run(args.scene.load().unwrap(), &args, None, Instant::now(), &AtomicBool::new(stop)).unwrap()
+    };
+    let rows = |folder: &Path| std::fs::read_to_string(folder.join(FORCE_TABLE)).unwrap();
+    with(true, &whole, false);
+    with(true, &stopped, true);
+    assert!(rows(&stopped).lines().count() < rows(&whole).lines().count());
+    let go_on = |folder: &Path, error_bar: bool| {
+        let resumed = RunArgs { resume: Some(folder.to_path_buf()), error_bar, ..args(SPHERE, &[]) };
+        assert_eq!(execute(&resumed, Instant::now()).unwrap(), 0);
+    };
+    go_on(&stopped, false);
+    assert_eq!(rows(&stopped), rows(&whole));
+    // One that began without a band gets it for all of its frames; the order is then the assumed one.
+    with(false, &added, true);
+    go_on(&added, true);
+    assert!(column(&added, "force_error_n").iter().all(Option::is_some));
 }
 
 #[test]
@@ -178,11 +204,11 @@ fn what_has_no_band_says_why() {
         error.to_string()
     };
     assert!(refused("scenes/samples/cyclic.toml").contains("has no tool"));
-    let narrow = ["tissue.cell_size_mm=4"];
-    let error = run_into(&base.path().join("x"), RunArgs { error_bar: true, ..args(SPHERE, &narrow) });
-    if let Err(error) = error {
-        assert!(error.to_string().contains("no companion"), "{error}");
-    }
+    // Cells of 15 mm fit twice into the smallest edge of the block, cells of 30 mm do not.
+    let wide = ["tissue.cell_size_mm=15"];
+    assert!(args(SPHERE, &wide).scene.load().is_ok());
+    let error = run_into(&base.path().join("x"), RunArgs { error_bar: true, ..args(SPHERE, &wide) }).unwrap_err();
+    assert!(error.exit_code() == 2 && error.to_string().contains("no companion"), "{error}");
     let mesh = Scene::load(Path::new("scenes/forearm.toml"), &[]).unwrap();
     assert!(mesh.wider_cells(WIDER).unwrap_err().to_string().contains("mesh from a file"));
 }

@@ -48,7 +48,8 @@ impl Display {
         // The server looks for a free number itself, and writes it once it takes connections.
         let file = std::fs::File::create(&numbers).unwrap();
         let server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
+            // A server begins anew when its last client goes, and meanwhile refuses others: here xdotool goes before the window has come.
+            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset"])
             .stdout(file)
             .stderr(Stdio::null())
             .spawn()

@@ -9,13 +9,12 @@ use super::SceneArgs;
 use super::report::moment;
 use crate::effects::mass_scaling::{AUTO_MACH, Loading};
 use crate::error::{Error, Result};
-use crate::output::folder::safe_name;
 use crate::simulation::EngineChoice;
 use crate::study::advice::{Candidate, best_in_real_time, speed};
 use crate::study::analysis::Analysis;
 use crate::study::plan::UnitCost;
 use crate::study::runner::{measure_engine, predicted_factor};
-use crate::study::store::Store;
+use crate::study::store::{Store, default_folder};
 use crate::study::subject::Subject;
 use crate::study::{MeshSize, Settings};
 use crate::units::{rounded, three_decimals, trimmed};
@@ -80,7 +79,7 @@ pub fn advise(args: &AdviseArgs) -> Result<String> {
         ));
     }
     let subject = Subject::load(&args.scene.file, &args.scene.overrides, args.engine)?;
-    let folder = PathBuf::from(format!("out/study_{}", safe_name(&subject.scene.name)));
+    let folder = default_folder(&subject.scene.name);
     let study = match &args.study {
         Some(folder) => Some(Store::existing(folder)?),
         None => Store::existing(&folder).ok(),

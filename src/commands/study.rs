@@ -15,7 +15,7 @@ use crate::output::progress::time_left;
 use crate::simulation::EngineChoice;
 use crate::study::analysis::Analysis;
 use crate::study::plan::{Costs, LeftOut, Plan, PlannedRun, Role, shard};
-use crate::study::store::{FIGURES, PAGE, RunRecord, Store, TABLE};
+use crate::study::store::{FIGURES, PAGE, RunRecord, Store, TABLE, default_folder};
 use crate::study::subject::Subject;
 use crate::study::{Axis, Engine, page, runner, tables};
 use crate::whole_file;
@@ -120,7 +120,7 @@ pub fn study(args: &StudyArgs, interrupted: &AtomicBool) -> Result<StudyOutcome>
     let subject = Subject::load(&args.scene.file, &args.scene.overrides, args.engine)?;
     let name = safe_name(&subject.scene.name);
     let out = args.out.clone().unwrap_or_else(|| match part {
-        None => PathBuf::from(format!("out/study_{name}")),
+        None => default_folder(&subject.scene.name),
         Some((part, of)) => PathBuf::from(format!("out/study_{name}_part_{part}_of_{of}")),
     });
     let store = Store::open(&out, &subject.scene.name, args.force)?;

@@ -17,7 +17,6 @@ use super::layout::Layout;
 use super::memory::{Memory, allocate};
 use super::pace::Pace;
 use super::plan::{Features, defines, measure_threads, mesh_numbers, stages, threads};
-use super::roofline::work;
 use super::structs::StepInput;
 use crate::engine::{Engine, EngineImage, EngineInfo, FramePlan, FrameSums, Health, Stage, State, foreign_image};
 use crate::error::{Error, Result};
@@ -51,29 +50,15 @@ struct ResultRange {
     size: u64,
 }
 
-/// What a stage moves and computes in one dispatch, see [`super::roofline`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct StageLoad {
-    pub stage: Stage,
-    pub threads: u32,
-    /// Sizes of the arrays that it reads and of those that it writes [B].
-    pub bytes: f64,
-    /// It goes through the whole mesh, so that it moves these bytes; else it touches a part of them.
-    pub whole: bool,
-    pub flops: f64,
-    /// There may be more of them, see [`super::roofline::Work::at_least`].
-    pub at_least: bool,
-}
-
 /// The engine.
 pub struct GpuEngine {
-    model: Arc<Model>,
+    pub(super) model: Arc<Model>,
     gpu: Gpu,
     info: EngineInfo,
-    layout: Layout,
+    pub(super) layout: Layout,
     dt: f64,
-    kernels: Vec<Kernel>,
-    buffers: BTreeMap<&'static str, Memory>,
+    pub(super) kernels: Vec<Kernel>,
+    pub(super) buffers: BTreeMap<&'static str, Memory>,
     results: Vec<ResultRange>,
     staging: Vec<wgpu::Buffer>,
     in_flight: VecDeque<InFlight>,
@@ -201,43 +186,6 @@ impl GpuEngine {
     /// Names and sizes of all device buffers [bytes].
     pub fn buffer_sizes(&self) -> Vec<(&'static str, u64)> {
         self.buffers.iter().map(|(n, b)| (*n, b.device_bytes())).collect()
-    }
-
-    /// What every stage moves and computes in one dispatch: arrays once each, whole.
-    ///
-    /// # Errors
-    /// `Error::Shader`, where a source has changed since.
-    pub fn loads(&self) -> Result<Vec<StageLoad>> {
-        let model = &*self.model;
-        let measure_threads = measure_threads(model);
-        let defines = defines(&model.effects, &Features::of(model));
-        let numbers = mesh_numbers(model, &self.layout, measure_threads);
-        let bytes = |names: &[String]| -> f64 {
-            let size = |name: &String| match name.as_str() {
-                // A step reads its own.
-                STEP_INPUT => size_of::<StepInput>() as f64,
-                name => self.buffers.get(name).map_or(0.0, |memory| memory.device_bytes() as f64),
-            };
-            names.iter().map(size).sum()
-        };
-        let load = |kernel: &Kernel| {
-            let threads = f64::from(kernel.threads());
-            // A thread has a strip of cells.
-            let rounds = match kernel.stage {
-                Stage::ElementForces => (model.mesh.cell_count() as f64 / threads).max(1.0),
-                _ => 1.0,
-            };
-            let work = work(kernel.stage, &defines, &numbers, rounds)?;
-            Ok(StageLoad {
-                stage: kernel.stage,
-                threads: kernel.threads(),
-                bytes: bytes(&work.read) + bytes(&work.written),
-                whole: threads * rounds >= model.mesh.cell_count().min(model.mesh.node_count()) as f64,
-                flops: work.flops * threads,
-                at_least: work.at_least,
-            })
-        };
-        self.kernels.iter().filter(|k| !k.stage.draws()).map(load).collect()
     }
 
     /// Wall and process CPU time of one dispatch of every stage [s], each repeated `repeats` times by itself. The state

@@ -6,8 +6,12 @@ use std::collections::BTreeMap;
 use naga::valid::{Capabilities, FunctionInfo, GlobalUse, ModuleInfo, ValidationFlags, Validator};
 use naga::{BinaryOperator, Block, Expression, Function, Handle, Literal, MathFunction, Module, Statement, TypeInner};
 
+use super::arrays::STEP_INPUT;
 use super::compose::Defines;
-use super::kernel::{MeshNumbers, reflect};
+use super::engine::GpuEngine;
+use super::kernel::{Kernel, MeshNumbers, reflect};
+use super::plan::{Features, defines, measure_threads, mesh_numbers};
+use super::structs::StepInput;
 use crate::engine::Stage;
 use crate::error::{Error, Result};
 
@@ -22,6 +26,59 @@ pub struct Work {
     pub flops: f64,
     /// Some loops have as many rounds as the data say, and count once: there may be more.
     pub at_least: bool,
+}
+
+/// What a stage moves and computes in one dispatch, see [`Work`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageLoad {
+    pub stage: Stage,
+    pub threads: u32,
+    /// Sizes of the arrays that it reads and of those that it writes [B].
+    pub bytes: f64,
+    /// It goes through the whole mesh, so that it moves these bytes; else it touches a part of them.
+    pub whole: bool,
+    pub flops: f64,
+    /// There may be more of them, see [`Work::at_least`].
+    pub at_least: bool,
+}
+
+impl GpuEngine {
+    /// What every stage moves and computes in one dispatch: arrays once each, whole.
+    ///
+    /// # Errors
+    /// `Error::Shader`, where a source has changed since.
+    pub fn loads(&self) -> Result<Vec<StageLoad>> {
+        let model = &*self.model;
+        let measure_threads = measure_threads(model);
+        let defines = defines(&model.effects, &Features::of(model));
+        let numbers = mesh_numbers(model, &self.layout, measure_threads);
+        let bytes = |names: &[String]| -> f64 {
+            let size = |name: &String| match name.as_str() {
+                // A step reads its own.
+                STEP_INPUT => size_of::<StepInput>() as f64,
+                name => self.buffers.get(name).map_or(0.0, |memory| memory.device_bytes() as f64),
+            };
+            names.iter().map(size).sum()
+        };
+        let load = |kernel: &Kernel| {
+            let threads = f64::from(kernel.threads());
+            // A thread has a strip of cells.
+            let rounds = match kernel.stage {
+                Stage::ElementForces => (model.mesh.cell_count() as f64 / threads).max(1.0),
+                _ => 1.0,
+            };
+            let work = work(kernel.stage, &defines, &numbers, rounds)?;
+            Ok(StageLoad {
+                stage: kernel.stage,
+                threads: kernel.threads(),
+                bytes: bytes(&work.read) + bytes(&work.written),
+                whole: threads * rounds >= model.mesh.cell_count().min(model.mesh.node_count()) as f64,
+                flops: work.flops * threads,
+                at_least: work.at_least,
+            })
+        };
+        self.kernels.iter().filter(|k| !k.stage.draws()).map(load).collect()
+    }
 }
 
 /// The work of a stage with these defines on a mesh with these numbers. `rounds`: how often a thread goes through the outermost loop that the

@@ -1,6 +1,6 @@
 //! The file that a run goes on from: `checkpoint.stylet`, replaced whole as the run goes, gone when it has ended well.
 //!
-//! Format: the line `stylet checkpoint 2`, then zlib of a postcard message. The checksum of zlib finds a damaged file.
+//! Format: the line `stylet checkpoint 3`, then zlib of a postcard message. The checksum of zlib finds a damaged file.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{BufReader, Read, Write};
@@ -19,7 +19,7 @@ use crate::simulation::checkpoint::Checkpoint;
 use crate::whole_file;
 use crate::{Error, Result};
 
-const MAGIC: &[u8] = b"stylet checkpoint 2\n";
+const MAGIC: &[u8] = b"stylet checkpoint 3\n";
 
 /// Bytes of a message that are unpacked to see whose it is.
 const FIRST: u64 = 4096;
@@ -41,6 +41,8 @@ pub struct RunCheckpoint {
     /// All records so far: tables and charts of the run are made of them.
     pub records: Vec<FrameRecord>,
     pub cells_in_needle: Option<u64>,
+    /// With a companion: the order that its band counts with, where one was observed.
+    pub error_bar: Option<Option<f64>>,
     /// Time and path of the field files so far.
     pub fields: Vec<(f64, String)>,
     /// Wall and CPU time of the steps so far [s].

@@ -179,6 +179,8 @@ pub struct Band {
     /// Order of the error in the cell edge, and whether a study has observed it; else it is assumed.
     pub order: f64,
     pub order_observed: bool,
+    /// Why the companion's numbers, and the band with them, are to be doubted.
+    pub companion_doubt: Option<String>,
     /// Mean difference of the two runs on the way in, times the factor of the band, over the mean force.
     pub mean_error: Option<f64>,
     /// Half-width of the band at the deepest point on the way in [N].

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::{Purpose, Simulation};
 use crate::error::Result;
 use crate::mesh::Mesh;
+use crate::model::Model;
 use crate::needle::motion::HandPose;
 use crate::observables::FrameRecord;
 use crate::observables::error_bar::ErrorBar;
@@ -44,7 +45,7 @@ impl Companion {
     }
 
     /// Scene, mesh and materials.
-    pub fn model(&self) -> &crate::model::Model {
+    pub fn model(&self) -> &Model {
         &self.simulation.model
     }
 

@@ -1,16 +1,23 @@
 //! From finished runs to what they tell: errors against the reference, fronts, orders, costs of effects.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
-use super::Settings;
 use super::advice::{self, Candidate};
 use super::metrics::{Errors, curve_error};
 use super::order::{self, Fit, Richardson};
 use super::pareto;
 use super::plan::{LeftOut, Plan, Role};
 use super::store::{RunRecord, Store};
+use super::{Settings, scene_hash};
 use crate::error::{Error, Result};
+use crate::reading;
+use crate::scene::Scene;
 use crate::units::{three_decimals, trimmed};
+
+/// What the errors and orders of the whole curve are called.
+const FORCE_CURVE: &str = "force curve";
 
 /// One finished run beside the reference.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +68,19 @@ pub struct Order {
     /// (edge [mm], value) of the three finest meshes, where the quantity is one number.
     pub values: Vec<(f64, f64)>,
     pub richardson: Option<Richardson>,
+}
+
+/// Order of the force curve that the study in this folder found; `None` where it holds none of this scene with these overrides, and where the
+/// curves did not converge.
+pub fn observed_order(folder: &Path, scene: &Scene, overrides: &[String]) -> Option<f64> {
+    let (store, plan) = Store::existing(folder).ok()?;
+    let text = reading::text(&scene.path, reading::most::SCENE).ok()?;
+    if plan.scene_hash != scene_hash(&text, overrides) {
+        return None;
+    }
+    let analysis = Analysis::read(&store, &plan).ok()?;
+    let curve = analysis.orders.iter().find(|order| order.what == FORCE_CURVE)?;
+    curve.fit.filter(|fit| fit.converges()).map(|fit| fit.order)
 }
 
 /// What an effect costs and what it changes.
@@ -244,7 +264,7 @@ fn orders(rows: &[Row], reference: &RunRecord) -> Vec<Order> {
     type Number = fn(&RunRecord) -> Option<f64>;
     type Of = fn(&Errors) -> Option<f64>;
     let quantities: [(&str, Of, Option<Number>); 5] = [
-        ("force curve", |e| e.force_curve, None),
+        (FORCE_CURVE, |e| e.force_curve, None),
         ("displacement field at the deepest point", |e| e.displacement, None),
         ("puncture force", |e| e.puncture_force, Some(|r| r.puncture_force_n)),
         ("depth of the puncture", |e| e.puncture_depth, Some(|r| r.puncture_depth_m.map(|d| d * 1e3))),
@@ -302,7 +322,7 @@ fn effect_costs(rows: &[Row], base: &RunRecord, settings: &Settings) -> Vec<Effe
 /// Convergence in mesh size in plain words, one sentence for the force curve and one per number with a limit.
 pub fn convergence_in_words(orders: &[Order]) -> Vec<String> {
     let mut sentences = Vec::new();
-    let Some(curve) = orders.iter().find(|o| o.what == "force curve") else {
+    let Some(curve) = orders.iter().find(|o| o.what == FORCE_CURVE) else {
         return vec!["Mesh size was not varied, so there is nothing to say about convergence in it.".into()];
     };
     let percent = |e: f64| format!("{} %", three_decimals(100.0 * e));

@@ -38,30 +38,26 @@ impl Errors {
     }
 }
 
-/// Relative L2 norm over depth of the difference of two curves (depth, force), depths ascending: the trapezoidal rule over the
-/// depths of the reference that both curves hold. `None` where they share fewer than two.
+/// Relative L2 norm over depth of the difference of two curves (depth, force), depths ascending. `None` where they share fewer than two depths of
+/// the reference.
 pub fn curve_error(curve: &[(f64, f64)], reference: &[(f64, f64)]) -> Option<f64> {
-    let shared: Vec<(f64, f64, f64)> =
-        reference.iter().filter_map(|(depth, force)| Some((*depth, *force, interpolated(curve, *depth)?))).collect();
-    let (mut difference, mut scale) = (0.0, 0.0);
-    for pair in shared.windows(2) {
-        let half = 0.5 * (pair[1].0 - pair[0].0);
-        difference += half * pair.iter().map(|(_, r, f)| (f - r).powi(2)).sum::<f64>();
-        scale += half * pair.iter().map(|(_, r, _)| r.powi(2)).sum::<f64>();
-    }
-    (scale > 0.0).then(|| (difference / scale).sqrt())
+    over_depth(curve, reference, |force| force * force).map(f64::sqrt)
 }
 
-/// Mean over depth of the difference of two curves (depth, force), depths ascending, over the mean force of the reference: the trapezoidal rule
-/// over the depths of the reference that both hold. `None` where they share fewer than two.
+/// Mean over depth of the difference of two such curves, over the mean force of the reference.
 pub fn mean_error(curve: &[(f64, f64)], reference: &[(f64, f64)]) -> Option<f64> {
+    over_depth(curve, reference, f64::abs)
+}
+
+/// Integral of `size` of the difference over that of the reference: the trapezoidal rule over the depths of the reference that both hold.
+fn over_depth(curve: &[(f64, f64)], reference: &[(f64, f64)], size: impl Fn(f64) -> f64) -> Option<f64> {
     let shared: Vec<(f64, f64, f64)> =
         reference.iter().filter_map(|(depth, force)| Some((*depth, *force, interpolated(curve, *depth)?))).collect();
     let (mut difference, mut scale) = (0.0, 0.0);
     for pair in shared.windows(2) {
         let half = 0.5 * (pair[1].0 - pair[0].0);
-        difference += half * pair.iter().map(|(_, r, f)| (f - r).abs()).sum::<f64>();
-        scale += half * pair.iter().map(|(_, r, _)| r.abs()).sum::<f64>();
+        difference += half * pair.iter().map(|(_, r, f)| size(f - r)).sum::<f64>();
+        scale += half * pair.iter().map(|(_, r, _)| size(*r)).sum::<f64>();
     }
     (scale > 0.0).then(|| difference / scale)
 }

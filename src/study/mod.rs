@@ -22,6 +22,7 @@ pub mod tables;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
+use crate::hash::fnv1a;
 use crate::simulation::EngineChoice;
 use crate::units::trimmed;
 
@@ -104,6 +105,11 @@ impl Axis {
             None => Ok(Axis::ALL.into_iter().filter(|axis| names.contains(&axis.key())).collect()),
         }
     }
+}
+
+/// What two studies must share to be joined: the scene file and its overrides, as one number.
+pub fn scene_hash(text: &str, overrides: &[String]) -> String {
+    fnv1a(&[text, &overrides.join("\n")])
 }
 
 /// Everything by which two runs of one study differ.

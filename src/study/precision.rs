@@ -17,6 +17,7 @@ use super::subject::{DECIMALS, Subject};
 use super::{Settings, runner};
 use crate::error::{Error, Result};
 use crate::observables::error_bar::{ASSUMED_ORDER, ORDERS, factor};
+use crate::simulation::advice::COARSEST;
 use crate::units::{rounded, three_digits, trimmed};
 
 /// Errors that can be asked for.
@@ -26,8 +27,6 @@ const PLANNED: f64 = 0.85;
 /// Widest cells of the first pair over those of the scene, and of each pair over the one before.
 const FIRST: f64 = 2.0;
 const FINER: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Widest cells in needle diameters: wider ones bend rather than part, see [`crate::simulation::advice`].
-const WIDEST_CELLS: f64 = 0.7;
 /// Factor between the two mass scalings that are compared.
 const LIGHTER: f64 = 4.0;
 /// Largest mass scaling over the one that was tried.
@@ -50,7 +49,7 @@ pub struct Choice {
     /// Runs that were made, and their wall time [s].
     pub runs: usize,
     pub took_s: f64,
-    /// Order of the error in the cell edge, where three meshes have shown it.
+    /// Order of the error in the cell edge, where three meshes or more have shown it.
     pub order: Option<f64>,
 }
 
@@ -117,7 +116,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The run with these settings; one that was stopped or is doubtful is an error with the reason.
+    /// The run with these settings, made once.
     fn run(&mut self, cell_size_mm: f64, mass_scaling: f64) -> Result<RunRecord> {
         let settings = Settings {
             cell_size_mm: rounded(cell_size_mm, DECIMALS),
@@ -194,7 +193,7 @@ impl Search<'_> {
 struct Law {
     a: f64,
     order: f64,
-    /// Three meshes have shown the order.
+    /// Three meshes or more have shown the order.
     observed: bool,
 }
 
@@ -235,7 +234,7 @@ pub fn choose(subject: &Subject, asked: f64, interrupted: &AtomicBool, told: &mu
     let aim = PLANNED * asked;
     // Pairs from coarse to fine, until the last one is not far from what is wanted. A single one may agree by chance.
     let mut pairs: Vec<(f64, f64)> = Vec::new();
-    let widest = subject.scene.needle().map_or(f64::INFINITY, |n| 1e3 * WIDEST_CELLS * 2.0 * n.radius);
+    let widest = subject.scene.needle().map_or(f64::INFINITY, |n| 1e3 * COARSEST * 2.0 * n.radius);
     let mut edge = widest.min(FIRST * base.cell_size_mm);
     for _ in 0..MOST_PAIRS {
         match search.apart(edge) {

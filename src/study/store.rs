@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::Settings;
 use super::plan::Plan;
 use crate::error::{Error, Result};
+use crate::output::folder::safe_name;
 use crate::reading;
 use crate::whole_file;
 
@@ -95,6 +96,11 @@ impl RunRecord {
         let cell_steps = self.cells as f64 * self.steps as f64;
         self.cpu_s.filter(|_| cell_steps > 0.0).map(|cpu| cpu * 1e9 / cell_steps)
     }
+}
+
+/// Where the study of a scene of this name goes by itself.
+pub fn default_folder(scene: &str) -> PathBuf {
+    PathBuf::from(format!("out/study_{}", safe_name(scene)))
 }
 
 /// An open folder.

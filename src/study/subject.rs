@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::{Engine, MeshSize, Settings};
+use super::{Engine, MeshSize, Settings, scene_hash};
 use crate::cpu::unknown_to_lanes;
 use crate::effects::{EFFECTS, Kind};
 use crate::engine::stable_dt::wave_speed_bound;
@@ -203,9 +203,9 @@ impl Subject {
         fnv1a(&[&self.text, &self.overrides.join("\n"), &settings, env!("CARGO_PKG_VERSION")])
     }
 
-    /// The same without the settings: what two studies must share to be joined.
+    /// The same without the settings, see [`scene_hash`].
     pub fn scene_hash(&self) -> String {
-        fnv1a(&[&self.text, &self.overrides.join("\n")])
+        scene_hash(&self.text, &self.overrides)
     }
 
     fn find_variants(&mut self) {

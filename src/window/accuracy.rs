@@ -1,20 +1,17 @@
 //! Accuracy against time: mesh and mass scaling with what they are predicted to cost, and the error where a study has measured it.
 
-use std::path::Path;
-
 use super::practice::Timing;
 use super::texts;
 use super::tuning::Tuning;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::output::folder::safe_name;
 use crate::scene::Scene;
 use crate::study::advice::Candidate;
 use crate::study::analysis::Analysis;
 use crate::study::plan::UnitCost;
 use crate::study::runner::predicted_factor;
-use crate::study::store::Store;
+use crate::study::store::{Store, default_folder};
 use crate::study::{MeshSize, Settings};
 
 /// What the sliders stand at, and what is known of it.
@@ -135,13 +132,14 @@ impl Accuracy {
 
 /// What a study of the scene in its usual folder found.
 fn studied(scene: &Scene) -> Vec<Candidate> {
-    let folder = format!("out/study_{}", safe_name(&scene.name));
-    let Ok((store, plan)) = Store::existing(Path::new(&folder)) else { return Vec::new() };
+    let Ok((store, plan)) = Store::existing(&default_folder(&scene.name)) else { return Vec::new() };
     Analysis::read(&store, &plan).map(|analysis| analysis.candidates()).unwrap_or_default()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     /// Nothing was timed yet: no factor, rather than an infinite one.

@@ -8,6 +8,8 @@ use crate::needle::motion::HandPose;
 use crate::observables::FrameRecord;
 use crate::simulation::Simulation;
 use crate::simulation::companion::{Companion, WIDER};
+use crate::study::analysis::observed_order;
+use crate::study::store::default_folder;
 
 /// Longest time that a companion, switched on late, may take of a frame to catch up [s].
 const CATCHING_UP: Duration = Duration::from_millis(8);
@@ -25,8 +27,10 @@ impl Band {
     /// # Errors
     /// `Error::Input` and `Error::Scene` where there can be no wider cells; as [`Companion::of`].
     pub fn of(main: &Simulation, source: &Source, poses: &[HandPose]) -> Result<Self> {
-        let wider = main.model.scene.wider_cells(WIDER)?;
-        let mut companion = Companion::of(main, source.with(&wider).scene()?, None)?;
+        let scene = &main.model.scene;
+        let wider = scene.wider_cells(WIDER)?;
+        let order = observed_order(&default_folder(&scene.name), scene, &source.overrides);
+        let mut companion = Companion::of(main, source.with(&wider).scene()?, order)?;
         poses.iter().for_each(|pose| companion.lead(pose));
         Ok(Band { companion, done: 0 })
     }
@@ -36,7 +40,7 @@ impl Band {
         self.companion.lead(pose);
     }
 
-    /// Gives the frames their bands, the last of them too unless the companion is behind.
+    /// Gives the frames their bands: the last one, and of those before it as many as time allows.
     pub fn fill(&mut self, records: &mut [FrameRecord]) {
         let begin = Instant::now();
         while self.done < records.len() && (self.done + 1 == records.len() || begin.elapsed() < CATCHING_UP) {

@@ -1,36 +1,32 @@
 //! The companion of a run: who it is, and what it tells at the end.
 
-use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use super::RunArgs;
 use crate::error::{Error, Result};
-use crate::hash::fnv1a;
 use crate::observables::FrameRecord;
 use crate::observables::error_bar::{ASSUMED_ORDER, factor};
 use crate::output::curve::frames_on_the_way_in;
-use crate::output::folder::safe_name;
 use crate::output::{Band, CurveFigures};
-use crate::reading;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 use crate::simulation::companion::{Companion, WIDER};
-use crate::study::analysis::Analysis;
+use crate::study::analysis::observed_order;
 use crate::study::metrics::mean_error;
 use crate::study::precision;
-use crate::study::store::Store;
+use crate::study::store::default_folder;
 use crate::study::subject::Subject;
 use crate::units::trimmed;
 
 /// A companion with the order that it counts with.
 pub struct Beside {
-    pub companion: Companion,
-    /// Observed in a study.
-    order: Option<f64>,
+    companion: Companion,
+    /// Where one was observed.
+    pub order: Option<f64>,
 }
 
 impl Beside {
-    /// The companion of a run at its beginning, announced. `overrides`: those with which the scene was read.
+    /// The companion of a run at its beginning, announced.
     ///
     /// # Errors
     /// `Error::Input` for a scene without a tool, and where there can be no wider cells; the text has the reason.
@@ -38,14 +34,15 @@ impl Beside {
         let overrides = &args.scene.overrides;
         let scene = &simulation.model.scene;
         let coarser = coarser(scene, overrides)?;
-        let study = study_folder(scene);
-        let known = observed_order(scene, overrides, &study);
-        let order = args.order.or(known);
+        let study = default_folder(&scene.name);
+        let order = args.order.unwrap_or_else(|| observed_order(&study, scene, overrides));
         let companion = Companion::of(simulation, coarser, order)?;
-        let by = match (args.order, known) {
-            (Some(order), _) => format!("order {order:.2} as the coarse runs have it"),
-            (_, Some(order)) => format!("order {order:.2} from {}", study.display()),
-            (None, None) => format!("order {ASSUMED_ORDER} assumed: no study of this scene in {}", study.display()),
+        let by = match (order, args.order) {
+            (Some(order), Some(_)) => format!("order {order:.2} as coarse runs or the run before had it"),
+            (Some(order), None) => format!("order {order:.2} from {}", study.display()),
+            (None, _) => {
+                format!("order {ASSUMED_ORDER} assumed: no study of this scene in {} has one", study.display())
+            }
         };
         let model = companion.model();
         eprintln!(
@@ -66,10 +63,12 @@ impl Beside {
         error
     }
 
-    /// Begins the band anew and takes it through these records.
-    pub fn follow(&mut self, records: &[FrameRecord]) {
+    /// Begins the band anew and takes it through these records, for a run that has gone on or back.
+    pub fn follow(&mut self, records: &mut [FrameRecord]) {
         self.companion.begin_again();
-        records.iter().for_each(|record| _ = self.error_of(record));
+        for record in records {
+            record.force_error = self.error_of(record);
+        }
     }
 
     /// What it tells of a whole run.
@@ -88,6 +87,7 @@ impl Beside {
             companion_wall_s: self.companion.taken.as_secs_f64(),
             order: self.order.unwrap_or(ASSUMED_ORDER),
             order_observed: self.order.is_some(),
+            companion_doubt: self.companion.records.last().and_then(|record| record.verdict.sentence()),
             mean_error: apart.map(|apart| factor(self.order) * apart),
             force_error_at_max_depth_n: at_the_deepest(records),
             puncture_depth_error_m: depth.map(|(a, b)| factor(self.order) * (a - b).abs()),
@@ -129,24 +129,6 @@ pub(super) fn choose(error: &str, args: &RunArgs, interrupted: &AtomicBool) -> R
     eprintln!("{}", choice.describe());
     let mut args = args.clone();
     args.scene.overrides.extend(choice.overrides());
-    (args.error_bar, args.order) = (true, choice.order);
+    (args.error_bar, args.order) = (true, Some(choice.order));
     Ok(args)
-}
-
-/// Where `stylet study` writes to by itself.
-fn study_folder(scene: &Scene) -> PathBuf {
-    PathBuf::from(format!("out/study_{}", safe_name(&scene.name)))
-}
-
-/// Order of the force curve that the study in this folder found; `None` where there is none of this scene with these overrides, and where its
-/// curves did not converge.
-fn observed_order(scene: &Scene, overrides: &[String], folder: &Path) -> Option<f64> {
-    let (store, plan) = Store::existing(folder).ok()?;
-    let text = reading::text(&scene.path, reading::most::SCENE).ok()?;
-    if plan.scene_hash != fnv1a(&[&text, &overrides.join("\n")]) {
-        return None;
-    }
-    let analysis = Analysis::read(&store, &plan).ok()?;
-    let curve = analysis.orders.iter().find(|order| order.what == "force curve")?;
-    curve.fit.filter(|fit| fit.converges()).map(|fit| fit.order)
 }

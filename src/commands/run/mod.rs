@@ -63,9 +63,9 @@ pub struct RunArgs {
     /// Choose cell edge and mass scaling for this error of the force, e.g. 5%, at the least time; with the error bar
     #[arg(long, value_name = "ERROR", conflicts_with = "resume")]
     pub error: Option<String>,
-    /// Order of the error in the cell edge that the band counts with, where it is known.
+    /// Order of the error in the cell edge that the band counts with, where that is decided: observed, or the assumed one.
     #[arg(skip)]
-    pub order: Option<f64>,
+    pub order: Option<Option<f64>>,
     /// Go on with the run in this folder, which was stopped; scene and overrides are those of the run
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "force", "overrides"])]
     pub resume: Option<PathBuf>,
@@ -86,7 +86,7 @@ impl RunArgs {
         };
         args.out = Some(folder.to_path_buf());
         args.scene.overrides = checkpoint.overrides.clone();
-        args.error_bar |= checkpoint.records.iter().any(|record| record.force_error.is_some());
+        (args.error_bar, args.order) = (args.error_bar || checkpoint.error_bar.is_some(), checkpoint.error_bar);
         args
     }
 }
@@ -211,7 +211,7 @@ impl<'a> Run<'a> {
     fn new(scene: Scene, args: &'a RunArgs, resumed: Option<&RunCheckpoint>) -> Result<Self> {
         let mut simulation = Simulation::new(scene, args.engine)?;
         let scene = simulation.model.scene.clone();
-        let beside = args.error_bar.then(|| Beside::of(&simulation, args)).transpose()?;
+        let mut beside = args.error_bar.then(|| Beside::of(&simulation, args)).transpose()?;
         // From here on there is something to keep.
         ending::begin();
         let resumed = resumed.zip(args.out.as_deref());
@@ -225,15 +225,18 @@ impl<'a> Run<'a> {
         let info = simulation.engine().info().clone();
         eprintln!("{}: {} on {} ({})", scene.name, info.engine, info.adapter, info.driver);
         let driven = DrivenFace::of_scene(&scene.faces, &simulation.model.mesh);
-        let records = resumed.map_or(&[][..], |(checkpoint, _)| &checkpoint.records);
+        let mut records = resumed.map_or(Vec::new(), |(checkpoint, _)| checkpoint.records.clone());
+        if let Some(beside) = &mut beside {
+            beside.follow(&mut records);
+        }
         let hollow = simulation.model.has_bore();
-        let tables = Tables::with_band(&output, &driven, hollow, &scene, records, beside.is_some())?;
+        let tables = Tables::with_band(&output, &driven, hollow, &scene, &records, beside.is_some())?;
         let mut run = Run {
             moments: moments(&simulation),
             fields: FieldFiles::new(&output),
             device: simulation.device().cloned(),
             clock: Clock::start((0.0, Some(0.0))),
-            records: records.to_vec(),
+            records,
             cells_in_needle: None,
             images: VecDeque::new(),
             before_doubt: None,
@@ -247,7 +250,6 @@ impl<'a> Run<'a> {
             driven,
             tables,
         };
-        run.follow_again();
         if let Some((checkpoint, _)) = resumed {
             eprintln!("going on at {:.3} s", checkpoint.records.last().map_or(0.0, |r| r.time));
             if checkpoint.adapter != run.info.adapter {
@@ -379,7 +381,10 @@ impl<'a> Run<'a> {
     }
 
     /// Starts the tables anew with these records.
-    fn keep_records(&mut self, records: Vec<FrameRecord>) -> Result<()> {
+    fn keep_records(&mut self, mut records: Vec<FrameRecord>) -> Result<()> {
+        if let Some(beside) = &mut self.beside {
+            self.clock.aside(|| beside.follow(&mut records));
+        }
         let hollow = self.simulation.model.has_bore();
         let band = self.beside.is_some();
         self.tables = Tables::with_band(&self.output, &self.driven, hollow, &self.scene, &records, band)?;
@@ -422,14 +427,6 @@ impl<'a> Run<'a> {
         Ok(Some(frame))
     }
 
-    /// Takes the companion to where a run is that has gone on or back.
-    fn follow_again(&mut self) {
-        let (records, beside) = (&self.records, &mut self.beside);
-        if let Some(beside) = beside {
-            self.clock.aside(|| beside.follow(records));
-        }
-    }
-
     fn keep_image(&mut self) -> Result<()> {
         if self.images.back().is_some_and(|newest| newest.frames == self.records.len() as u64) {
             return Ok(());
@@ -453,6 +450,7 @@ impl<'a> Run<'a> {
             adapter: self.info.adapter.clone(),
             records: self.records[..simulation.frames as usize].to_vec(),
             cells_in_needle: self.cells_in_needle,
+            error_bar: self.beside.as_ref().map(|beside| beside.order),
             fields: self.fields.written().to_vec(),
             wall: self.clock.wall(),
             cpu: self.clock.cpu(),

@@ -57,7 +57,6 @@ impl Run<'_> {
             self.simulation = next;
             let records = self.records[..image.frames as usize].to_vec();
             self.keep_records(records)?;
-            self.follow_again();
             self.images.clear();
             self.plan_stops();
             self.keep_image()?;

@@ -71,6 +71,9 @@ pub fn describe(summary: &Summary) -> String {
             100.0 * band.companion_wall_s / summary.wall_s.max(1e-9)
         );
     }
+    if let Some(doubt) = band.and_then(|band| band.companion_doubt.as_ref()) {
+        text += &format!("error bar: the companion is doubtful, and the band with it: {doubt}\n");
+    }
     if let Some(count) = summary.cells_in_needle {
         text += &format!(
             "needle: {count} cells of tissue within its wall at most, over the times of pictures and fields\n"
