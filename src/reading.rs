@@ -17,6 +17,8 @@ pub mod most {
     pub const CURVE: u64 = 16 << 20;
     /// A mesh: some two million tetrahedra as text.
     pub const MESH: u64 = 384 << 20;
+    /// A volume of labels, or its data file: some three whole bodies at 1 mm, uncompressed.
+    pub const VOLUME: u64 = 1 << 30;
     /// A table of a run.
     pub const TABLE: u64 = 256 << 20;
     /// A checkpoint, compressed: that of the main scene has a megabyte.
