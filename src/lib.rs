@@ -16,6 +16,7 @@
 #[macro_use]
 pub mod terminal;
 
+pub mod anatomy;
 #[cfg(feature = "cli")]
 pub mod commands;
 pub mod cpu;

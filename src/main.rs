@@ -9,6 +9,7 @@ use stylet::commands::bench::{self, BenchArgs};
 use stylet::commands::check::{self, CheckArgs};
 use stylet::commands::compare_adapters::{self, CompareArgs};
 use stylet::commands::fit_args::{self, FitArgs};
+use stylet::commands::import::{self, ImportArgs};
 use stylet::commands::material::{MaterialArgs, material};
 use stylet::commands::prepare::{self, PrepareArgs};
 use stylet::commands::replay::{self, ReplayArgs};
@@ -38,6 +39,8 @@ enum Command {
     Run(RunArgs),
     /// Open a window: lead the needle by hand, or watch, while the tissue is solved (build with --features window)
     View(ViewArgs),
+    /// Tell what a label map, a surface or a mesh holds and what a needle would cross; write a scene from it, and run it
+    Import(ImportArgs),
     /// Compute a recorded session again: the same forces, without a window
     Replay(ReplayArgs),
     /// Check a scene and tell what it means; a trial of its first steps, a second at most, predicts the time of a run
@@ -77,6 +80,7 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
     let text = match cli.command.unwrap_or(Command::Run(cli.run)) {
         Command::Run(args) => return run::execute(&args, start),
         Command::View(args) => return view::execute(&args, |args| open_window(args, start)),
+        Command::Import(args) => return import::execute(&args, start),
         Command::Replay(args) => return replay::execute(&args),
         Command::Check(args) => return check::execute(&args),
         Command::Bench(args) if args.effects => return bench_effects::execute(&args),

@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use crate::anatomy::{self, markups};
 use crate::error::{Error, Result};
 use crate::material::curves;
 use crate::mesh::import::{self, ImportOptions, LengthUnit};
@@ -38,6 +39,13 @@ const UNPACKED: usize = 1032 * 4 * 3;
 /// A vector whose damaged length promises much is given up to 1 MiB before its values are read; a few are open at once [B].
 const PROMISED: usize = 4 << 20;
 
+/// The tables of a bzip2 decoder for the largest block, and what a stream is unpacked in [B].
+const BZIP2: usize = 8 << 20;
+
+/// Bzip2 is let make at most 65536 bytes of one; a label of two bytes comes of each. A bit says where layers overlap, and text is there
+/// a few times over.
+const VOLUME: usize = 65536 * 9 / 4;
+
 /// All readers.
 pub const READERS: &[Reader] = &[
     Reader { name: "scene", read: scene, memory: (GRID_LINES, 1024) },
@@ -48,6 +56,8 @@ pub const READERS: &[Reader] = &[
     // Arrays of XML may be compressed; what they unpack to must agree with the counts of the file. A .vtk file may hold XML, too.
     Reader { name: "vtk", read: vtk, memory: (FEW, UNPACKED) },
     Reader { name: "vtu", read: vtu, memory: (FEW, UNPACKED) },
+    // A surface may be XML with such arrays.
+    Reader { name: "surface", read: surface, memory: (FEW, UNPACKED) },
     Reader { name: "abaqus", read: abaqus, memory: (FEW, 128) },
     Reader { name: "checkpoint", read: checkpoint, memory: (PROMISED, UNPACKED) },
     Reader { name: "checkpoint_message", read: checkpoint_message, memory: (PROMISED, 32) },
@@ -57,6 +67,13 @@ pub const READERS: &[Reader] = &[
     Reader { name: "study_run", read: study_run, memory: (FEW, 128) },
     Reader { name: "attempt", read: attempt, memory: (FEW, 128) },
     Reader { name: "session", read: session, memory: (FEW, 128) },
+    // Each tells its format from the content: a file for one of them may be NRRD, which alone may be compressed with bzip2.
+    Reader { name: "nrrd", read: nrrd, memory: (FEW + BZIP2, VOLUME) },
+    Reader { name: "nifti", read: nifti, memory: (FEW + BZIP2, VOLUME) },
+    Reader { name: "metaimage", read: metaimage, memory: (FEW + BZIP2, VOLUME) },
+    Reader { name: "markups", read: points, memory: (FEW, 256) },
+    #[cfg(feature = "cli")]
+    Reader { name: "label_names", read: label_names, memory: (FEW, 256) },
     // A body that is kept has at most 128 KiB, however much is promised; the others are skipped.
     #[cfg(feature = "link")]
     Reader { name: "link", read: link, memory: (FEW, 8) },
@@ -121,6 +138,11 @@ fn predictions(bytes: &[u8]) -> Result<()> {
     crate::predictions::file::parse(&place("predictions.toml"), text(bytes)?).map(drop).map_err(Error::Scene)
 }
 
+#[cfg(feature = "cli")]
+fn label_names(bytes: &[u8]) -> Result<()> {
+    crate::commands::import::names::parse("names.txt", text(bytes)?).map(drop)
+}
+
 fn materials(bytes: &[u8]) -> Result<()> {
     presets::parse_library(&place("materials.toml"), text(bytes)?).map(drop)
 }
@@ -149,6 +171,16 @@ fn vtu(bytes: &[u8]) -> Result<()> {
 
 fn abaqus(bytes: &[u8]) -> Result<()> {
     mesh("mesh.inp", bytes)
+}
+
+fn surface(bytes: &[u8]) -> Result<()> {
+    for surface in crate::anatomy::surface::parse("surface", bytes, 1e-3)?.surfaces {
+        let points = surface.points.len();
+        assert!(surface.triangles.iter().flatten().all(|n| (*n as usize) < points), "a corner is no point");
+        assert!(surface.triangles.iter().all(|[a, b, c]| a != b && b != c && c != a), "a triangle has two corners");
+        assert!(surface.points.iter().all(|x| x.is_finite()), "a point is nowhere");
+    }
+    Ok(())
 }
 
 fn checkpoint(bytes: &[u8]) -> Result<()> {
@@ -192,6 +224,32 @@ fn attempt(bytes: &[u8]) -> Result<()> {
 
 fn session(bytes: &[u8]) -> Result<()> {
     Session::from_bytes(&place("session.json"), bytes)?;
+    Ok(())
+}
+
+fn volume(name: &str, bytes: &[u8]) -> Result<()> {
+    let map = anatomy::parse(name, bytes)?.map;
+    assert!(map.labels.len() == map.size.iter().product::<usize>(), "a voxel has no label");
+    assert!(map.steps.determinant().abs() > 0.0 && map.origin.is_finite(), "a voxel has no volume or no place");
+    assert!(map.position(0, 0, 0).is_finite() && map.spacing().min_element() > 0.0, "voxels are nowhere");
+    Ok(())
+}
+
+fn nrrd(bytes: &[u8]) -> Result<()> {
+    volume("volume.nrrd", bytes)
+}
+
+fn nifti(bytes: &[u8]) -> Result<()> {
+    volume("volume.nii.gz", bytes)
+}
+
+fn metaimage(bytes: &[u8]) -> Result<()> {
+    volume("volume.mha", bytes)
+}
+
+fn points(bytes: &[u8]) -> Result<()> {
+    let points = markups::parse("points.mrk.json", bytes)?;
+    assert!(points.iter().all(|point| point.position.is_finite()), "a point is nowhere");
     Ok(())
 }
 

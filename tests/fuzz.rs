@@ -307,6 +307,8 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
         paths.sort();
         paths.iter().map(|p| std::fs::read(p).unwrap()).collect()
     };
+    let volumes =
+        |ends: &[&str]| -> Vec<Vec<u8>> { ends.iter().flat_map(|end| files("tests/anatomy/files", end)).collect() };
     let settings = Settings {
         cell_size_mm: 0.6,
         mass_scaling: 4000.0,
@@ -331,6 +333,7 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
         "vtk" => files("tests/meshes", "vtk"),
         "vtu" => files("tests/meshes", "vtu"),
         "abaqus" => files("tests/meshes", "inp"),
+        "surface" => ["stl", "obj", "ply", "vtp"].iter().flat_map(|e| files("tests/anatomy/files", e)).collect(),
         "checkpoint" => vec![checkpoint.0.clone()],
         "checkpoint_message" => vec![checkpoint.1.clone()],
         "curves" => files("assets/curves", "csv"),
@@ -399,6 +402,24 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
                 .collect();
             vec![serde_json::to_vec(&session).unwrap()]
         }
+        "nrrd" => volumes(&["nrrd"]),
+        "nifti" => volumes(&["nii", "gz"]),
+        "metaimage" => volumes(&["mha"]),
+        "markups" => vec![
+            b"# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n# columns = id,x,y,z,label,desc\n\
+              1,10.5,-2,30,\"entry, left\",\n2,11,-2.5,1e1,target,\n"
+                .to_vec(),
+            b"{\"markups\": [{\"type\": \"Fiducial\", \"coordinateSystem\": \"LPS\", \"coordinateUnits\": \"mm\", \"controlPoints\": [\
+              {\"id\": \"1\", \"label\": \"entry\", \"position\": [1.5, -2.0, 3.0], \"positionStatus\": \"defined\"}, \
+              {\"id\": \"2\", \"label\": \"target\", \"position\": [4, 5, 6]}]}]}"
+                .to_vec(),
+        ],
+        #[cfg(feature = "cli")]
+        "label_names" => vec![
+            b"# colours\n1 spleen 157 108 162 255\n2 rib left 4 253 232 158 255\n".to_vec(),
+            b"1 255 0 0 1 1 1 \"spleen\"\n".to_vec(),
+            b"{\"labels\": {\"background\": 0, \"spleen\": 1, \"rib left 4\": 2}}".to_vec(),
+        ],
         #[cfg(feature = "link")]
         "link" | "link_message" => {
             use stylet::link::message::{Content, Kind, NEWTON, Sensor, Status, Transform, Verb};
@@ -580,6 +601,14 @@ fn short_files_cannot_ask_for_much() {
     encoder.finish().unwrap();
     let (meant, bytes) = measured(|| named("checkpoint").survives(&bomb));
     assert!(!meant && bytes <= named("checkpoint").memory(bomb.len()), "{bytes} B for {} B", bomb.len());
+    // A volume whose stream goes on behind what its header promises is given up there.
+    let head = "NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 10 10 10\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n\
+                space origin: (0,0,0)\nencoding: gzip\n\n";
+    let mut encoder = flate2::write::GzEncoder::new(head.as_bytes().to_vec(), flate2::Compression::best());
+    std::io::Write::write_all(&mut encoder, &vec![0; 64 << 20]).unwrap();
+    let bomb = encoder.finish().unwrap();
+    let (meant, bytes) = measured(|| named("nrrd").survives(&bomb));
+    assert!(!meant && bytes < 1 << 20, "{bytes} B for {} B", bomb.len());
 }
 
 /// A damaged checkpoint that can be read all the same does not bring down the run that goes on from it.

@@ -125,6 +125,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
         title: "16G needle in calf muscle (made-up field)".into(),
         path: PathBuf::from("scenes/synthetic.toml"),
         tissue: Tissue {
+            top: 0.0,
             size: DVec3::new(20e-3, 20e-3, 16e-3),
             cell_size: 0.6e-3,
             fine_radius: 3e-3,
@@ -134,6 +135,7 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
         material: TissueMaterial::new("test", "test", ElasticLaw::mooney_rivlin(2e3, 1e3, 1e5), 1060.0),
         regions: Vec::new(),
         mesh: None,
+        case: None,
         supports: Vec::new(),
         faces: std::array::from_fn(|_| FaceCondition::default()),
         tool,

@@ -8,6 +8,7 @@ use glam::DVec3;
 use stylet::gpu::{Gpu, GpuEngine};
 use stylet::needle::{NeedleShape, Tool};
 use stylet::scene::{Scene, Target};
+use stylet::window::parts::Parts;
 use stylet::window::probe::{ATTENUATION, Probe, ProbePlane};
 use stylet::window::tool_shape::ToolPlace;
 use stylet::window::ultrasound::{DYNAMIC_RANGE, SIZE, Ultrasound, Window};
@@ -230,4 +231,31 @@ fn cost_of_a_picture() {
     draw(100);
     let cpu = stylet::process::cpu_seconds().zip(cpu).map(|(after, before)| (after - before) * 10.0);
     println!("processor time of a picture [ms]: {cpu:.2?}");
+}
+
+/// Below bone there is shadow, and what is fluid is darker than what lies around it.
+#[test]
+fn parts_of_a_patient_are_heard_with_their_shadow() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/cases/scene.toml");
+    let text = "[tissue]\nlabels = \"lumbar.nrrd\"\ncell_size_mm = 3\n[material]\nyoungs_modulus_kpa = 20\npoisson_ratio = 0.45\n\
+                [[region]]\nname = \"vertebrae\"\nlabel = [\"bone L3\", \"bone L4\"]\nrigid = true\n\
+                [needle]\ngauge = \"18G\"\ntip_length_mm = 4\n[motion]\nentry_ras_mm = [0, 0, 0]\ntarget_ras_mm = [0, 52, 0]\n\
+                [[motion.phase]]\nkind = \"insert\"\nspeed_mm_s = 20\n";
+    let model = model(Scene::parse(&path, text, &[]).unwrap());
+    let parts = Parts::of(&model.scene, &model.mesh).unwrap();
+    let anatomy = stylet::render::anatomy::Anatomy::of_scene(&model.scene).unwrap();
+    let number = |name: &str| anatomy.parts().iter().position(|part| part.name == name).unwrap();
+    assert!(parts.levels[number("cerebrospinal fluid")] > parts.levels[number("dura")] + 20.0);
+    let [nx, ny, nz] = parts.size;
+    let is_bone = |texel: [u8; 2]| anatomy.parts()[usize::from(texel[0])].name.starts_with("bone");
+    let mut below = 0;
+    for column in 0..nx * ny {
+        let above = |from: usize| (from + 1..nz).filter(|k| is_bone(parts.texels[k * nx * ny + column])).count();
+        for k in (0..nz).step_by(7) {
+            let texel = parts.texels[k * nx * ny + column];
+            assert_eq!(usize::from(texel[1]), above(k).min(255));
+            below += usize::from(texel[1] > 0 && !is_bone(texel));
+        }
+    }
+    assert!(below > 100, "{below} texels lie below bone");
 }

@@ -7,7 +7,7 @@ struct DamageParams {
     deletion: f32,
 }
 
-@group(0) @binding(11) var<uniform> damage: array<DamageParams, 16>;
+@group(0) @binding(11) var<uniform> damage: array<DamageParams, 256>;
 
 // d for the equivalent plastic strain `alpha` of a cell of edge `length`.
 fn degradation(number: u32, alpha: f32, length: f32) -> f32 {

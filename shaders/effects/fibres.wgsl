@@ -11,7 +11,7 @@ struct FibreParams {
     _pad1: f32,
 }
 
-@group(0) @binding(8) var<uniform> fibres: array<FibreParams, 16>;
+@group(0) @binding(8) var<uniform> fibres: array<FibreParams, 256>;
 
 // Stress added to P_iso, and its tangent bound.
 struct FibreStress {

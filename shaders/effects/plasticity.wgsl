@@ -9,7 +9,7 @@ struct PlasticState {
     z: vec4<f32>,
 }
 
-@group(0) @binding(7) var<uniform> plasticity: array<PlasticityParams, 16>;
+@group(0) @binding(7) var<uniform> plasticity: array<PlasticityParams, 256>;
 @group(3) @binding(9) var<storage, read_write> plastic_state: array<PlasticState>;
 
 // Flow begins where the overstress is worth a thousandth of the strain at yield within these limits, and ends where it is

@@ -30,7 +30,7 @@ struct ViscousLayout {
     _pad2: u32,
 }
 
-@group(0) @binding(9) var<uniform> prony: array<PronySeries, 16>;
+@group(0) @binding(9) var<uniform> prony: array<PronySeries, 256>;
 @group(0) @binding(10) var<uniform> viscous_layout: ViscousLayout;
 // Per cell the sum of all q_i, then q_1, q_2, ...
 @group(3) @binding(10) var<storage, read_write> viscous_state: array<ViscousStress>;

@@ -5,7 +5,8 @@ struct View {
     towards: vec4<f32>,
     // Low and high end of the field, its lane, 1 where the scale is logarithmic.
     range: vec4<f32>,
-    // How much of the tissue's surface, and of layers that are seen through, is drawn, 0..1; z, w unused.
+    // How much of the tissue's surface, and of layers that are seen through, is drawn, 0..1; nodes from
+    // row to row and from layer to layer of a block with labels.
     surface: vec4<f32>,
 }
 

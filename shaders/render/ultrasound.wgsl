@@ -17,9 +17,12 @@ struct Slice {
     // Gain [dB]; what attenuation takes beyond what the time gain gives back [dB/m]; range from black to white [dB]; unused.
     scan: vec4<f32>,
     echo_count: u32,
-    _pad0: u32,
-    _pad1: u32,
-    _pad2: u32,
+    // Where in `echoes` the parts of a label map begin; how many there are, 0: no label map.
+    first_part: u32,
+    part_count: u32,
+    _pad: u32,
+    // Low corner of the texture of parts at rest, and edge of its texels [m].
+    parts_low: vec4<f32>,
 }
 
 // Where tissue of a certain brightness lies at rest [m]; later ones lie over earlier ones.
@@ -38,15 +41,24 @@ struct Echo {
 }
 
 @group(0) @binding(0) var<uniform> slice: Slice;
-@group(0) @binding(1) var<uniform> echoes: array<Echo, 64>;
+@group(0) @binding(1) var<uniform> echoes: array<Echo, 256>;
 // Displacement in fixed point, 2^-36 m; rest position [m].
 @group(0) @binding(2) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(0) @binding(3) var<storage, read> node_rest: array<vec4<f32>>;
+// Number of the part at rest, and texels of bone or air above it.
+@group(0) @binding(4) var parts: texture_3d<u32>;
 
 const DISPLACEMENT_UNIT: f32 = 1.4551915228366852e-11;
 const TAU: f32 = 6.283185307179586;
 // Standard deviation of the drawn boundaries and walls [m].
 const LINE: f32 = 0.05e-3;
+// What a texel of bone or air takes, and what is lost below it at most [dB].
+const LOSS: f32 = 9.0;
+const MOST_LOSS: f32 = 42.0;
+// Step of brightness at which a boundary answers in full [dB], its amplitude, and the part that is seen from every side.
+const FULL_STEP: f32 = 40.0;
+const PART_EDGE: f32 = 0.32;
+const PART_ASIDE: f32 = 0.05;
 
 // Clip coordinates of a place in the picture [m].
 fn on_picture(place: vec2<f32>) -> vec4<f32> {
@@ -143,11 +155,42 @@ fn decibel(amplitude: f32) -> f32 {
     return 8.685889638 * log(max(amplitude, 1e-6));
 }
 
+// Brightness of the parts around a point of the material, and texels of bone or air above it; between texels their mean, so that a
+// boundary is no staircase.
+fn part_level(X: vec3<f32>) -> vec2<f32> {
+    let size = vec3<i32>(textureDimensions(parts));
+    let at = (X - slice.parts_low.xyz) / slice.parts_low.w - 0.5;
+    let low = floor(at);
+    let share = at - low;
+    var sum = vec2<f32>(0.0);
+    for (var n = 0; n < 8; n++) {
+        let step = vec3<i32>(n & 1, (n >> 1u) & 1, n >> 2u);
+        let weights = mix(1.0 - share, share, vec3<f32>(step));
+        let texel = textureLoad(parts, clamp(vec3<i32>(low) + step, vec3<i32>(0), size - 1), 0);
+        let found = vec2<f32>(echoes[slice.first_part + texel.x].level, f32(texel.y));
+        sum += weights.x * weights.y * weights.z * found;
+    }
+    return sum;
+}
+
 @fragment
 fn slice_colour(corner: SliceCorner) -> @location(0) vec4<f32> {
     // Brightness of the tissue, and amplitude of the boundaries: a smooth one answers where the beam meets it square.
     var level = echoes[0].level;
     var boundary = 0.0;
+    var lost = 0.0;
+    if (slice.part_count > 0u) {
+        let here = part_level(corner.rest);
+        level = here.x;
+        lost = min(LOSS * here.y, MOST_LOSS);
+        let along = 0.4 * slice.parts_low.w * slice.depth.xyz;
+        let aside = 0.4 * slice.parts_low.w * slice.lateral.xyz;
+        let down = part_level(corner.rest + along).x - part_level(corner.rest - along).x;
+        let across = part_level(corner.rest + aside).x - part_level(corner.rest - aside).x;
+        let steep = down * down + across * across;
+        let square = down * down / max(steep, 1e-6);
+        boundary = PART_EDGE * min(sqrt(steep) / FULL_STEP, 1.0) * mix(square * square, 1.0, PART_ASIDE);
+    }
     for (var n = 0u; n < slice.echo_count; n++) {
         let way = outside(echoes[n], corner.rest);
         let slope = vec2<f32>(dpdx(way), dpdy(way));
@@ -165,7 +208,7 @@ fn slice_colour(corner: SliceCorner) -> @location(0) vec4<f32> {
     let rest = vec2<f32>(dot(corner.rest, slice.lateral.xyz), dot(corner.rest, slice.depth.xyz));
     let echo = envelope(rest);
     let amplitude = echo * exp(level / 8.685889638) + boundary * (0.3 + 0.7 * echo);
-    let shown = decibel(amplitude) + slice.scan.x - slice.scan.y * max(corner.depth, 0.0);
+    let shown = decibel(amplitude) - lost + slice.scan.x - slice.scan.y * max(corner.depth, 0.0);
     return vec4<f32>(vec3<f32>(clamp(1.0 + shown / slice.scan.z, 0.0, 1.0)), 1.0);
 }
 

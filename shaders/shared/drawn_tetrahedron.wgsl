@@ -2,6 +2,9 @@
 #import shared/drawn_cell
 #import shared/tetrahedron
 #import shared/averaged_dilatation
+#ifdef PUNCTURE
+#import effects/puncture
+#endif
 
 fn drawn_cell(index: u32) -> DrawnCell {
     let tet = tetrahedra[index];
@@ -21,6 +24,9 @@ fn drawn_cell(index: u32) -> DrawnCell {
     out.material = material_number(tet);
     out.length = tet.gradient_c_and_edge.w;
     out.kept = 1.0;
+#ifdef PUNCTURE
+    out.kept = cell_stiffness[index];
+#endif
     out.tissue = true;
     return out;
 }

@@ -15,10 +15,11 @@ struct Material {
     law: u32,
 }
 
-@group(0) @binding(6) var<uniform> materials: array<Material, 16>;
+@group(0) @binding(6) var<uniform> materials: array<Material, 256>;
 
 #ifdef REGIONS
-// Index of the material per cell.
+// Index of the material per cell. Where cells are empty, 256 is added where open sides of the tissue meet, and behind the cells stand the
+// strips that hold tissue: strip times the number of columns, and the column.
 @group(1) @binding(7) var<storage, read> cell_material: array<u32>;
 #endif
 
@@ -44,10 +45,14 @@ struct IsochoricStress {
 #end
 
 fn material_of(cell: u32) -> u32 {
+#ifdef EMPTY_CELLS
+    return cell_material[cell] & 255u;
+#else
 #ifdef REGIONS
     return cell_material[cell];
 #else
     return 0u;
+#endif
 #endif
 }
 

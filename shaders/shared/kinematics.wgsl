@@ -127,10 +127,20 @@ fn jacobian_minus_one(H: mat3x3<f32>) -> f32 {
     return H[0].x + H[1].y + H[2].z + minors + dot(H[0], cross(H[1], H[2]));
 }
 
+#ifdef EARLY_FLATNESS
+// Constant of src/effects/puncture.rs.
+#const FLAT_UNDER_NEEDLE
+
+// min(0, J - J_c): how far a tetrahedron under a needle is on its way to being flat or inside out.
+fn flatness(dj: f32) -> f32 {
+    return min(1.0 + dj - FLAT_UNDER_NEEDLE, 0.0);
+}
+#else
 // min(0, J - 0.3): how far a cell is on its way to being flat or inside out.
 fn flatness(dj: f32) -> f32 {
     return min(1.0 + dj - J_CONTINUATION, 0.0);
 }
+#endif
 
 // F = I + H.
 fn deformation_gradient(H: mat3x3<f32>) -> mat3x3<f32> {

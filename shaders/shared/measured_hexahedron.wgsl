@@ -23,5 +23,9 @@ fn measured_cell(index: u32) -> MeasuredCell {
 #endif
     out.energy = cell_energy(cell, material_of(index), out.kept, &u);
     out.volume = column_area(column_at(cell.x, cell.y)) * layer_edge(cell.z).length;
+#ifdef EMPTY_CELLS
+    // No tissue, like a gap.
+    out.volume = select(0.0, out.volume, materials[material_of(index)].bulk_modulus > 0.0);
+#endif
     return out;
 }

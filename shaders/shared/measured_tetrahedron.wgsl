@@ -2,6 +2,9 @@
 #import shared/cell_energy
 #import shared/tetrahedron
 #import shared/averaged_dilatation
+#ifdef PUNCTURE
+#import effects/puncture
+#endif
 
 fn measured_cell(index: u32) -> MeasuredCell {
     let tet = tetrahedra[index];
@@ -11,11 +14,14 @@ fn measured_cell(index: u32) -> MeasuredCell {
     let d = relative_displacement(node_displacement[tet.nodes.w], origin);
     let number = material_number(tet);
     let averaged = averaged_energy(tet.nodes, materials[number].bulk_modulus);
-    let place = PointPlace(index, number, tet.gradient_c_and_edge.w, 1.0, 0.0, averaged);
-    let point = point_energy(place, tetrahedron_gradient(tet, b, c, d));
     var out: MeasuredCell;
-    out.volume = tet.gradient_b_and_volume.w;
     out.kept = 1.0;
+#ifdef PUNCTURE
+    out.kept = cell_stiffness[index];
+#endif
+    let place = PointPlace(index, number, tet.gradient_c_and_edge.w, out.kept, 0.0, averaged);
+    let point = point_energy(place, tetrahedron_gradient(tet, b, c, d));
+    out.volume = tet.gradient_b_and_volume.w;
     let edges = max(max(abs(b), abs(c)), abs(d));
     let across = max(max(abs(c - b), abs(d - c)), abs(b - d));
     out.apart = largest_component(max(edges, across));

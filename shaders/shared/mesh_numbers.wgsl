@@ -16,6 +16,9 @@ override COLUMN_COUNT: u32 = 1u;
 override STRIP_LAYERS: u32 = 1u;
 override STRIP_COUNT: u32 = 1u;
 override PADDED_COLUMNS: u32 = 9u;
+// Strips that hold tissue, and nodes in groups of 64 among which one moves.
+override BUSY_STRIP_COUNT: u32 = 1u;
+override BUSY_NODE_COUNT: u32 = 64u;
 // Threads of the measuring stages.
 override MEASURE_THREADS: u32 = 64u;
 // Fixed displacement components per face, bits 0..2 = x, y, z.

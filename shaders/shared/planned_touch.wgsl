@@ -17,11 +17,19 @@ fn tip_share(contact: Contact) -> vec4<f32> {
     var share = vec2<f32>(0.0);
     let near = abs(contact.rest_axial - tip_state.coordinate) <= puncture.anchor_reach;
     for (var anchor = select(ANCHOR_COUNT, 0u, near); anchor < ANCHOR_COUNT; anchor++) {
+#ifdef TETRAHEDRA
+        let nodes = tip_anchor_loads[anchor].cell;
+        let load = tip_anchor_loads[anchor].load;
+        let weights = vec4<f32>(load.xyz, 1.0 - load.x - load.y - load.z);
+        let weight = dot(select(vec4<f32>(0.0), weights, nodes == vec4<u32>(contact.node)), vec4<f32>(1.0));
+        share += vec2<f32>(load.w, select(0.0, 1.0, load.w != 0.0)) * weight;
+#else
         let cell = tip_anchor_loads[anchor].cell.xyz;
         let load = tip_anchor_loads[anchor].load;
         let weight = select(vec3<f32>(0.0), 1.0 - load.xyz, contact.grid == cell)
             + select(vec3<f32>(0.0), load.xyz, contact.grid == cell + 1u);
         share += vec2<f32>(load.w, select(0.0, 1.0, load.w != 0.0)) * (weight.x * weight.y * weight.z);
+#endif
     }
     return vec4<f32>(step_input.direction.xyz * share.x, share.y);
 }

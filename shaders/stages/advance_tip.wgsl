@@ -3,7 +3,9 @@
 #import shared/params
 #import shared/step_input
 #import shared/displacement
+#ifndef TETRAHEDRA
 #import shared/grid_lines
+#endif
 #import effects/puncture
 #import shared/tip_written
 #ifdef ADHESION
@@ -34,6 +36,9 @@ const LANES: u32 = 32u;
 var<workgroup> bond_force: f32;
 var<workgroup> bond_energy: f32;
 
+#ifdef TETRAHEDRA
+#import shared/tetrahedron_anchor
+#else
 struct AnchorPlace {
     cell: vec3<u32>,
     local: vec3<f32>,
@@ -86,6 +91,7 @@ fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     place.stretch = stretch;
     return place;
 }
+#endif
 
 @compute @workgroup_size(LANES)
 fn advance_tip(@builtin(local_invocation_index) lane: u32) {
@@ -189,7 +195,11 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
 #endif
         gaps[lane] = place.gap;
         distances[lane] = place.distance;
+#ifdef TETRAHEDRA
+        tip_anchor_loads[lane].cell = place.cell;
+#else
         tip_anchor_loads[lane].cell = vec4<u32>(place.cell, 0u);
+#endif
         tip_anchor_loads[lane].load = vec4<f32>(place.local, force + bond_force / f32(ANCHOR_COUNT));
     }
     workgroupBarrier();

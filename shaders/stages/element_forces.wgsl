@@ -41,11 +41,20 @@ fn largest_square(diagonal: vec3<f32>, xy: f32, yz: f32, zx: f32, on_edge: bool)
 @compute @workgroup_size(64)
 fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let thread = thread_index(id, groups);
+#ifdef EMPTY_CELLS
+    if (thread >= BUSY_STRIP_COUNT) {
+        return;
+    }
+    let busy = cell_material[CELL_COUNT + thread];
+    let strip = quotient(busy, COLUMN_COUNT);
+    let column = busy - strip * COLUMN_COUNT;
+#else
     if (thread >= COLUMN_COUNT * STRIP_COUNT) {
         return;
     }
     let strip = quotient(thread, COLUMN_COUNT);
     let column = thread - strip * COLUMN_COUNT;
+#endif
     let j = quotient(column, CELLS_X);
     let i = column - j * CELLS_X;
     let first = strip * STRIP_LAYERS;
@@ -121,7 +130,11 @@ fn element_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let cy = pull_eta(shape, point.cof[0], point.cof[1]);
         let cz = point.cof[2] * edge_z.quarter_inverse;
 #ifdef INNER_BOUND
+#ifdef EMPTY_CELLS
+        let on_edge = cell_material[cell] >= 256u;
+#else
         let on_edge = open_sides + open_side(k, CELLS_Z - 1u, 4u, FIXED_Z_MIN, FIXED_Z_MAX) > 1u;
+#endif
 #else
         let on_edge = true;
 #endif

@@ -27,6 +27,9 @@
 #ifdef TIED
 #import shared/tied_nodes
 #endif
+#ifdef EMPTY_CELLS
+#import shared/busy_nodes
+#endif
 
 @group(1) @binding(1) var<storage, read> node_mass: array<f32>;
 // u in fixed point; w: steps of this frame in which the mass of the node was raised.
@@ -36,7 +39,15 @@
 
 @compute @workgroup_size(64)
 fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+#ifdef EMPTY_CELLS
+    let thread = thread_index(id, groups);
+    if (thread >= BUSY_NODE_COUNT) {
+        return;
+    }
+    let node = busy_node(thread);
+#else
     let node = thread_index(id, groups);
+#endif
     if (node >= NODE_COUNT) {
         return;
     }
@@ -77,7 +88,12 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
     let half = 0.5 * params.mass_damping * params.dt;
     var next = (old.xyz * (1.0 - half) + force * (params.dt / mass)) / (1.0 + half);
-    let is_free = vec3<f32>((vec3<u32>(held_components(place)) & vec3<u32>(1u, 2u, 4u)) == vec3<u32>(0u));
+#ifdef EMPTY_CELLS
+    let held = held_components(place) | standing_components(thread);
+#else
+    let held = held_components(place);
+#endif
+    let is_free = vec3<f32>((vec3<u32>(held) & vec3<u32>(1u, 2u, 4u)) == vec3<u32>(0u));
     // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
     next *= is_free;
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.

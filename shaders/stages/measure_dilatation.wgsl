@@ -11,6 +11,9 @@
 #ifdef DAMAGE
 #import effects/damage
 #endif
+#ifdef PUNCTURE
+#import effects/puncture
+#endif
 
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
@@ -24,6 +27,9 @@ fn stiffness_left(cell: u32, tet: Tetrahedron) -> f32 {
     alpha = plastic_state[cell].x.w;
 #endif
     left -= degradation(material_number(tet), alpha, tet.gradient_c_and_edge.w);
+#endif
+#ifdef PUNCTURE
+    left *= cell_stiffness[cell];
 #endif
     return left;
 }

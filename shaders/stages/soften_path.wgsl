@@ -7,12 +7,18 @@
 #endif
 #import shared/displacement
 #import shared/material_point
+#ifdef TETRAHEDRA
+#import shared/softened_tetrahedron
+#else
 #import shared/hexahedron_energy
+#endif
 #import effects/puncture
 #import shared/tip_read
 
+#ifndef TETRAHEDRA
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
+#endif
 
 @compute @workgroup_size(64)
 fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -32,6 +38,9 @@ fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
 #endif
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
     for (var once = select(1u, 0u, remaining < old); once == 0u; once++) {
+#ifdef TETRAHEDRA
+        let energy = softened_energy(path.cell, path.material);
+#else
         let layer = CELLS_X * CELLS_Y;
         let k = quotient(path.cell, layer);
         let j = quotient(path.cell - k * layer, CELLS_X);
@@ -44,6 +53,7 @@ fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
                 - node_velocity[node].xyz * (0.5 * params.dt);
         }
         let energy = cell_energy(cell, path.material, 1.0, &u);
+#endif
         // What Prony terms hold is booked with their work, which the softening does not touch.
         path_cells[index].dissipation += (old - remaining) * (energy.elastic - energy.held + energy.hourglass);
         cell_stiffness[path.cell] = remaining;

@@ -9,6 +9,9 @@
 #import shared/material_point
 #import shared/tetrahedron
 #import shared/averaged_dilatation
+#ifdef PUNCTURE
+#import effects/puncture
+#endif
 
 // Forces of cells on their corners, those of one node side by side: x, y, z [N]; w: bound of the stiffness there
 // [N/m], zero without mass scaling.
@@ -57,7 +60,11 @@ fn tetrahedron_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num
 #ifdef DAMAGE
     energy = averaged_energy(tet.nodes, materials[number].bulk_modulus);
 #endif
-    let point = material_point(PointPlace(cell, number, tet.gradient_c_and_edge.w, 1.0, 0.0, energy), H);
+    var kept = 1.0;
+#ifdef PUNCTURE
+    kept = cell_stiffness[cell];
+#endif
+    let point = material_point(PointPlace(cell, number, tet.gradient_c_and_edge.w, kept, 0.0, energy), H);
     let volume = tet.gradient_b_and_volume.w;
     let gb = tet.gradient_b_and_volume.xyz;
     let gc = tet.gradient_c_and_edge.xyz;

@@ -176,6 +176,13 @@ fn describe_shape(shape: &RegionShape) -> String {
             format!("cylinder of {} mm from {} to {} mm", mm(*radius), point(from), point(to))
         }
         RegionShape::MeshTag(tag) => format!("cells of the mesh called {tag}"),
+        RegionShape::Labels { labels, case } => {
+            let named = |label: &u16| match case.map.names.get(label) {
+                Some(name) => format!("{label} \"{name}\""),
+                None => label.to_string(),
+            };
+            format!("label {}", labels.iter().map(named).collect::<Vec<_>>().join(", "))
+        }
     }
 }
 

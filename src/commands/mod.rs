@@ -10,6 +10,7 @@ pub mod check_penetration;
 pub mod compare_adapters;
 pub mod fit;
 pub mod fit_args;
+pub mod import;
 pub mod material;
 pub mod prepare;
 pub mod replay;

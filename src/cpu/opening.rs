@@ -305,8 +305,8 @@ impl Shape<'_> {
     fn stress_and_bound(&self, f: DMat3) -> (DMat3, TangentBound) {
         let h = f - DMat3::IDENTITY;
         if let Some((law, state)) = self.regular.as_ref().zip(Regular::new(h.to_cols_array_2d())) {
-            let [straight, turned] = state.tangent_bound(law, self.material.law.bulk_modulus);
-            let stress = state.stress(law, 0.0);
+            let [straight, turned] = state.tangent_bound(&law.in_lanes(0.0), self.material.law.bulk_modulus);
+            let stress = state.stress(&law.in_lanes(0.0), 0.0);
             return (DMat3::from_cols_array_2d(&stress), TangentBound { straight, turned });
         }
         (self.stress(f), self.material.tangent_bound(h, &PointState::default()))
@@ -315,7 +315,7 @@ impl Shape<'_> {
     fn stress(&self, f: DMat3) -> DMat3 {
         let h = f - DMat3::IDENTITY;
         if let Some((law, state)) = self.regular.as_ref().zip(Regular::new(h.to_cols_array_2d())) {
-            return DMat3::from_cols_array_2d(&state.stress(law, 0.0));
+            return DMat3::from_cols_array_2d(&state.stress(&law.in_lanes(0.0), 0.0));
         }
         self.material.stress(h, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default())
     }

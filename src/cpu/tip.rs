@@ -6,10 +6,13 @@ use super::CpuEngine;
 use crate::effects::adhesion::{self, Bond};
 use crate::effects::puncture::{self, advance_limit, bounded_stretch, tip_advance};
 use crate::engine::elements::CellStates;
-use crate::mesh::{BlockMesh, CORNERS};
+use crate::mesh::{BlockMesh, CORNERS, Mesh};
 use crate::model::PuncturePlan;
 use crate::needle::ToolPose;
 use crate::needle::tip_contact::Touch;
+
+/// Nodes around a material point, their weights, and the derivative of the weights along the path [1/m].
+type Around = ([usize; 8], [f64; 8], [f64; 8]);
 
 /// An anchor at the material coordinate of the tip.
 struct PlacedAnchor {
@@ -49,9 +52,22 @@ impl TipLoads {
 }
 
 impl CpuEngine {
+    /// What is around the anchor number `index` at the material coordinate `a` [m].
+    fn around_anchor(mesh: &Mesh, plan: &PuncturePlan, index: usize, a: f64, direction: DVec3) -> Around {
+        match mesh {
+            Mesh::Block(block) => Self::locate(block, plan.anchors[index].surface + direction * a, direction),
+            Mesh::Tets(_) => {
+                let (nodes, weights, slopes) = plan.lines[index].weights(a);
+                let none = |values: [f64; 4]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
+                let nodes = std::array::from_fn(|i| nodes[i.min(3)] as usize);
+                (nodes, none(weights), none(slopes))
+            }
+        }
+    }
+
     /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction` (in a bent grid the
     /// direction of its axis).
-    fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> ([usize; 8], [f64; 8], [f64; 8]) {
+    fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> Around {
         let ([i, j, k], xi) = mesh.locate(x);
         let cell = mesh.cell_index(i, j, k);
         let width = mesh.cell_size(cell);
@@ -72,17 +88,15 @@ impl CpuEngine {
     /// `a = a_exit` on.
     pub(super) fn advance_tip(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
         let model = self.model.clone();
-        let mesh = model.mesh.block();
+        let mesh = &model.mesh;
         let t = pose.direction;
         let count = plan.anchors.len() as f64;
         let spring = plan.params.tip_stiffness / count;
         let tip_axial = (pose.tip - plan.path.entry).dot(t);
         let place = |u: &[DVec3], a: f64| -> Vec<PlacedAnchor> {
-            plan.anchors
-                .iter()
-                .map(|anchor| {
-                    let x = anchor.surface + t * a;
-                    let (nodes, weights, slope) = Self::locate(mesh, x, t);
+            (0..plan.anchors.len())
+                .map(|index| {
+                    let (nodes, weights, slope) = Self::around_anchor(mesh, plan, index, a, t);
                     let (mut du, mut stretch) = (0.0, 1.0);
                     for i in 0..8 {
                         let along = u[nodes[i]].dot(t);
@@ -205,12 +219,14 @@ impl CpuEngine {
         }
         // Half a step back: the mean of the energies before and after the step, as the leapfrog work has it.
         let half = 0.5 * self.dt;
+        let place = |node: usize| self.state.displacement[node] - self.state.velocity[node] * half;
         let mut u = [DVec3::ZERO; 8];
         for (u, n) in u.iter_mut().zip(self.model.mesh.cell_nodes(cell).iter()) {
-            *u = self.state.displacement[*n] - self.state.velocity[*n] * half;
+            *u = place(*n);
         }
         let intact = CellStates { points: &self.state.points, stiffness: &[] };
-        let m = self.elements.measure_corners(&self.model, cell, &u, None, intact);
+        let averaged = self.elements.averaged_energy_of(&self.model, cell, place);
+        let m = self.elements.measure_corners(&self.model, cell, &u, averaged, intact);
         // What Prony terms hold is booked with their work, which the softening does not touch.
         self.sums.energy.softening += (old - factor) * (m.elastic - m.held + m.hourglass);
         self.state.stiffness[cell] = factor;

@@ -120,6 +120,8 @@ pub struct TissueMaterial {
     pub toughness: Option<f64>,
     /// Stretch at which it tears; `None`: it holds any.
     pub tear_stretch: Option<f64>,
+    /// Bone and the like: it does not deform, and a needle does not enter it.
+    pub rigid: bool,
 }
 
 impl TissueMaterial {
@@ -139,6 +141,7 @@ impl TissueMaterial {
             membrane_energy: None,
             toughness: None,
             tear_stretch: None,
+            rigid: false,
         }
     }
 
@@ -182,13 +185,6 @@ pub enum Kind {
     Tool,
 }
 
-impl Kind {
-    /// True for effects that work on the block only.
-    pub const fn needs_block(self) -> bool {
-        matches!(self, Kind::Faces | Kind::Contact | Kind::Tool)
-    }
-}
-
 /// What the program knows about an effect without running it.
 #[derive(Debug, Clone, Copy)]
 pub struct Effect {
@@ -208,6 +204,14 @@ pub struct Effect {
     pub cost: &'static str,
     /// Numbers that may be changed while a run goes on.
     pub parameters: &'static [parameter::Parameter],
+}
+
+impl Effect {
+    /// True for effects that work on the block only: faces between cells of a grid, the top face under an indenter, a beam beside
+    /// the grid.
+    pub fn needs_block(&self) -> bool {
+        matches!(self.key, "cohesive" | "indentation" | "flexible_needle")
+    }
 }
 
 impl EffectSet {

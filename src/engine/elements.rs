@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use crate::effects::puncture::FLAT_UNDER_NEEDLE;
 use crate::material::TangentBound;
 use crate::material::kinematics::{J_CONTINUATION, cofactor, jacobian_minus_one};
 use crate::material_point::{Material, PointState, Surroundings, Volumetric};
@@ -218,7 +219,7 @@ impl CellShape {
 /// Tetrahedra with averaged nodal pressure:
 /// ```text
 /// V_a = sum_e V_e/4,  Jbar_a = sum_e J_e V_e/4 / V_a,  K_a = sum_e w_e K_e V_e/4 / V_a
-/// E_vol = sum_a 1/2 K_a V_a (Jbar_a - 1)^2 + sum_e 1/2 w_e K_e V_e min(0, J_e - J_c)^2,  J_c = 0.3
+/// E_vol = sum_a 1/2 K_a V_a (Jbar_a - 1)^2 + sum_e 1/2 w_e K_e V_e min(0, J_e - J_c)^2,  J_c = 0.3 (0.75 under a needle)
 /// p_e   = mean of K_a (Jbar_a - 1) over the corners + w_e K_e min(0, J_e - J_c)
 /// ```
 /// with the stiffness `w_e` that damage and path left; `p_e` is the derivative of E_vol, so energy is kept also between
@@ -230,6 +231,8 @@ pub struct Elements {
     hourglass: Vec<f64>,
     /// c.
     quartic: f64,
+    /// J_c, below which a tetrahedron has a pressure of its own.
+    flat_below: f64,
     /// Node to cells of a tetrahedral mesh, else empty: offsets and cells.
     offsets: Vec<usize>,
     cells: Vec<u32>,
@@ -280,6 +283,13 @@ pub struct CellMeasure {
     pub damage: f64,
 }
 
+impl CellMeasure {
+    /// A cell without tissue.
+    fn of_nothing() -> Self {
+        CellMeasure { jacobian: 1.0, corner_jacobian: 1.0, ..CellMeasure::default() }
+    }
+}
+
 /// Forces on the corners with the sign of f_int, and the stiffness bound of each corner [N/m].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CellForces {
@@ -298,6 +308,7 @@ impl Elements {
         Elements {
             hourglass: model.materials.iter().map(hourglass).collect(),
             quartic: solver.hourglass_quartic,
+            flat_below: if model.puncture.is_some() { FLAT_UNDER_NEEDLE } else { J_CONTINUATION },
             offsets,
             cells,
         }
@@ -344,6 +355,9 @@ impl Elements {
 
     /// The same of a cell without history where the displacement of the nodes is `u`.
     pub fn stiffness_bound_at(&self, model: &Model, cell: usize, u: &[DVec3]) -> [f64; 8] {
+        if model.mesh.is_empty(cell) {
+            return [0.0; 8];
+        }
         let shape = CellShape::new(&model.mesh, cell);
         let corners = shape.gather(u);
         let h = shape.displacement_gradient(&corners);
@@ -360,13 +374,29 @@ impl Elements {
         let block = model.mesh.block();
         let (at, cells) = (block.cell_coordinates(cell), block.cells());
         let open = |face: usize| !model.scene.faces[face].fixed[face / 2];
-        let open_sides = (0..3).filter(|a| at[*a] == 0 && open(2 * a) || at[*a] + 1 == cells[*a] && open(2 * a + 1));
-        open_sides.count() > 1
+        // Beside a cell in which nothing is the tissue ends, too; what does not deform holds it.
+        let ends_beside = |a: usize, up: bool| {
+            let mut beside = at;
+            beside[a] = if up { at[a] + 1 } else { at[a] - 1 };
+            let beside = block.cell_index(beside[0], beside[1], beside[2]);
+            block.is_empty(beside) && !model.composition.rigid.get(beside).is_some_and(|rigid| *rigid)
+        };
+        let is_open = |a: &usize| {
+            let low = if at[*a] == 0 { open(2 * a) } else { ends_beside(*a, false) };
+            let high = if at[*a] + 1 == cells[*a] { open(2 * a + 1) } else { ends_beside(*a, true) };
+            low || high
+        };
+        (0..3).filter(is_open).count() > 1
     }
 
     /// kappa 3.11 mu0 of a material [Pa].
     pub fn hourglass_of(&self, material: usize) -> f64 {
         self.hourglass[material]
+    }
+
+    /// J below which a tetrahedron has a pressure of its own.
+    pub fn flat_below(&self) -> f64 {
+        self.flat_below
     }
 
     /// Factor c of the quartic hourglass term.
@@ -414,7 +444,7 @@ impl Elements {
             let corners = tets.tets[cell].map(|n| nodes[n as usize]);
             let bulk = model.material(cell).law.bulk_modulus;
             let (_, dj, left) = cells[cell];
-            let flat = (1.0 + dj - J_CONTINUATION).min(0.0);
+            let flat = (1.0 + dj - self.flat_below).min(0.0);
             Volumetric {
                 stress: corners.iter().map(|(theta, k)| 0.25 * k * theta).sum::<f64>() + left * flat,
                 energy: corners.iter().map(|(theta, _)| 0.125 * bulk * theta * theta).sum::<f64>()
@@ -424,9 +454,35 @@ impl Elements {
         Some((0..tets.tets.len()).into_par_iter().map(answer).collect())
     }
 
+    /// The averaged energy of one intact tetrahedron where the displacement of a node is `u`, for a look at a single cell (its stress
+    /// is left away); `None` for a hexahedron.
+    pub fn averaged_energy_of(&self, model: &Model, cell: usize, u: impl Fn(usize) -> DVec3) -> Option<Volumetric> {
+        let tets = model.mesh.as_tets()?;
+        // V_e/4 and J - 1.
+        let dilatation = |cell: usize| {
+            let shape = CellShape::new(&model.mesh, cell);
+            let mut corners = [DVec3::ZERO; 8];
+            corners.iter_mut().zip(shape.nodes.iter()).for_each(|(corner, node)| *corner = u(*node));
+            (0.25 * shape.volume, jacobian_minus_one(shape.displacement_gradient(&corners)))
+        };
+        let theta = |node: usize| {
+            let around = self.cells[self.offsets[node]..self.offsets[node + 1]].iter();
+            let sums = around.map(|c| dilatation(*c as usize)).fold((0.0, 0.0), |s, (v, dj)| (s.0 + v, s.1 + v * dj));
+            sums.1 / sums.0
+        };
+        let bulk = model.material(cell).law.bulk_modulus;
+        let (_, dj) = dilatation(cell);
+        let flat = (1.0 + dj - self.flat_below).min(0.0);
+        let averaged: f64 = tets.tets[cell].iter().map(|n| 0.125 * bulk * theta(*n as usize).powi(2)).sum();
+        Some(Volumetric { stress: 0.0, energy: averaged + 0.5 * bulk * flat * flat })
+    }
+
     /// Forces of one cell. The flag tells whether the return mapping met the yield condition.
     pub fn corner_forces(&self, model: &Model, cell: usize, u: &[DVec3], input: CellInput) -> (CellForces, bool) {
         let CellInput { averaged, remaining, point, advance } = input;
+        if model.mesh.is_empty(cell) {
+            return (CellForces::default(), true);
+        }
         let shape = CellShape::new(&model.mesh, cell);
         let material = model.material(cell);
         let u = shape.gather(u);
@@ -489,6 +545,9 @@ impl Elements {
         averaged: Option<Volumetric>,
         states: CellStates,
     ) -> CellMeasure {
+        if model.mesh.is_empty(cell) {
+            return CellMeasure::of_nothing();
+        }
         let shape = CellShape::new(&model.mesh, cell);
         let material = model.material(cell);
         let h = shape.displacement_gradient(u);

@@ -42,7 +42,7 @@ pub const PARAMS: [(&str, &[&str]); 3] = [
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 17] = [
+pub const SCENE_DEFINES: [&str; 19] = [
     "TIED",
     "INNER_BOUND",
     "SLIT",
@@ -54,9 +54,11 @@ pub const SCENE_DEFINES: [&str; 17] = [
     "DRIVEN_FACES",
     "NODE_WORK",
     "REGIONS",
+    "EMPTY_CELLS",
     "TETRAHEDRA",
     "HISTORY",
     "VARYING_STIFFNESS",
+    "EARLY_FLATNESS",
     "INVARIANT_LAWS",
     "SEVERAL_LAWS",
     "OWN",

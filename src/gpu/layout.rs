@@ -17,7 +17,7 @@ impl Layout {
     /// `layers`: cells per strip of a block.
     pub fn new(mesh: &Mesh, layers: u32) -> Self {
         match mesh {
-            Mesh::Block(block) => Layout::Strips(Strips::new(block.cells(), layers)),
+            Mesh::Block(block) => Layout::Strips(Strips::new(block, layers)),
             Mesh::Tets(tets) => Layout::Fours(Fours::new(tets)),
         }
     }
@@ -66,20 +66,46 @@ impl Layout {
 }
 
 /// Layout of strips and columns of a block (see shaders/shared/corner_force.wgsl).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Strips {
     pub layers: u32,
     pub count: u32,
     pub columns: u32,
     pub padded_columns: u32,
     cells_x: u32,
+    /// Strips that hold tissue, ascending: strip times the number of columns, and the column; no entries: all.
+    busy: Vec<u32>,
 }
 
 impl Strips {
-    fn new(cells: [usize; 3], layers: u32) -> Self {
-        let [x, y, z] = cells.map(|c| c as u32);
+    fn new(block: &BlockMesh, layers: u32) -> Self {
+        let [x, y, z] = block.cells().map(|c| c as u32);
         let layers = layers.clamp(1, z);
-        Strips { layers, count: z.div_ceil(layers), columns: x * y, padded_columns: (x + 2) * (y + 2), cells_x: x }
+        let count = z.div_ceil(layers);
+        let mut busy = Vec::new();
+        if !block.empty.is_empty() {
+            let holds = |strip: u32, column: u32| {
+                let layers = strip * layers..((strip + 1) * layers).min(z);
+                layers.into_iter().any(|k| !block.empty[(k * x * y + column) as usize])
+            };
+            let strips = (0..count).flat_map(|strip| (0..x * y).map(move |column| (strip, column)));
+            busy = strips.filter(|(strip, column)| holds(*strip, *column)).map(|(s, c)| s * x * y + c).collect();
+        }
+        Strips { layers, count, columns: x * y, padded_columns: (x + 2) * (y + 2), cells_x: x, busy }
+    }
+
+    /// Strips that hold tissue; no entries: all.
+    pub fn busy(&self) -> &[u32] {
+        &self.busy
+    }
+
+    /// How many strips hold tissue.
+    pub fn busy_count(&self) -> u32 {
+        if self.busy.is_empty() { self.columns * self.count } else { self.busy.len() as u32 }
+    }
+
+    fn is_busy(&self, strip: u32, column: u32) -> bool {
+        self.busy.is_empty() || self.busy.binary_search(&(strip * self.columns + column)).is_ok()
     }
 
     fn slots(&self) -> u64 {
@@ -94,9 +120,18 @@ impl Strips {
 
     /// A slot of node (i, j, k) that the element stage writes in every step.
     pub fn owned_slot(&self, [i, j, k]: [usize; 3], cells: [usize; 3]) -> u32 {
-        let strip = ((k as u32) / self.layers).min(self.count - 1);
-        let (right, back) = (u32::from(i == cells[0]), u32::from(j == cells[1]));
-        self.slot(strip, k as u32, right + 2 * back, i as u32 - right, j as u32 - back)
+        let upper = ((k as u32) / self.layers).min(self.count - 1);
+        let lower = if k > 0 { (k as u32 - 1) / self.layers } else { upper };
+        let sides = |at: usize, count: usize| (at.saturating_sub(1)..=at.min(count - 1)).rev();
+        let [i, j, k] = [i as u32, j as u32, k as u32];
+        let places = [upper, lower].into_iter().flat_map(|strip| {
+            sides(j as usize, cells[1])
+                .flat_map(move |b| sides(i as usize, cells[0]).map(move |a| (strip, a as u32, b as u32)))
+        });
+        let first = (upper, i.min(cells[0] as u32 - 1), j.min(cells[1] as u32 - 1));
+        let busy = |&(strip, a, b): &(u32, u32, u32)| self.is_busy(strip, b * self.cells_x + a);
+        let (strip, a, b) = places.into_iter().find(busy).unwrap_or(first);
+        self.slot(strip, k, (i - a) + 2 * (j - b), a, b)
     }
 
     /// A slot of node (i, j, k) for a pair across the given axis. Stages that work on pairs of different axes at one node

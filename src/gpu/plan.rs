@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::arrays::{CONTACT_PARTS, FACE_PARTS, SEPARATION_PARTS, free_cell_count, opening_counts};
+use super::arrays::{CONTACT_PARTS, FACE_PARTS, SEPARATION_PARTS, busy_nodes, free_cell_count, opening_counts};
 use super::compose::Defines;
 use super::kernel::MeshNumbers;
 use super::layout::Layout;
@@ -20,6 +20,8 @@ pub struct Features {
     pub driven_faces: bool,
     /// Several materials.
     pub regions: bool,
+    /// Cells that hold no tissue.
+    pub empty_cells: bool,
     /// Tetrahedra instead of the block.
     pub tetrahedra: bool,
     /// The tissue separates around a hollow needle, or on a slit before a solid one.
@@ -41,6 +43,7 @@ impl Features {
             loaded_faces: !model.node_load.is_empty(),
             driven_faces: model.has_driven_faces(),
             regions: !model.cell_material.is_empty(),
+            empty_cells: model.mesh.as_block().is_some_and(|block| !block.empty.is_empty()),
             tetrahedra: model.mesh.as_tets().is_some(),
             bore: model.has_surface(|s| matches!(s, ContactSurface::OuterWall | ContactSurface::Bore)),
             slit: model.has_surface(|s| matches!(s, ContactSurface::Slit { .. })),
@@ -56,7 +59,7 @@ impl Features {
 pub fn defines(effects: &EffectSet, features: &Features) -> Defines {
     // A flexible needle acts by the contact of `puncture`, on a planned path.
     let bends = effects.puncture.is_some() && !features.free_path;
-    let works = |e: &&Effect| !(features.tetrahedra && e.kind.needs_block()) && (e.key != "flexible_needle" || bends);
+    let works = |e: &&Effect| !(features.tetrahedra && e.needs_block()) && (e.key != "flexible_needle" || bends);
     let mut defines: BTreeSet<&'static str> = effects.active().filter(works).map(|e| e.define).collect();
     let own: Vec<&'static OwnEffect> = effects.own.iter().map(|chosen| chosen.effect).collect();
     let mut define = |name: &'static str, wanted: bool| {
@@ -70,6 +73,7 @@ pub fn defines(effects: &EffectSet, features: &Features) -> Defines {
     define("STEP_INPUT", loaded || driven);
     define("NODE_WORK", loaded || driven);
     define("REGIONS", features.regions);
+    define("EMPTY_CELLS", features.empty_cells);
     define("TETRAHEDRA", features.tetrahedra);
     let separates = !features.tetrahedra && effects.cohesive.is_some() && effects.puncture.is_some();
     // Grid lines are doubled where faces may separate: copies that stay together move as one.
@@ -80,8 +84,10 @@ pub fn defines(effects: &EffectSet, features: &Features) -> Defines {
     define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
     define("OPENING", features.opening && effects.puncture.is_some() && !features.tetrahedra);
     // The bulk stiffness of a cell is not that of all others.
-    define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || effects.damage.is_some()));
+    let weakens = effects.damage.is_some() || effects.puncture.is_some();
+    define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || weakens));
     define("HISTORY", effects.plasticity.is_some() || effects.viscoelastic.is_some() || effects.damage.is_some());
+    define("EARLY_FLATNESS", features.tetrahedra && effects.puncture.is_some());
     // Its key chooses a law: `#for law`.
     for law in &LAWS {
         define(law.key, features.laws.contains(law.key));
@@ -96,21 +102,23 @@ pub fn defines(effects: &EffectSet, features: &Features) -> Defines {
 /// The stages that a set of effects needs, in the order of the step.
 pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     let (block, tetrahedra) = (!features.tetrahedra, features.tetrahedra);
-    let puncture = block && effects.puncture.is_some();
+    // On tetrahedra the path is planned, and softened.
+    let puncture = effects.puncture.is_some();
     let indentation = block && effects.indentation.is_some();
     let cohesive = block && effects.cohesive.is_some();
+    let (free_path, opening) = (block && features.free_path, block && features.opening);
     let wanted = |stage: &Stage| match stage {
         // Where faces separate no cell is softened, but a core is severed.
-        Stage::SoftenPath => puncture && !features.opening && (!cohesive || features.bore) && !features.free_path,
+        Stage::SoftenPath => puncture && !opening && (!cohesive || features.bore) && !free_path,
         Stage::CohesiveForces | Stage::MeasureSeparation => cohesive,
-        Stage::AdvanceTip => puncture && !features.free_path,
-        Stage::AdvanceFreeTip | Stage::SoftenFreePath => puncture && features.free_path,
+        Stage::AdvanceTip => puncture && !free_path,
+        Stage::AdvanceFreeTip | Stage::SoftenFreePath => puncture && free_path,
         Stage::NeedleContact => puncture,
         Stage::OpeningPoints
         | Stage::OpeningCells
         | Stage::OpeningReactions
         | Stage::OpeningNodes
-        | Stage::MeasureOpening => puncture && features.opening,
+        | Stage::MeasureOpening => puncture && opening,
         Stage::IndenterContact => indentation,
         Stage::MeasureContact => puncture || indentation,
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
@@ -137,14 +145,14 @@ pub fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u3
         Stage::NodeFields => model.mesh.node_count() as u32,
         Stage::MeasureDilatation | Stage::TetrahedronForces => model.mesh.cell_count() as u32,
         Stage::AveragePressure => model.mesh.node_count() as u32,
-        Stage::ElementForces => layout.strips().columns * layout.strips().count,
+        Stage::ElementForces => layout.strips().busy_count(),
         Stage::OpeningReactions => 64,
         Stage::OpeningPoints => opening_counts(model)[0],
         Stage::OpeningCells => opening_counts(model)[1],
         Stage::OpeningNodes => opening_counts(model)[2],
         Stage::MeasureOpening => 128,
         Stage::NeedleContact | Stage::IndenterContact => model.contact_nodes.len() as u32,
-        Stage::IntegrateNodes => model.mesh.node_count() as u32,
+        Stage::IntegrateNodes => 64 * busy_nodes(model).len() as u32,
         Stage::MeasureCells | Stage::MeasureNodes => measure_threads,
         Stage::CohesiveForces => model.separation.pairs.len() as u32,
         Stage::MeasureSeparation => SEPARATION_PARTS as u32,
@@ -178,6 +186,8 @@ pub fn mesh_numbers(model: &Model, layout: &Layout, measure_threads: u32) -> Mes
             ("STRIP_LAYERS", strips.layers),
             ("STRIP_COUNT", strips.count),
             ("PADDED_COLUMNS", strips.padded_columns),
+            ("BUSY_STRIP_COUNT", strips.busy_count()),
+            ("BUSY_NODE_COUNT", 64 * busy_nodes(model).len() as u32),
         ]);
     }
     numbers

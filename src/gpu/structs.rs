@@ -184,6 +184,13 @@ shared_structs! {
         column: [u32; 4],
         local: [f32; 4],
     }
+    /// shaders/shared/tetrahedron_anchor.wgsl
+    struct LinePiece {
+        nodes: [u32; 4],
+        weights: [f32; 4],
+        slopes: [f32; 4],
+        range: [f32; 4],
+    }
     /// shaders/effects/puncture.wgsl
     struct TipAnchorLoad {
         cell: [u32; 4],

@@ -29,6 +29,46 @@ pub struct Polynomial {
     pub c01: f64,
 }
 
+/// The same in every lane, or another in each.
+#[derive(Debug, Clone, Copy)]
+pub struct Constants<N> {
+    pub c1: N,
+    pub c2: N,
+    pub c3: N,
+    pub c01: N,
+    /// True where no lane has c2 or c3, and where one has c01.
+    pub is_linear: bool,
+    pub has_c01: bool,
+}
+
+impl Polynomial {
+    /// In every lane of a number of the kind of `n`.
+    #[inline(always)]
+    pub fn in_lanes<N: Number>(&self, n: N) -> Constants<N> {
+        Constants {
+            c1: n.of(self.c1),
+            c2: n.of(self.c2),
+            c3: n.of(self.c3),
+            c01: n.of(self.c01),
+            is_linear: self.is_linear(),
+            has_c01: self.c01 != 0.0,
+        }
+    }
+
+    /// True where it has neither c2 nor c3.
+    pub fn is_linear(&self) -> bool {
+        self.c2 == 0.0 && self.c3 == 0.0
+    }
+}
+
+impl<N: Number> Constants<N> {
+    /// The constants of a law that is weakened to the part `left` of its stress.
+    #[inline(always)]
+    pub fn weakened(&self, left: N) -> Self {
+        Constants { c1: self.c1 * left, c2: self.c2 * left, c3: self.c3 * left, c01: self.c01 * left, ..*self }
+    }
+}
+
 /// A state and what its stress and its bound share.
 #[derive(Debug, Clone, Copy)]
 pub struct Regular<N> {
@@ -107,15 +147,16 @@ impl<N: Number> Regular<N> {
 
     /// Slopes w1, w2 and w11 of the law.
     #[inline(always)]
-    fn slopes(&self, law: &Polynomial) -> [N; 3] {
+    fn slopes(&self, law: &Constants<N>) -> [N; 3] {
         let n = self.dj;
-        if law.c2 == 0.0 && law.c3 == 0.0 {
-            return [n.of(law.c1), n.of(law.c01), n.of(0.0)];
+        if law.is_linear {
+            return [law.c1, law.c01, n.of(0.0)];
         }
         // I1bar - 3 = J^(-2/3) (e1 + 3 - 3 J^(2/3)): the strain of a polynomial law is not small where it matters.
         let e = self.root * self.root * (self.e1 + n.of(3.0)) - n.of(3.0);
-        let w1 = e.mul_add(e.mul_add(n.of(3.0 * law.c3), n.of(2.0 * law.c2)), n.of(law.c1));
-        [w1, n.of(law.c01), e.mul_add(n.of(6.0 * law.c3), n.of(2.0 * law.c2))]
+        let (twice, thrice) = (n.of(2.0) * law.c2, n.of(3.0) * law.c3);
+        let w1 = e.mul_add(e.mul_add(thrice, twice), law.c1);
+        [w1, law.c01, e.mul_add(n.of(2.0) * thrice, twice)]
     }
 
     /// cof F.
@@ -131,7 +172,7 @@ impl<N: Number> Regular<N> {
 
     /// P_iso + p cof F [Pa].
     #[inline(always)]
-    pub fn stress(&self, law: &Polynomial, pressure: N) -> Tensor<N> {
+    pub fn stress(&self, law: &Constants<N>, pressure: N) -> Tensor<N> {
         let Regular { h, cofactor_less_one: k, dj, root, e1, e2, .. } = *self;
         let n = dj;
         let [w1, w2, _] = self.slopes(law);
@@ -145,7 +186,7 @@ impl<N: Number> Regular<N> {
         let mut by_k = pressure - first * s1;
         let mut by_one = first.mul_add(one_less, pressure);
         let mut p = [[n.of(0.0); 3]; 3];
-        if law.c01 != 0.0 {
+        if law.has_c01 {
             let second = n.of(2.0) * w2 * r2 * r2;
             let s2 = (e2 + n.of(3.0)) * third * n.of(2.0);
             let two_less = n.of(2.0) * (n.of(3.0) * dj - e2) * third;
@@ -173,7 +214,7 @@ impl<N: Number> Regular<N> {
 
     /// Bound of the isochoric tangent, straight and turned, of `InvariantLaw::tangent_bound` [Pa].
     #[inline(always)]
-    pub fn tangent_bound(&self, law: &Polynomial, bulk_modulus: N) -> [N; 2] {
+    pub fn tangent_bound(&self, law: &Constants<N>, bulk_modulus: N) -> [N; 2] {
         let Regular { j, root, dj, .. } = *self;
         let n = dj;
         let [xx, yy, zz, yz, zx, xy] = self.strain;
@@ -181,7 +222,7 @@ impl<N: Number> Regular<N> {
         let (i1, i2) = (self.e1 + n.of(3.0), self.e2 + n.of(3.0));
         let r2 = root * root;
         let (a, b, over_j) = (r2, r2 * r2, r2 * root);
-        let stiffening = if law.c2 == 0.0 && law.c3 == 0.0 {
+        let stiffening = if law.is_linear {
             n.of(0.0)
         } else {
             let by_j = n.of(-2.0 / 3.0) * a * i1 * over_j;
@@ -276,12 +317,12 @@ mod tests {
                 let state = Regular::new(h.to_cols_array_2d()).unwrap();
                 let p = BULK * jacobian_minus_one(h);
                 let exact = law.isochoric_stress(h) + cofactor(DMat3::IDENTITY + h) * p;
-                let found = DMat3::from_cols_array_2d(&state.stress(&polynomial, p));
+                let found = DMat3::from_cols_array_2d(&state.stress(&polynomial.in_lanes(p), p));
                 // The laws themselves lose 1e-16 of the modulus to cancellation.
                 let allowed = 1e-12 * entries(exact) + 1e-15 * law.shear_modulus() * 10.0;
                 assert!(entries(found - exact) < allowed, "{word:?} at {h}: {found} {exact}");
                 let bound = law.tangent_bound(h, BULK);
-                let [straight, turned] = state.tangent_bound(&polynomial, BULK);
+                let [straight, turned] = state.tangent_bound(&polynomial.in_lanes(BULK), BULK);
                 let close = |a: f64, b: f64| (a - b).abs() <= 1e-11 * (BULK + b.abs());
                 assert!(close(straight, bound.straight) && close(turned, bound.turned), "{word:?} at {h}");
             }

@@ -36,11 +36,14 @@ pub fn trilinear(local: DVec3, width: DVec3) -> ([f64; 8], [DVec3; 8]) {
     (weights, gradients)
 }
 
-/// The tissue block: `-size.x/2..size.x/2`, `-size.y/2..size.y/2`, `-size.z..0` [m]; the top face is z = 0.
+/// The tissue block: `-size.x/2..size.x/2`, `-size.y/2..size.y/2`, `-size.z..top` [m]; the needle enters at z = 0, which is the top face
+/// but where tissue from a label map rises beside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tissue {
-    /// Edge lengths of the block [m].
+    /// Edge lengths of the block, in z those below the entry point [m].
     pub size: DVec3,
+    /// Height of the block above the entry point, whole cells [m]; 0 for all tissue but that of a label map.
+    pub top: f64,
     /// Cell edge in the fine zone around the planned path [m].
     pub cell_size: f64,
     /// Half width of the fine zone around the path [m].
@@ -62,6 +65,8 @@ pub struct BlockMesh {
     pub lines: [Vec<f64>; 3],
     /// Bends the lines into circles around a vertical axis.
     pub bore: Option<Bore>,
+    /// Cells in which nothing is, or what does not deform; no entries: there are none.
+    pub empty: Vec<bool>,
 }
 
 /// A map of the xy plane that turns the square ring of grid lines at the distance `radius` from `centre` into a circle:
@@ -94,7 +99,17 @@ impl Bore {
 impl BlockMesh {
     /// A rectilinear block.
     pub fn new(lines: [Vec<f64>; 3]) -> Self {
-        BlockMesh { lines, bore: None }
+        BlockMesh { lines, bore: None, empty: Vec::new() }
+    }
+
+    /// True where the cell holds tissue that deforms: no gap, and not empty.
+    pub fn is_tissue(&self, cell: usize) -> bool {
+        !self.is_gap(cell) && !self.is_empty(cell)
+    }
+
+    /// True where nothing is in the cell, or what does not deform.
+    pub fn is_empty(&self, cell: usize) -> bool {
+        self.empty.get(cell).is_some_and(|empty| *empty)
     }
 
     /// True for a flat cell between the two copies of a line.
@@ -278,6 +293,9 @@ const SMALLEST_EDGE: f64 = 0.7;
 /// Uniform depth kept below the deepest point of the path [m].
 const FINE_BELOW_PATH: f64 = 4.0e-3;
 
+/// Uniform height kept above the entry point, where tissue rises beside it [m].
+const FINE_ABOVE_ENTRY: f64 = 3.0e-3;
+
 /// Half width of the slit before a solid needle, in needle radii. A slit as wide as the needle has to stretch by half of its
 /// length to lie around it.
 pub const SLIT_HALF_WIDTH: f64 = 1.2;
@@ -305,7 +323,7 @@ impl BlockMesh {
             return BlockMesh::new([
                 uniform_lines(-half.x, half.x, h),
                 uniform_lines(-half.y, half.y, h),
-                uniform_lines(-tissue.size.z, 0.0, h),
+                with_top(uniform_lines(-tissue.size.z, 0.0, h), tissue),
             ]);
         };
         let (low, high) = motion.reach(tissue.size.z);
@@ -315,8 +333,30 @@ impl BlockMesh {
             let anchor = entry - tissue.axis_offset_cells[axis] * h;
             graded_lines([-half[axis], half[axis]], zone, anchor, h, tissue.growth)
         };
-        BlockMesh::new([lateral(0), lateral(1), depth_lines(tissue.size.z, -low.z + FINE_BELOW_PATH, h, tissue.growth)])
+        let down = depth_lines(tissue.size.z, -low.z + FINE_BELOW_PATH, h, tissue.growth);
+        BlockMesh::new([lateral(0), lateral(1), with_top(down, tissue)])
     }
+}
+
+/// The lines of the depth and those above the entry point.
+fn with_top(mut lines: Vec<f64>, tissue: &Tissue) -> Vec<f64> {
+    let h = tissue.cell_size;
+    let above = (tissue.top / h).round();
+    let fine = (FINE_ABOVE_ENTRY / h).ceil().min(above);
+    let (give_up, edges) = series_to_face(|give_up| above - (fine - give_up), tissue.growth)
+        .filter(|(give_up, _)| *give_up as f64 <= fine)
+        .unwrap_or_else(|| (0, vec![1.0; (above - fine) as usize]));
+    let fine = fine as usize - give_up;
+    lines.extend((1..=fine).map(|k| k as f64 * h));
+    let mut z = fine as f64 * h;
+    lines.extend(edges.iter().map(|edge| {
+        z += edge * h;
+        z
+    }));
+    if let (true, Some(last)) = (above > 0.0, lines.last_mut()) {
+        *last = above * h;
+    }
+    lines
 }
 
 /// Lines of a whole axis around `centre`, one of them there and two at the distance `radius` from it.
@@ -463,6 +503,7 @@ mod tests {
         Tissue {
             size: DVec3::from(size) * 1e-3,
             cell_size: cell * 1e-3,
+            top: 0.0,
             fine_radius: 2.5e-3,
             growth,
             axis_offset_cells: [0.23, 0.31],

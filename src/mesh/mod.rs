@@ -2,6 +2,8 @@
 
 pub mod block;
 pub mod import;
+pub mod tet_line;
+pub mod tet_path;
 pub mod tets;
 pub mod tissue_point;
 
@@ -10,6 +12,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 pub use block::{BlockMesh, Bore, CORNERS, Tissue, trilinear};
+pub use tet_line::TetLine;
+pub use tet_path::TetPath;
 pub use tets::TetMesh;
 pub use tissue_point::TissuePoint;
 
@@ -99,6 +103,16 @@ impl Mesh {
     /// True for a flat cell between two copies of a grid line, which is no tissue.
     pub fn is_gap(&self, cell: usize) -> bool {
         self.as_block().is_some_and(|block| block.is_gap(cell))
+    }
+
+    /// True where the cell holds tissue that deforms.
+    pub fn is_tissue(&self, cell: usize) -> bool {
+        self.as_block().is_none_or(|block| block.is_tissue(cell))
+    }
+
+    /// True where nothing is in the cell, or what does not deform.
+    pub fn is_empty(&self, cell: usize) -> bool {
+        self.as_block().is_some_and(|block| block.is_empty(cell))
     }
 
     /// Centre of a cell at rest [m].

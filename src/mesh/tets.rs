@@ -1,10 +1,13 @@
 //! An unstructured mesh of four-node tetrahedra.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
 use super::BlockMesh;
+
+/// A node lies on a side of the bounding box when it is no farther from it, in parts of the diagonal of the box.
+pub const SIDE_TOLERANCE: f64 = 1e-6;
 
 /// Tetrahedra with positive volume, sorted so that neighbours in space are neighbours in memory.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -87,6 +90,45 @@ impl TetMesh {
     pub fn longest_edge(&self, tet: usize) -> f64 {
         let [a, b, c, d] = self.corners(tet);
         [b - a, c - a, d - a, c - b, d - b, d - c].iter().map(|e| e.length()).fold(0.0, f64::max)
+    }
+
+    /// Rest volumes of the tissue around the nodes, a quarter of every tetrahedron [m^3].
+    pub fn node_volumes(&self) -> Vec<f64> {
+        let mut volumes = vec![0.0; self.positions.len()];
+        for (tet, nodes) in self.tets.iter().enumerate() {
+            let share = 0.25 * self.volume(tet);
+            nodes.iter().for_each(|node| volumes[*node as usize] += share);
+        }
+        volumes
+    }
+
+    /// Triangles of the surface, which belong to one tetrahedron only, in the order of the mesh; counter-clockwise seen from outside.
+    pub fn surface(&self) -> Vec<[u32; 3]> {
+        let faces = |&[a, b, c, d]: &[u32; 4]| [[b, c, d], [a, d, c], [a, b, d], [a, c, b]];
+        let key = |mut face: [u32; 3]| {
+            face.sort_unstable();
+            face
+        };
+        let mut count: HashMap<[u32; 3], u32> = HashMap::new();
+        for face in self.tets.iter().flat_map(faces) {
+            *count.entry(key(face)).or_default() += 1;
+        }
+        self.tets.iter().flat_map(faces).filter(|face| count[&key(*face)] == 1).collect()
+    }
+
+    /// Those of its triangles that lie on a side of the bounding box, as far as a millionth of its diagonal tells; `axis` 0..2, at the
+    /// larger coordinate or the smaller one.
+    pub fn surface_on_side(&self, axis: usize, is_max: bool) -> Vec<[u32; 3]> {
+        let (low, high) = self.bounds();
+        let (plane, near) = (if is_max { high } else { low }[axis], SIDE_TOLERANCE * (high - low).length());
+        let on_side = |face: &[u32; 3]| face.iter().all(|n| (self.positions[*n as usize][axis] - plane).abs() <= near);
+        self.surface().into_iter().filter(on_side).collect()
+    }
+
+    /// Area of a triangle of nodes [m^2].
+    pub fn area(&self, face: [u32; 3]) -> f64 {
+        let [a, b, c] = face.map(|n| self.positions[n as usize]);
+        0.5 * (b - a).cross(c - a).length()
     }
 
     /// Rest volume of a region [m^3].

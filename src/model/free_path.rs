@@ -84,7 +84,7 @@ impl Model {
             m.membrane_energy.map_or(cutting, |energy| cutting.of_membrane(energy, params.transition_length))
         };
         let cuttings = std::iter::once(&self.scene.material).chain(self.scene.regions.iter().map(|r| &r.material));
-        let path = PlannedPath { entry: motion.entry, direction: motion.direction };
+        let path = PlannedPath::into_block(motion.entry, motion.direction);
         self.puncture = Some(PuncturePlan {
             opening: None,
             contact: None,
@@ -98,6 +98,7 @@ impl Model {
             }],
             exit: f64::INFINITY,
             anchors: Vec::new(),
+            lines: Vec::new(),
             cells: Vec::new(),
             contact_stiffness: self.contact_stiffness(params.contact_stiffness_factor),
             ring_stiffness_per_volume: self.ring_stiffness_per_volume(params.contact_stiffness_factor),

@@ -1,14 +1,18 @@
 //! What is constant during a run: mesh, masses, loads, and what the chosen effects prepare once, one file for each of them.
 
+pub mod composition;
 mod contact;
 mod free_path;
 mod indentation;
 pub mod opening;
 mod puncture;
+pub mod rigid;
 mod slit;
+mod tet_puncture;
 
 use glam::DVec3;
 
+pub use composition::Composition;
 pub use contact::{ContactNode, ContactSurface};
 pub use free_path::FreePlan;
 pub use puncture::{
@@ -17,13 +21,14 @@ pub use puncture::{
 
 use crate::effects::{EffectSet, cohesive};
 use crate::material_point::Material;
-use crate::mesh::{Mesh, TissuePoint};
+use crate::mesh::tets::SIDE_TOLERANCE;
+use crate::mesh::{BlockMesh, Mesh, TetMesh, TissuePoint};
 use crate::needle::{Kinematics, PlannedPath};
-use crate::scene::{Face, FaceCondition, RegionShape, Scene};
+use crate::scene::{Face, FaceCondition, Scene};
 use crate::separation::Separation;
 
-/// Most materials of one scene; the last index is that of the last region.
-pub const LARGEST_MATERIAL_COUNT: usize = 16;
+/// Most materials of a model: those of the scene and mixtures of them.
+pub const LARGEST_MATERIAL_COUNT: usize = 256;
 
 /// Bits of [`Model::node_flags`] of held or driven components.
 pub const HELD: u32 = 7;
@@ -38,12 +43,16 @@ const SPEED_PER_STEP: f64 = 0.1;
 pub struct Model {
     pub scene: Scene,
     pub mesh: Mesh,
-    /// Materials with the effects that are on: the scene's own, then one per region.
+    /// Materials with the effects that are on: the scene's own, one per region, then mixtures.
     pub materials: Vec<Material>,
     /// Index into `materials` per cell; empty where there is one material only.
     pub cell_material: Vec<u8>,
+    /// What cells are made of, and which of them hold nothing.
+    pub composition: Composition,
     /// Per node: bits 0..2 held or driven components x, y, z; bits 3..8 the faces that it lies on.
     pub node_flags: Vec<u32>,
+    /// True where a region does not deform.
+    pub has_rigid: bool,
     pub effects: EffectSet,
     pub kinematics: Option<Kinematics>,
     /// Nodal mass including the uniform mass scaling [kg].
@@ -60,31 +69,43 @@ pub struct Model {
     pub cohesion: Option<cohesive::Law>,
     /// Nodes that a tool may touch, ascending in the node index; empty without contact.
     pub contact_nodes: Vec<ContactNode>,
-    /// Where the targets of the scene lie in the block.
+    /// Where the targets of the scene lie in the mesh.
     pub targets: Vec<TissuePoint>,
 }
 
 impl Model {
     /// Prepares a scene. The mesh is built from the scene by `BlockMesh::for_scene`.
     pub fn new(scene: Scene, mesh: impl Into<Mesh>) -> Self {
-        let mesh = mesh.into();
+        let mut mesh = mesh.into();
         let scaling = scene.effects.mass_scaling.map_or(1.0, |m| m.factor);
-        let materials: Vec<Material> = std::iter::once(&scene.material)
+        let mut materials: Vec<Material> = std::iter::once(&scene.material)
             .chain(scene.regions.iter().map(|r| &r.material))
             .map(|m| Material::of(m, &scene.effects))
             .collect();
-        let cell_material = if scene.regions.is_empty() { Vec::new() } else { assign_materials(&scene, &mesh) };
-        let node_mass = nodal_masses(&mesh, &materials, &cell_material, scaling);
+        let mut composition = Composition::new(&scene, &mesh, &materials);
+        materials.append(&mut composition.mixtures);
+        let cell_material = std::mem::take(&mut composition.cell_material);
+        if let Mesh::Block(block) = &mut mesh {
+            block.empty.clone_from(&composition.empty);
+        }
+        let mut node_mass = nodal_masses(&mesh, &materials, &cell_material, scaling);
+        // Nodes without tissue stand still, whatever they weigh.
+        node_mass
+            .iter_mut()
+            .zip(&composition.held)
+            .filter(|(m, held)| **held && **m == 0.0)
+            .for_each(|(m, _)| *m = 1.0);
         let (node_load, load_ramp) = nodal_loads(&scene, &mesh);
-        let targets = mesh.as_block().map_or(Vec::new(), |block| {
-            scene.targets.iter().map(|target| TissuePoint::new(block, target.position)).collect()
-        });
-        let kinematics = (!scene.motion.phases.is_empty()).then(|| Kinematics::new(&scene.motion));
+        let targets = scene.targets.iter().map(|target| TissuePoint::in_mesh(&mesh, target.position)).collect();
+        let kinematics = (!scene.motion.phases.is_empty())
+            .then(|| Kinematics::new(&scene.motion).no_deeper_than(rigid::deepest(&scene)));
         let mut model = Model {
             effects: scene.effects.clone(),
-            node_flags: node_flags(&scene, &mesh),
+            node_flags: node_flags(&scene, &mesh, &composition),
             materials,
             cell_material,
+            composition,
+            has_rigid: scene.regions.iter().any(|region| region.material.rigid),
             node_mass,
             node_load,
             load_ramp,
@@ -129,6 +150,36 @@ impl Model {
         &self.materials[self.material_index(cell)]
     }
 
+    /// Rest volume of the tissue around a node, an eighth of every hexahedron or a quarter of every tetrahedron [m^3]; of all nodes
+    /// of tetrahedra at once: [`Model::node_volumes`].
+    pub fn node_volume(&self, node: usize) -> f64 {
+        let block = match &self.mesh {
+            Mesh::Block(block) => block,
+            Mesh::Tets(tets) => return tets.node_volumes()[node],
+        };
+        if block.empty.is_empty() {
+            return block.node_volume(node);
+        }
+        // As much as it weighs, in the density of its cells where they are whole.
+        let at = block.node_coordinates(node);
+        let around = |a: usize| at[a].saturating_sub(1)..(at[a] + 1).min(block.cells()[a]);
+        let cells =
+            around(2).flat_map(|k| around(1).map(move |j| (j, k))).flat_map(|(j, k)| around(0).map(move |i| (i, j, k)));
+        let eighth = |(i, j, k)| {
+            let cell = block.cell_index(i, j, k);
+            0.125 * self.composition.fill(cell) * block.cell_size(cell).element_product()
+        };
+        cells.map(eighth).sum()
+    }
+
+    /// Rest volumes of the tissue around the nodes [m^3].
+    pub fn node_volumes(&self) -> Vec<f64> {
+        match &self.mesh {
+            Mesh::Block(block) => (0..block.node_count()).map(|node| self.node_volume(node)).collect(),
+            Mesh::Tets(tets) => tets.node_volumes(),
+        }
+    }
+
     /// True where cells remember something.
     pub fn has_history(&self) -> bool {
         self.effects.plasticity.is_some() || self.effects.viscoelastic.is_some() || !self.effects.own.is_empty()
@@ -153,7 +204,7 @@ impl Model {
     fn planned_path(&self) -> Option<PlannedPath> {
         let motion = &self.scene.motion;
         let cuts = self.effects.puncture.is_some() && self.scene.needle().is_some() && !self.scene.has_free_path();
-        cuts.then_some(PlannedPath { entry: motion.entry, direction: motion.direction })
+        cuts.then_some(PlannedPath::into_block(motion.entry, motion.direction))
     }
 
     /// True where the mesh follows the bore of a hollow needle.
@@ -203,21 +254,10 @@ impl Model {
     }
 }
 
-/// Material of every cell: the last region that holds its centre, else the scene's own.
-fn assign_materials(scene: &Scene, mesh: &Mesh) -> Vec<u8> {
-    let holds = |shape: &RegionShape, cell: usize| match (shape, mesh) {
-        (RegionShape::MeshTag(name), Mesh::Tets(tets)) => tets.regions[tets.tags[cell] as usize] == *name,
-        _ => shape.contains(mesh.cell_centre(cell)),
-    };
-    (0..mesh.cell_count())
-        .map(|cell| scene.regions.iter().rposition(|r| holds(&r.shape, cell)).map_or(0, |i| i as u8 + 1))
-        .collect()
-}
-
 /// Lumped masses [kg].
 fn nodal_masses(mesh: &Mesh, materials: &[Material], cell_material: &[u8], scaling: f64) -> Vec<f64> {
     let mut mass = vec![0.0; mesh.node_count()];
-    for cell in 0..mesh.cell_count() {
+    for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_empty(*cell)) {
         let density = materials[cell_material.get(cell).map_or(0, |m| usize::from(*m))].density * scaling;
         let nodes = mesh.cell_nodes(cell);
         let share = density * mesh.cell_volume(cell) / nodes.len() as f64;
@@ -230,9 +270,9 @@ fn nodal_masses(mesh: &Mesh, materials: &[Material], cell_material: &[u8], scali
 
 /// Held components and faces of every node. A node of a tetrahedral mesh lies on a face where it lies on the bounding
 /// box, within a millionth of its diagonal.
-fn node_flags(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
+fn node_flags(scene: &Scene, mesh: &Mesh, composition: &Composition) -> Vec<u32> {
     let (low, high) = mesh.bounds();
-    let near = 1e-6 * (high - low).length();
+    let near = SIDE_TOLERANCE * (high - low).length();
     let fixed_bits = |fixed: [bool; 3]| (0..3).map(|a| u32::from(fixed[a]) << a).sum::<u32>();
     let mut flags: Vec<u32> = (0..mesh.node_count())
         .map(|node| {
@@ -247,6 +287,9 @@ fn node_flags(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
                 .fold(0, |flags, face| flags | 1 << (3 + face as usize) | fixed_bits(scene.faces[face as usize].fixed))
         })
         .collect();
+    for (flags, _) in flags.iter_mut().zip(&composition.held).filter(|(_, held)| **held) {
+        *flags |= HELD;
+    }
     if let Mesh::Tets(tets) = mesh {
         for support in &scene.supports {
             for node in tets.node_sets.get(&support.set).into_iter().flatten() {
@@ -259,7 +302,6 @@ fn node_flags(scene: &Scene, mesh: &Mesh) -> Vec<u32> {
 
 /// Nodal forces of all face tractions at full ramp [N], and the ramp time [s].
 fn nodal_loads(scene: &Scene, mesh: &Mesh) -> (Vec<DVec3>, f64) {
-    let Some(mesh) = mesh.as_block() else { return (Vec::new(), 0.0) };
     let loaded: Vec<Face> = Face::ALL.into_iter().filter(|&f| scene.faces[f as usize].traction.is_some()).collect();
     if loaded.is_empty() {
         return (Vec::new(), 0.0);
@@ -270,16 +312,31 @@ fn nodal_loads(scene: &Scene, mesh: &Mesh) -> (Vec<DVec3>, f64) {
         let condition = &scene.faces[face as usize];
         let traction = condition.traction.unwrap_or_default();
         ramp = ramp.max(condition.traction_ramp);
-        let axis = face.axis();
-        let plane = if face.is_max() { mesh.nodes()[axis] - 1 } else { 0 };
-        let lines = &mesh.lines[axis];
-        let half =
-            0.5 * if face.is_max() { lines[lines.len() - 1] - lines[lines.len() - 2] } else { lines[1] - lines[0] };
-        for (node, force) in load.iter_mut().enumerate() {
-            if mesh.node_coordinates(node)[axis] == plane {
-                *force += traction * (mesh.node_volume(node) / half);
-            }
+        match mesh {
+            Mesh::Block(block) => load_block(block, face, traction, &mut load),
+            Mesh::Tets(tets) => load_tets(tets, face, traction, &mut load),
         }
     }
     (load, ramp)
+}
+
+/// Adds the nodal forces [N] of a traction on a face of the block [Pa].
+fn load_block(mesh: &BlockMesh, face: Face, traction: DVec3, load: &mut [DVec3]) {
+    let axis = face.axis();
+    let plane = if face.is_max() { mesh.nodes()[axis] - 1 } else { 0 };
+    let lines = &mesh.lines[axis];
+    let half = 0.5 * if face.is_max() { lines[lines.len() - 1] - lines[lines.len() - 2] } else { lines[1] - lines[0] };
+    for (node, force) in load.iter_mut().enumerate() {
+        if mesh.node_coordinates(node)[axis] == plane {
+            *force += traction * (mesh.node_volume(node) / half);
+        }
+    }
+}
+
+/// The same on the triangles of a mesh that lie on a side of its bounding box: a third of their force on each of their nodes.
+fn load_tets(mesh: &TetMesh, face: Face, traction: DVec3, load: &mut [DVec3]) {
+    for triangle in mesh.surface_on_side(face.axis(), face.is_max()) {
+        let share = traction * (mesh.area(triangle) / 3.0);
+        triangle.iter().for_each(|node| load[*node as usize] += share);
+    }
 }

@@ -5,14 +5,16 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::opening::{OpeningInput, OpeningPlan};
-use super::{ContactNode, ContactSurface, FreePlan, Model};
+use super::{ContactNode, ContactSurface, FreePlan, Model, tet_puncture};
+use crate::anatomy::Case;
 use crate::effects::puncture;
 use crate::effects::puncture::{Cutting, SchemeWord, left_before_exit};
 use crate::mesh::{BlockMesh, Bore};
+use crate::mesh::{Mesh, TetLine};
 use crate::needle::gap::Profile;
 use crate::needle::slit::REFERENCE_EDGE;
 use crate::needle::tip_contact::{DISC, TipContact};
-use crate::needle::{NeedleShape, PlannedPath, Tool, lateral_axes};
+use crate::needle::{NeedleShape, PlannedPath, Tool, lateral_axes, ring_around, tip_lines};
 use crate::penetration::surface::Surface;
 use crate::scene::Scene;
 
@@ -35,6 +37,9 @@ const UNKNOWN_HOLE: f64 = 0.1;
 /// Distance of the tip springs of a cutting ring from its edge, on either side [m].
 const CUTTING_RING: f64 = 0.2e-3;
 
+/// How far above or below the entry point the skin may lie beside it [m].
+const SKIN_REACH: f64 = 3.0e-3;
+
 /// Step along the path in which its materials are told apart [m].
 const SEGMENT_STEP: f64 = 2.0e-5;
 
@@ -52,7 +57,7 @@ pub struct PathCell {
 /// A material line parallel to the path, on which one tip spring is anchored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipAnchor {
-    /// Point where the line enters the top face [m].
+    /// Point where the line enters the surface [m].
     pub surface: DVec3,
     /// Axial coordinate of that point relative to the entry point [m]; 0 for a perpendicular entry.
     pub axial_offset: f64,
@@ -72,6 +77,16 @@ pub struct PathSegment {
     pub hole: f64,
 }
 
+/// A way through the tissue.
+pub(super) struct Way {
+    pub segments: Vec<PathSegment>,
+    pub anchors: Vec<TipAnchor>,
+    pub lines: Vec<TetLine>,
+    /// [m]
+    pub exit: f64,
+    pub cells: Vec<PathCell>,
+}
+
 /// What the effect `puncture` prepares.
 #[derive(Debug, Clone)]
 pub struct PuncturePlan {
@@ -83,7 +98,9 @@ pub struct PuncturePlan {
     pub profile: Profile,
     pub path: PlannedPath,
     pub anchors: Vec<TipAnchor>,
-    /// Material coordinate at which the path leaves the block through the bottom [m].
+    /// On tetrahedra the lines of the anchors, each counted from its `surface`; empty for a block.
+    pub lines: Vec<TetLine>,
+    /// Material coordinate at which the path leaves the tissue, through the bottom of a block [m].
     pub exit: f64,
     pub cells: Vec<PathCell>,
     /// Contact stiffness k of a face that separates [N/m].
@@ -148,9 +165,14 @@ impl Model {
             self.plan_free_path(params, needle);
             return;
         }
-        let path = PlannedPath { entry: self.scene.motion.entry, direction: self.scene.motion.direction };
+        if self.mesh.as_tets().is_some() {
+            self.plan_puncture_of_tets(params, needle);
+            return;
+        }
+        let path = PlannedPath::into_block(self.scene.motion.entry, self.scene.motion.direction);
         let deepest = self.scene.motion.deepest();
         let Some(mesh) = self.mesh.as_block() else { return };
+        let case = self.scene.case.as_deref();
         // Faces that separate need no softened path; the core of a hollow needle is severed cell by cell.
         let cells = match (&self.cohesion, mesh.bore) {
             (Some(_), Some(bore)) => core_cells(mesh, &bore, deepest),
@@ -161,13 +183,14 @@ impl Model {
         let surfaces = self.separated_surfaces(&path);
         let opening = params.scheme == SchemeWord::Opening;
         let anchors = match opening {
-            true => disc_anchors(&path, &needle),
-            false => tip_anchors(&path, &needle, self.effects.cohesive.is_some()),
+            true => disc_anchors(&path, &needle, case),
+            false => tip_anchors(&path, &needle, self.effects.cohesive.is_some(), case),
         };
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the outermost anchor.
         let outermost = if opening { DISC * needle.radius } else { needle.radius };
         let anchor_reach = outermost + self.scene.tissue.cell_size * 1.5;
         let cohesive = self.cohesion.is_some();
+        let volumes = self.node_volumes();
         self.contact_nodes = (0..mesh.node_count())
             .filter_map(|node| {
                 let (r0, s0) = path.material_coordinates(mesh.rest_position(node));
@@ -175,21 +198,44 @@ impl Model {
                 let in_ring = params.ring_weight(r0) > 0.0;
                 let on_slit = matches!(surface, ContactSurface::Slit { .. });
                 let on_face = surface != ContactSurface::OpenedPath;
-                let pushed = on_slit || s0 < deepest && if cohesive { on_face } else { in_ring };
+                // What stands still is not pushed aside, but it carries the tip.
+                let stands = self.composition.held.get(node).is_some_and(|held| *held);
+                let pushed = !stands && (on_slit || s0 < deepest && if cohesive { on_face } else { in_ring });
                 let carries = r0 < anchor_reach && s0 < deepest + 2.0 * self.scene.tissue.cell_size;
-                let carrier = ContactNode::carrier(node, r0, s0, mesh.node_volume(node));
+                let carrier = ContactNode::carrier(node, r0, s0, volumes[node]);
                 (pushed || carries).then_some(ContactNode { pushed, surface, ..carrier })
             })
             .collect();
+        self.weigh_cut_carriers();
         self.join_slit_faces();
+        let segments = path_segments(&self.scene, &params, &needle, exit, |depth| {
+            self.scene.region_at(path.entry + path.direction * depth)
+        });
+        self.puncture =
+            Some(self.puncture_plan(params, needle, path, Way { segments, anchors, lines: Vec::new(), exit, cells }));
+        if opening {
+            self.plan_opening();
+        }
+    }
+
+    /// The plan of a needle on a way through the tissue.
+    pub(super) fn puncture_plan(
+        &self,
+        params: puncture::Params,
+        needle: NeedleShape,
+        path: PlannedPath,
+        way: Way,
+    ) -> PuncturePlan {
+        let Way { segments, anchors, lines, exit, cells } = way;
         // As the nodes of a face would be damped, each with a half of the masses of its cells.
         let h = self.scene.tissue.cell_size;
         let contact_stiffness = self.contact_stiffness(params.contact_stiffness_factor);
         let face_mass = 0.5 * self.scaled_density() * h.powi(3);
-        self.puncture = Some(PuncturePlan {
-            segments: path_segments(&self.scene, &params, &needle, &path, exit),
+        PuncturePlan {
+            segments,
             exit,
             anchors,
+            lines,
             cells,
             contact_stiffness,
             ring_stiffness_per_volume: self.ring_stiffness_per_volume(params.contact_stiffness_factor),
@@ -201,9 +247,21 @@ impl Model {
             free: None,
             opening: None,
             contact: None,
-        });
-        if opening {
-            self.plan_opening();
+        }
+    }
+
+    /// Nodes that carry the tip in cells that the skin cuts weigh at least a quarter of what they would in whole cells: the springs of
+    /// the tip are those of a whole cell, and beside a sliver of tissue they would ask for steps ten times shorter.
+    fn weigh_cut_carriers(&mut self) {
+        const LEAST_PART: f64 = 0.25;
+        if self.composition.fill.is_empty() {
+            return;
+        }
+        let density = self.scaled_density();
+        for contact in &self.contact_nodes {
+            let node = contact.node as usize;
+            let least = LEAST_PART * density * self.mesh.block().node_volume(node);
+            self.node_mass[node] = self.node_mass[node].max(least);
         }
     }
 
@@ -225,8 +283,7 @@ impl Model {
             },
         );
         let below = plan.path.entry + plan.path.direction * SEGMENT_STEP;
-        let region = self.scene.regions.iter().rposition(|r| r.shape.contains(below));
-        let material = region.map_or(&self.scene.material, |r| &self.scene.regions[r].material);
+        let material = self.scene.material_at(below);
         let surface = Surface::new(&material.law, &plan.needle);
         let puncture_force = plan.segments[0].cutting.puncture_force;
         let contact =
@@ -245,9 +302,13 @@ impl Model {
 
     /// Largest part of the tip springs that one node can carry: where the anchors are in the first cells of the path.
     pub fn largest_spring_share(&self) -> f64 {
-        let (Some(plan), Some(mesh)) = (&self.puncture, self.mesh.as_block()) else { return 0.0 };
+        let Some(plan) = &self.puncture else { return 0.0 };
+        let mesh = match &self.mesh {
+            Mesh::Block(block) => block,
+            Mesh::Tets(_) => return tet_puncture::largest_spring_share(plan, self.scene.tissue.cell_size),
+        };
         let anchors = match plan.anchors.is_empty() {
-            true => tip_anchors(&plan.path, &plan.needle, false),
+            true => tip_anchors(&plan.path, &plan.needle, false, None),
             false => plan.anchors.clone(),
         };
         let h = self.scene.tissue.cell_size;
@@ -270,22 +331,21 @@ impl Model {
     }
 }
 
-/// Stretches of the path with their own tip forces, from the materials that its axis passes through on its way to the
-/// bottom at `exit` [m].
-fn path_segments(
+/// Stretches of the path with their own tip forces, from the materials that its axis passes through on its way to where
+/// it leaves the tissue at `exit` [m]. `region_at`: the region at a depth along the axis [m].
+pub(super) fn path_segments(
     scene: &Scene,
     params: &puncture::Params,
     needle: &NeedleShape,
-    path: &PlannedPath,
     exit: f64,
+    region_at: impl Fn(f64) -> Option<usize>,
 ) -> Vec<PathSegment> {
     let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
     let mut starts: Vec<(f64, Option<usize>)> = Vec::new();
     for i in 0..(exit / SEGMENT_STEP).ceil().max(1.0) as usize {
         // The surface itself belongs to what lies under it.
         let a = i as f64 * SEGMENT_STEP;
-        let x = path.entry + path.direction * (a + 0.5 * SEGMENT_STEP);
-        let region = scene.regions.iter().rposition(|r| r.shape.contains(x));
+        let region = region_at(a + 0.5 * SEGMENT_STEP);
         if starts.last().is_none_or(|(_, last)| *last != region) {
             starts.push((a, region));
         }
@@ -324,28 +384,18 @@ fn path_segments(
 
 /// Lines on which the tip springs are anchored: one on the axis, 6 at R/2, 12 at R. Before a slit none lies on its plane,
 /// where it would pull at one side; a cutting ring has 12 on either side of its edge.
-fn tip_anchors(path: &PlannedPath, needle: &NeedleShape, cohesive: bool) -> Vec<TipAnchor> {
-    let (e1, e2) = lateral_axes(path.direction);
+fn tip_anchors(path: &PlannedPath, needle: &NeedleShape, cohesive: bool, case: Option<&Case>) -> Vec<TipAnchor> {
     let turn = if cohesive { std::f64::consts::TAU / 24.0 } else { 0.0 };
-    let ring = |count: usize, r: f64| {
-        (0..count).map(move |i| {
-            let angle = std::f64::consts::TAU * i as f64 / count as f64 + turn;
-            (e1 * angle.cos() + e2 * angle.sin()) * r
-        })
-    };
-    let radius = needle.radius;
+    let ring = |radius: f64| ring_around(path.direction, 12, radius, turn);
     let offsets: Vec<DVec3> = match needle.bore.filter(|_| cohesive) {
-        Some(bore) => ring(12, bore.edge - CUTTING_RING).chain(ring(12, bore.edge + CUTTING_RING)).collect(),
-        None => {
-            let centre = (!cohesive).then_some(DVec3::ZERO);
-            centre.into_iter().chain(ring(6, 0.5 * radius)).chain(ring(12, radius)).collect()
-        }
+        Some(bore) => ring(bore.edge - CUTTING_RING).chain(ring(bore.edge + CUTTING_RING)).collect(),
+        None => tip_lines(path.direction, needle.radius, turn, !cohesive),
     };
-    offsets.into_iter().map(|o| anchor_beside(path, o)).collect()
+    offsets.into_iter().map(|o| anchor_beside(path, o, case)).collect()
 }
 
 /// Lines on which the tip acts in the scheme `opening`: each stands for the same part of a disc of the radius [`DISC`] R.
-fn disc_anchors(path: &PlannedPath, needle: &NeedleShape) -> Vec<TipAnchor> {
+fn disc_anchors(path: &PlannedPath, needle: &NeedleShape, case: Option<&Case>) -> Vec<TipAnchor> {
     let (e1, e2) = lateral_axes(path.direction);
     let within = |ring: usize| (1 + 3 * ring * (ring + 1)) as f64;
     let offsets = (0..=RINGS).flat_map(|ring| {
@@ -360,13 +410,16 @@ fn disc_anchors(path: &PlannedPath, needle: &NeedleShape) -> Vec<TipAnchor> {
             (e1 * angle.cos() + e2 * angle.sin()) * radius
         })
     });
-    offsets.map(|o| anchor_beside(path, o)).collect()
+    offsets.map(|o| anchor_beside(path, o, case)).collect()
 }
 
 /// The anchor whose line runs at `offset` [m] from the path.
-fn anchor_beside(path: &PlannedPath, offset: DVec3) -> TipAnchor {
-    // The line entry + offset + t s meets z = 0 at s = -offset.z / t.z.
-    let axial_offset = -offset.z / path.direction.z;
+fn anchor_beside(path: &PlannedPath, offset: DVec3, case: Option<&Case>) -> TipAnchor {
+    let axial_offset = match case {
+        // Where the line meets the skin.
+        Some(case) => case.surface_along(path.entry + offset, path.direction, SKIN_REACH).unwrap_or(0.0),
+        None => path.entry_beside(offset),
+    };
     TipAnchor { surface: path.entry + offset + path.direction * axial_offset, axial_offset }
 }
 

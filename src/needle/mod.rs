@@ -51,6 +51,10 @@ pub struct Kinematics {
     vibration: Option<Vibration>,
     /// True where a hand leads: legs are no phases.
     led: bool,
+    /// Depth along the needle that the tip does not get beyond [m]: it stands there until the phases take it back.
+    deepest: f64,
+    /// When it gets there, and when it leaves [s].
+    stops: Vec<f64>,
 }
 
 impl Kinematics {
@@ -69,7 +73,22 @@ impl Kinematics {
             at_end: motion.end(),
             vibration: motion.vibration,
             led: false,
+            deepest: f64::INFINITY,
+            stops: Vec::new(),
         }
+    }
+
+    /// The same with a tip that does not get beyond a depth along the needle [m]: something holds it there.
+    pub fn no_deeper_than(mut self, depth: Option<f64>) -> Self {
+        let Some(depth) = depth else { return self };
+        self.deepest = depth;
+        for (start, leg) in &self.legs {
+            let (from, to) = (leg.at(0.0).depth, leg.at(leg.duration).depth);
+            if (from - depth) * (to - depth) < 0.0 {
+                self.stops.push(start + leg.duration * (depth - from) / (to - from));
+            }
+        }
+        self
     }
 
     /// A motion that a hand leads, see [`Kinematics::lead`]: it starts where the phases would.
@@ -81,6 +100,8 @@ impl Kinematics {
             at_end: motion.begin(),
             vibration: motion.vibration,
             led: true,
+            deepest: f64::INFINITY,
+            stops: Vec::new(),
         }
     }
 
@@ -134,6 +155,12 @@ impl Kinematics {
             let (start, leg) = self.legs[phase];
             leg.at(time - start)
         };
+        let at = if at.depth > self.deepest {
+            let tip = at.tip - at.direction * (at.depth - self.deepest);
+            Placement { tip, depth: self.deepest, velocity: DVec3::ZERO, ..at }
+        } else {
+            at
+        };
         let (offset, shaking) = self.vibration.map_or((DVec3::ZERO, DVec3::ZERO), |v| v.at(time));
         let velocity = at.velocity + shaking;
         let angular_velocity = swing_rate(self.reference, at.direction, at.turning);
@@ -157,7 +184,8 @@ impl Kinematics {
         const PARTS: u32 = 8;
         let mut pose = self.pose(time);
         let (from, to) = (time - dt * (1.0 - 1e-6), time + dt * (1.0 - 1e-6));
-        let changes = self.legs.iter().map(|(start, _)| *start).chain([self.end]).any(|t| from < t && t < to);
+        let kinks = self.legs.iter().map(|(start, _)| *start).chain([self.end]).chain(self.stops.iter().copied());
+        let changes = kinks.into_iter().any(|t| from < t && t < to);
         if changes {
             // Means over half of the time: `from` is -1 for the step before, 0 for the step after.
             let mean = |from: f64| {
@@ -202,22 +230,52 @@ pub fn lateral_axes(direction: DVec3) -> (DVec3, DVec3) {
     (first, direction.cross(first))
 }
 
-/// A straight planned path: from `entry` on the top face along `direction`.
+/// `count` vectors of the length `radius` [m] all around `direction`, the first turned by `turn` [rad] from the first lateral axis.
+pub fn ring_around(direction: DVec3, count: usize, radius: f64, turn: f64) -> impl Iterator<Item = DVec3> {
+    let (e1, e2) = lateral_axes(direction);
+    (0..count).map(move |i| {
+        let angle = std::f64::consts::TAU * i as f64 / count as f64 + turn;
+        (e1 * angle.cos() + e2 * angle.sin()) * radius
+    })
+}
+
+/// Vectors from the axis to the lines on which the tip springs of a solid needle of the radius `radius` [m] are anchored: 6 at R/2,
+/// 12 at R, turned by `turn` [rad]; before them the axis itself where `centre` is true.
+pub fn tip_lines(direction: DVec3, radius: f64, turn: f64, centre: bool) -> Vec<DVec3> {
+    let rings = ring_around(direction, 6, 0.5 * radius, turn).chain(ring_around(direction, 12, radius, turn));
+    centre.then_some(DVec3::ZERO).into_iter().chain(rings).collect()
+}
+
+/// A straight planned path: from `entry` on the surface along `direction`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedPath {
+    /// [m]
     pub entry: DVec3,
+    /// Unit vector of the insertion.
     pub direction: DVec3,
+    /// Normal of the surface at the entry point, out of the tissue, of any length; +z for a block.
+    pub normal: DVec3,
 }
 
 impl PlannedPath {
     /// Material coordinates of a rest position [m]: distance r0 from the axis, and the axial distance s0 from
-    /// the point where the line through `x` parallel to the path enters the top face (z = 0), so that at oblique
-    /// entry the front of the path is parallel to the surface.
+    /// the point where the line through `x` parallel to the path enters the plane of the surface (the top face z = 0 of a
+    /// block), so that at oblique entry the front of the path is parallel to the surface.
     pub fn material_coordinates(&self, x: DVec3) -> (f64, f64) {
         let relative = x - self.entry;
         let axial = relative.dot(self.direction);
         let radial = (relative - self.direction * axial).length();
-        (radial, x.z / self.direction.z)
+        (radial, relative.dot(self.normal) / self.direction.dot(self.normal))
+    }
+
+    /// Axial coordinate [m], from the entry point, at which the line beside the axis by `offset` [m] enters that plane.
+    pub fn entry_beside(&self, offset: DVec3) -> f64 {
+        -offset.dot(self.normal) / self.direction.dot(self.normal)
+    }
+
+    /// A path into the top face of a block.
+    pub fn into_block(entry: DVec3, direction: DVec3) -> Self {
+        PlannedPath { entry, direction, normal: DVec3::Z }
     }
 }
 

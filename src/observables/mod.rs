@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::needle::centre_line::CentreLine;
 use crate::verdict::Verdict;
 
-/// Force that moves the tool, in parts [N]; positive along the insertion direction. Means over the frame. All parts but the
-/// inertia act on the tissue.
+/// Force that moves the tool, in parts [N]; positive along the insertion direction. Means over the frame. All parts but
+/// bone and inertia act on the tissue.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ForceParts {
     /// What the hand feels along the insertion: sum of the parts [N].
@@ -30,6 +30,9 @@ pub struct ForceParts {
     /// Normal force of the tissue on the shaft, summed along it; it is no part of the axial force. Zero but in the scheme `opening` [N].
     #[serde(default)]
     pub shaft_normal: f64,
+    /// Bone that the tip stands on [N]; it acts on no tissue.
+    #[serde(default)]
+    pub bone: f64,
     /// Mass of the needle times the acceleration of its prescribed motion, mean over the length of a frame [N].
     pub inertia: f64,
     /// Lateral force on the tissue, world frame with the axial part removed [N].
@@ -56,7 +59,7 @@ pub struct ForcePart {
 impl ForceParts {
     /// The parts that add up to `axial`, from the bottom of a stack to its top. A new part is one line here: columns,
     /// charts and reports follow this list.
-    pub const PARTS: [ForcePart; 7] = [
+    pub const PARTS: [ForcePart; 8] = [
         ForcePart {
             name: "cutting",
             column: "cutting_force_n",
@@ -98,6 +101,13 @@ impl ForceParts {
             meaning: "tissue that sticks to the tip",
             colour: [240, 228, 66],
             of: |f| f.adhesion,
+        },
+        ForcePart {
+            name: "bone",
+            column: "bone_force_n",
+            meaning: "bone, or another rigid part, that the tip stands on",
+            colour: [0, 114, 178],
+            of: |f| f.bone,
         },
         ForcePart {
             name: "inertia",

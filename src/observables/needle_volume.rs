@@ -30,7 +30,7 @@ pub fn cells_in_needle(model: &Model, state: &State, pose: &ToolPose, line: Opti
         }
     };
     (0..model.mesh.cell_count())
-        .filter(|cell| !model.mesh.is_gap(*cell) && state.stiffness.get(*cell).is_none_or(|s| *s > 0.5))
+        .filter(|cell| model.mesh.is_tissue(*cell) && state.stiffness.get(*cell).is_none_or(|s| *s > 0.5))
         .filter(|cell| {
             let nodes = model.mesh.cell_nodes(*cell);
             let place = |n: &usize| model.mesh.rest_position(*n) + state.displacement[*n];

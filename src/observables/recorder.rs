@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{ForceParts, FrameRecord};
 use crate::engine::clock::Clock;
 use crate::engine::{EnergyAccount, FrameEnergies, FrameSums};
-use crate::model::Model;
+use crate::model::{Model, rigid};
 use crate::needle::{Kinematics, Tool};
 
 /// Adds up what the frames deliver, in f64.
@@ -38,8 +38,16 @@ impl Recorder {
         let step = first + u64::from(sums.steps);
         let end = clock.time_of(step);
         let e = &mut self.totals;
-        e.external += sums.tool_work + sums.load_work;
-        e.book(&mut self.taken, &sums.energy);
+        // The spring between the tip and bone.
+        let in_bone = |time: f64| {
+            let pose = kinematics.map(|k| k.pose(time));
+            pose.map_or(0.0, |pose| model.depth_in_bone(pose.tip, pose.direction))
+        };
+        let [before, after] = [begin, end].map(in_bone);
+        let held = |depth: f64| 0.5 * rigid::STIFFNESS * depth * depth;
+        let energies = FrameEnergies { contact_stored: sums.energy.contact_stored + held(after), ..sums.energy };
+        e.external += sums.tool_work + sums.load_work + held(after) - held(before);
+        e.book(&mut self.taken, &energies);
         e.external_max = e.external_max.max(e.put_in().abs());
         let mean_pose = kinematics.map(|k| k.pose(0.5 * (begin + end)));
         let direction = mean_pose.map_or(DVec3::ZERO, |p| p.direction);
@@ -52,6 +60,7 @@ impl Recorder {
             friction: sums.friction_impulse / duration,
             shaft_normal: sums.shaft_normal_impulse / duration,
             adhesion: sums.adhesion_impulse / duration,
+            bone: 0.5 * rigid::STIFFNESS * (before + after),
             inertia: inertia(model, kinematics, end),
             lateral: force - direction * force.dot(direction),
             torque: sums.angular_impulse / duration,

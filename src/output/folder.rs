@@ -27,6 +27,11 @@ pub const FIELD_COLLECTION: &str = "frames.pvd";
 /// Folder of the VTU files `frame_00012.vtu`.
 pub const FIELD_FOLDER: &str = "frames";
 
+/// What names of pictures begin with: of stress, and of what lies where in the cut and in three dimensions.
+const STRESS: &str = "stress_";
+const ANATOMY: &str = "anatomy_";
+const BODY: &str = "body_";
+
 const SINGLE_FILES: [&str; 11] = [
     CHECKPOINT,
     FORCE_TABLE,
@@ -62,9 +67,14 @@ pub enum PictureMoment {
 impl PictureMoment {
     /// Name of its first picture, without the ending.
     pub fn picture_stem(self) -> String {
+        format!("{STRESS}{}", self.tag())
+    }
+
+    /// The moment in the names of files: `12.00mm`, `0.5000s`.
+    pub fn tag(self) -> String {
         match self {
-            PictureMoment::Depth(depth) => format!("stress_{:05.2}mm", depth * 1e3),
-            PictureMoment::Time(time) => format!("stress_{time:.4}s"),
+            PictureMoment::Depth(depth) => format!("{:05.2}mm", depth * 1e3),
+            PictureMoment::Time(time) => format!("{time:.4}s"),
         }
     }
 }
@@ -166,6 +176,14 @@ impl OutputFolder {
         path
     }
 
+    /// Paths of the pictures of what lies where that belong to a picture of stress: `anatomy_12.00mm.png` and, in three dimensions,
+    /// `body_12.00mm.png` to `stress_12.00mm.png`.
+    pub fn anatomy_beside(picture: &Path) -> [PathBuf; 2] {
+        let name = picture.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
+        let moment = name.strip_prefix(STRESS).unwrap_or(&name);
+        [ANATOMY, BODY].map(|kind| picture.with_file_name(format!("{kind}{moment}")))
+    }
+
     /// Path of a VTU file relative to the folder, as the collection names it.
     pub fn field_name(frame: u64) -> String {
         format!("{FIELD_FOLDER}/frame_{frame:05}.vtu")
@@ -241,24 +259,42 @@ fn is_unfinished_file(name: &str) -> bool {
 
 fn is_result_file(name: &str) -> bool {
     let name = name.strip_suffix(UNFINISHED).unwrap_or(name);
-    SINGLE_FILES.contains(&name) || is_picture_file(name)
+    SINGLE_FILES.contains(&name) || is_picture_file(name) || is_volume_file(name)
 }
 
-/// `stress_<number>mm.png`, `stress_<number>s.png`, with `_<number>` before the ending where a moment repeats.
+/// Names of the files that a run writes for a patient, before and behind the moment.
+const VOLUME_FILES: [(&str, &str); 4] =
+    [("displacement_", ".nrrd"), ("labels_", ".nrrd"), ("needle_", ".mrk.json"), ("targets_", ".mrk.json")];
+
+fn is_volume_file(name: &str) -> bool {
+    VOLUME_FILES
+        .iter()
+        .any(|(begin, end)| name.strip_prefix(begin).and_then(|rest| rest.strip_suffix(end)).is_some_and(is_moment))
+}
+
+/// Whether it is `<number>mm` or `<number>s`.
+fn is_moment(text: &str) -> bool {
+    let number = text.strip_suffix("mm").or_else(|| text.strip_suffix('s'));
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    number.is_some_and(|n| {
+        let n = n.strip_prefix('-').unwrap_or(n);
+        n.split_once('.').is_some_and(|(whole, part)| digits(whole) && digits(part))
+    })
+}
+
+/// `stress_<number>mm.png`, `stress_<number>s.png`, with `_<number>` before the ending where a moment repeats; `anatomy_` and `body_`
+/// likewise.
 fn is_picture_file(name: &str) -> bool {
-    let Some(middle) = name.strip_prefix("stress_").and_then(|rest| rest.strip_suffix(".png")) else {
+    let of_run = [STRESS, ANATOMY, BODY].into_iter().find_map(|kind| name.strip_prefix(kind));
+    let Some(middle) = of_run.and_then(|rest| rest.strip_suffix(".png")) else {
         return false;
     };
     let (moment, repeat) = match middle.split_once('_') {
         Some((moment, repeat)) => (moment, Some(repeat)),
         None => (middle, None),
     };
-    let number = moment.strip_suffix("mm").or_else(|| moment.strip_suffix('s'));
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    number.is_some_and(|n| {
-        let n = n.strip_prefix('-').unwrap_or(n);
-        n.split_once('.').is_some_and(|(whole, part)| digits(whole) && digits(part))
-    }) && repeat.is_none_or(digits)
+    is_moment(moment) && repeat.is_none_or(digits)
 }
 
 fn is_field_file(name: &str) -> bool {
@@ -310,6 +346,10 @@ mod tests {
             "stress_12.50mm_2.png",
             "stress_-1.00mm.png",
             "stress_0.5000s.png",
+            "displacement_12.00mm.nrrd",
+            "labels_0.5000s.nrrd",
+            "needle_06.00mm.mrk.json",
+            "targets_06.00mm.mrk.json.part",
         ] {
             assert!(is_result_file(ours), "{ours}");
         }
@@ -317,7 +357,11 @@ mod tests {
             "force.csv.bak",
             "my_force.csv",
             "stress_notes.png",
+            "anatomy_notes.png",
             "stress_mm.png",
+            "labels.nrrd",
+            "labels_patient.nrrd",
+            "needle_best.mrk.json",
             "stress_6.0mm_final.png",
             "notes.txt",
             "scene.toml",
@@ -340,6 +384,10 @@ mod tests {
             let path = folder.picture(moment);
             let name = path.file_name().unwrap().to_str().unwrap();
             assert!(is_result_file(name), "{name}");
+            for (beside, kind) in OutputFolder::anatomy_beside(&path).iter().zip(["anatomy_", "body_"]) {
+                let name = beside.file_name().unwrap().to_str().unwrap();
+                assert!(name.starts_with(kind) && is_result_file(name), "{name}");
+            }
         }
     }
 

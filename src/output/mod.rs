@@ -23,6 +23,7 @@ pub mod sample_chart;
 pub mod summary;
 pub mod tables;
 pub mod target;
+pub mod volumes;
 pub mod vtu;
 
 pub use chart::write_force_chart;

@@ -21,6 +21,8 @@ const VTK_HEXAHEDRON: u8 = 12;
 #[derive(Debug)]
 pub struct FieldFiles {
     folder: OutputFolder,
+    /// Names of the materials that the array `material` counts; none: the files do not say them.
+    materials: Vec<String>,
     /// Time [s] and relative path of every file so far.
     written: Vec<(f64, String)>,
 }
@@ -28,12 +30,17 @@ pub struct FieldFiles {
 impl FieldFiles {
     /// Nothing is written before the first frame.
     pub fn new(folder: &OutputFolder) -> Self {
-        Self { folder: folder.clone(), written: Vec::new() }
+        Self { folder: folder.clone(), materials: Vec::new(), written: Vec::new() }
     }
 
     /// Goes on after the files of a run that was stopped: time [s] and relative path of each.
     pub fn resumed(folder: &OutputFolder, written: Vec<(f64, String)>) -> Self {
-        Self { folder: folder.clone(), written }
+        Self { folder: folder.clone(), materials: Vec::new(), written }
+    }
+
+    /// The same with the names of the materials, that of the tissue itself first.
+    pub fn naming(self, materials: Vec<String>) -> Self {
+        Self { materials, ..self }
     }
 
     /// Time [s] and relative path of every file so far.
@@ -47,7 +54,7 @@ impl FieldFiles {
         std::fs::create_dir_all(&fields).map_err(|source| Error::file(&fields, source))?;
         let name = OutputFolder::field_name(snapshot.frame);
         let path = self.folder.file(&name);
-        whole_file::write(&path, vtu(mesh, snapshot).as_bytes())?;
+        whole_file::write(&path, vtu(mesh, snapshot, &self.materials).as_bytes())?;
         self.written.retain(|(_, other)| *other != name);
         self.written.push((snapshot.time, name));
         whole_file::write(&self.folder.file(FIELD_COLLECTION), collection(&self.written).as_bytes())?;
@@ -55,11 +62,11 @@ impl FieldFiles {
     }
 }
 
-/// Text of one VTU file. Empty cell fields are left out.
-pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot) -> String {
+/// Text of one VTU file. Empty cell fields are left out. `materials` are names for the numbers of the array `material`.
+pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot, materials: &[String]) -> String {
     let nodes = mesh.node_count();
     // Flat cells between the copies of a line are no tissue.
-    let shown: Vec<usize> = (0..mesh.cell_count()).filter(|c| !mesh.is_gap(*c)).collect();
+    let shown: Vec<usize> = (0..mesh.cell_count()).filter(|c| mesh.is_tissue(*c)).collect();
     let cells = shown.len();
     assert_eq!(snapshot.displacement.len(), nodes, "a snapshot holds one displacement per node");
     let points = (0..nodes).flat_map(|n| mesh.rest_position(n).to_array());
@@ -75,6 +82,9 @@ pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot) -> String {
          <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n\
          <UnstructuredGrid>\n",
     );
+    if !snapshot.material.is_empty() && !materials.is_empty() {
+        text += &names(materials);
+    }
     text += &format!("<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{cells}\">\n<Points>\n");
     text += &array("Points", "Float32", 3, floats(points));
     text += "</Points>\n<Cells>\n";
@@ -134,6 +144,16 @@ fn array(name: &str, kind: &str, components: usize, data: Vec<u8>) -> String {
     )
 }
 
+/// Names of the numbers of the array `material` as a comment: texts in field data are refused by meshio.
+fn names(materials: &[String]) -> String {
+    // Nothing that ends a comment or begins a tag.
+    let plain = |name: &str| -> String {
+        name.chars().map(|c| if c.is_alphanumeric() || " _.,()%".contains(c) { c } else { '_' }).collect()
+    };
+    let all: Vec<String> = materials.iter().enumerate().map(|(n, name)| format!("{n} {}", plain(name))).collect();
+    format!("<!-- material: {} -->\n", all.join("; "))
+}
+
 /// Base64 with padding (RFC 4648, section 4).
 fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -154,6 +174,12 @@ fn base64(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_do_not_end_their_comment() {
+        let text = names(&["across-fibre".into(), "a --><b>".into()]);
+        assert_eq!(text, "<!-- material: 0 across_fibre; 1 a ____b_ -->\n");
+    }
 
     #[test]
     fn base64_of_the_standard() {

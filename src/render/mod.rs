@@ -1,7 +1,8 @@
 //! The picture of a run: a cut through tissue and tool with the von Mises stress as colour.
 //!
 //! [`slice`] cuts the deformed mesh, [`picture`] composes one list of coloured triangles, [`offscreen`] draws it on the
-//! device and [`raster`] on the processor. Both draw the same list with the same four samples per pixel.
+//! device and [`raster`] on the processor. Both draw the same list with the same four samples per pixel. [`anatomy`] tells what lies where
+//! in a scene with labels or regions, and [`contour`] where it ends.
 
 use std::path::Path;
 
@@ -11,13 +12,18 @@ use crate::scene::Scene;
 use crate::whole_file;
 use crate::{Error, Result};
 
+pub mod anatomy;
+pub mod body;
+pub mod contour;
 pub mod offscreen;
 pub mod picture;
 pub mod raster;
 pub mod slice;
 pub mod stroke_font;
+pub mod surfaces;
 
 pub use picture::Picture;
+pub use picture::anatomy::AnatomyPicture;
 
 /// A finished picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,10 +55,23 @@ pub fn draw(
     snapshot: &FieldSnapshot,
     device: Option<(&wgpu::Device, &wgpu::Queue)>,
 ) -> Result<Image> {
-    let picture = Picture::compose(scene, mesh, snapshot);
+    rendered(&Picture::compose(scene, mesh, snapshot), device)
+}
+
+/// Draws what lies where, in natural colours with names; none for a scene without labels and regions.
+pub fn draw_anatomy(
+    scene: &Scene,
+    mesh: &Mesh,
+    snapshot: &FieldSnapshot,
+    device: Option<(&wgpu::Device, &wgpu::Queue)>,
+) -> Result<Option<Image>> {
+    AnatomyPicture::compose(scene, mesh, snapshot).map(|found| rendered(&found.picture, device)).transpose()
+}
+
+fn rendered(picture: &Picture, device: Option<(&wgpu::Device, &wgpu::Queue)>) -> Result<Image> {
     let rgba = match device {
-        Some((device, queue)) => offscreen::render_on_device(device, queue, &picture)?,
-        None => raster::render_on_processor(&picture),
+        Some((device, queue)) => offscreen::render_on_device(device, queue, picture)?,
+        None => raster::render_on_processor(picture),
     };
     Ok(Image { width: picture.width, height: picture.height, rgba })
 }

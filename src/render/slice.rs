@@ -66,7 +66,7 @@ impl Plane {
             nodes.iter().map(|n| mesh.rest_position(*n)).sum::<DVec3>() / nodes.len() as f64
         };
         let near = (0..mesh.cell_count())
-            .filter(|cell| !mesh.is_gap(*cell))
+            .filter(|cell| mesh.is_tissue(*cell))
             .map(|cell| plane.height(middle(cell)))
             .min_by(|a, b| (a - wanted).abs().total_cmp(&(b - wanted).abs()));
         Self { origin: plane.origin + plane.normal * near.unwrap_or(0.0), ..plane }
@@ -75,7 +75,7 @@ impl Plane {
     /// True where a cell at rest lies on both sides of the cut.
     fn meets(&self, mesh: &Mesh, cell_size: f64) -> bool {
         let plane = self.beside_grid_lines(cell_size);
-        (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell)).any(|cell| {
+        (0..mesh.cell_count()).filter(|cell| mesh.is_tissue(*cell)).any(|cell| {
             let nodes = mesh.cell_nodes(cell);
             let above = |node: &usize| plane.height(mesh.rest_position(*node)) >= 0.0;
             nodes.iter().any(above) && !nodes.iter().all(above)
@@ -117,6 +117,8 @@ impl Plane {
 pub struct SliceTriangle {
     /// Corners in the plane [m].
     pub points: [DVec2; 3],
+    /// The same points of the tissue at rest [m].
+    pub rest: [DVec3; 3],
     /// Von Mises stress at the corners [Pa].
     pub von_mises: [f64; 3],
     /// True in a cell that the tip has opened.
@@ -139,6 +141,8 @@ pub enum EdgeKind {
 pub struct SliceLine {
     /// Ends in the plane [m].
     pub points: [DVec2; 2],
+    /// The same points of the tissue at rest [m].
+    pub rest: [DVec3; 2],
     pub kind: EdgeKind,
 }
 
@@ -151,8 +155,24 @@ pub struct Slice {
     pub cells_left_out: usize,
 }
 
-/// Cuts the deformed mesh.
+/// Cuts the deformed tissue.
 pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64) -> Slice {
+    cut_cells(mesh, snapshot, plane, cell_size, |cell| mesh.is_tissue(cell))
+}
+
+/// As [`cut`], but with the cells in which nothing is, or what does not deform: what lies in them is told by the label map. Of such cells
+/// only edges at the border of the block are drawn.
+pub fn cut_whole(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64) -> Slice {
+    cut_cells(mesh, snapshot, plane, cell_size, |cell| !mesh.is_gap(cell))
+}
+
+fn cut_cells(
+    mesh: &Mesh,
+    snapshot: &FieldSnapshot,
+    plane: &Plane,
+    cell_size: f64,
+    is_wanted: impl Fn(usize) -> bool,
+) -> Slice {
     let plane = plane.beside_grid_lines(cell_size);
     let von_mises = smoothed_to_nodes(mesh, VON_MISES.cells(snapshot), &snapshot.stiffness);
     let (low, high) = mesh.bounds();
@@ -163,7 +183,7 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
     };
     let mut slice = Slice::default();
     for cell in 0..mesh.cell_count() {
-        if mesh.is_gap(cell) {
+        if !is_wanted(cell) {
             continue;
         }
         let nodes = mesh.cell_nodes(cell);
@@ -171,7 +191,8 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
             nodes.iter().map(|n| snapshot.displacement.get(*n).copied().unwrap_or_default()).collect();
         // Written so that NaN counts as too far.
         let drawable = displacement.iter().all(|u| u.length() <= farthest);
-        let corner: Vec<DVec3> = nodes.iter().zip(&displacement).map(|(n, u)| mesh.rest_position(*n) + *u).collect();
+        let rest: Vec<DVec3> = nodes.iter().map(|n| mesh.rest_position(*n)).collect();
+        let corner: Vec<DVec3> = rest.iter().zip(&displacement).map(|(rest, u)| *rest + *u).collect();
         if !drawable {
             slice.cells_left_out += 1;
             continue;
@@ -186,14 +207,16 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
             (
                 plane.project(corner[a].lerp(corner[b], t)),
                 von_mises[nodes[a]] + t * (von_mises[nodes[b]] - von_mises[nodes[a]]),
+                rest[a].lerp(rest[b], t),
             )
         };
         let parts: &[[usize; 4]] = if nodes.len() == 8 { &TETRAHEDRA } else { &[[0, 1, 2, 3]] };
         for tetrahedron in parts.iter().copied() {
             let (above, below): (Vec<usize>, Vec<usize>) = tetrahedron.into_iter().partition(|&c| height[c] >= 0.0);
-            let mut push = |corners: [(DVec2, f64); 3]| {
+            let mut push = |corners: [(DVec2, f64, DVec3); 3]| {
                 slice.triangles.push(SliceTriangle {
                     points: corners.map(|c| c.0),
+                    rest: corners.map(|c| c.2),
                     von_mises: corners.map(|c| c.1),
                     opened,
                 });
@@ -211,13 +234,14 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
             }
         }
         let mut edge = |triangle: [usize; 3], kind: EdgeKind| {
-            let ends: Vec<DVec2> = (0..3)
+            let ends: Vec<(DVec2, DVec3)> = (0..3)
                 .map(|e| (triangle[e], triangle[(e + 1) % 3]))
                 .filter(|&(a, b)| (height[a] >= 0.0) != (height[b] >= 0.0))
-                .map(|(a, b)| crossing(a, b).0)
+                .map(|(a, b)| crossing(a, b))
+                .map(|(point, _, rest)| (point, rest))
                 .collect();
             if let &[a, b] = ends.as_slice() {
-                slice.lines.push(SliceLine { points: [a, b], kind });
+                slice.lines.push(SliceLine { points: [a.0, b.0], rest: [a.1, b.1], kind });
             }
         };
         match mesh {
@@ -246,7 +270,9 @@ pub fn cut(mesh: &Mesh, snapshot: &FieldSnapshot, plane: &Plane, cell_size: f64)
                             false => between(&snapshot.material, cell, other),
                         }
                     };
-                    triangles.into_iter().for_each(|triangle| edge(triangle, kind));
+                    if !block.is_empty(cell) || (kind == EdgeKind::Surface && (at[axis] == 0 || last)) {
+                        triangles.into_iter().for_each(|triangle| edge(triangle, kind));
+                    }
                 }
             }
             Mesh::Tets(_) => {
@@ -307,7 +333,8 @@ fn smoothed_to_nodes(mesh: &Mesh, values: &[f64], stiffness: &[f64]) -> Vec<f64>
     let mut intact = vec![(0.0, 0.0); mesh.node_count()];
     let mut opened = intact.clone();
     for (cell, &value) in values.iter().enumerate() {
-        if !value.is_finite() {
+        // Cells that do not deform know no stress, and shall not pale what lies beside them.
+        if !value.is_finite() || mesh.is_empty(cell) {
             continue;
         }
         let volume = mesh.cell_volume(cell);

@@ -57,6 +57,7 @@ impl Scene {
             path: "block".into(),
             tissue: Tissue {
                 size: size.into(),
+                top: 0.0,
                 cell_size,
                 fine_radius: 2.5e-3,
                 growth: 1.25,
@@ -65,6 +66,7 @@ impl Scene {
             material,
             regions: Vec::new(),
             mesh: None,
+            case: None,
             supports: Vec::new(),
             faces: [held.clone(), held.clone(), held.clone(), held.clone(), held, FaceCondition::default()],
             tool: None,

@@ -32,6 +32,7 @@ pub use document::closest;
 pub use file::OnTrouble;
 pub use task::{Goal, Obstacle, Task};
 
+use crate::anatomy::Case;
 use crate::effects::own::OwnEffect;
 use crate::effects::{EffectSet, Numbers, TissueMaterial};
 use crate::mesh::{TetMesh, Tissue};
@@ -63,6 +64,8 @@ pub struct Scene {
     pub regions: Vec<Region>,
     /// Tetrahedra instead of the structured block.
     pub mesh: Option<Arc<TetMesh>>,
+    /// The label map that the block lies in.
+    pub case: Option<Arc<Case>>,
     /// Node sets of the tetrahedral mesh whose displacement components are held at zero.
     pub supports: Vec<Support>,
     /// Conditions on the six faces, indexed by [`Face`].
@@ -148,12 +151,36 @@ impl Scene {
 
     /// The same for a hand: with room beyond the phases, and everywhere where the path is free.
     pub fn for_hand(mut self) -> Scene {
-        self.motion = self.motion.with_room(self.tissue.size.z);
+        // How far a path may go on in a mesh is not looked at here.
+        if self.mesh.is_none() {
+            self.motion = self.motion.with_room(self.tissue.size.z);
+        }
         let free = self.has_free_path();
         if let Some(puncture) = &mut self.effects.puncture {
             puncture.anywhere = free;
         }
         self
+    }
+
+    /// Index of the region at a point, the last that holds it; `None`: the tissue's own material.
+    pub fn region_at(&self, x: DVec3) -> Option<usize> {
+        let of_mesh = self.regions.iter().any(|region| matches!(region.shape, RegionShape::MeshTag(_)));
+        let mesh = self.mesh.as_ref().filter(|_| of_mesh);
+        let tag = mesh.and_then(|mesh| Some(&mesh.regions[mesh.tags[mesh.locate(x)?.0] as usize]));
+        self.region_in(x, tag.map(String::as_str))
+    }
+
+    /// The same where the region of the mesh file is known in which the point lies.
+    pub fn region_in(&self, x: DVec3, mesh_tag: Option<&str>) -> Option<usize> {
+        self.regions.iter().rposition(|region| match &region.shape {
+            RegionShape::MeshTag(tag) => mesh_tag == Some(tag),
+            shape => shape.contains(x),
+        })
+    }
+
+    /// The material at a point.
+    pub fn material_at(&self, x: DVec3) -> &TissueMaterial {
+        self.region_at(x).map_or(&self.material, |index| &self.regions[index].material)
     }
 
     /// Where the parameters of effects find their present values.
@@ -213,6 +240,13 @@ pub enum RegionShape {
     },
     /// Cells of a tetrahedral mesh that carry this region name.
     MeshTag(String),
+    /// What has one of these labels in a label map.
+    Labels {
+        /// Ascending.
+        labels: Vec<u16>,
+        /// The label map in the scene.
+        case: Arc<Case>,
+    },
 }
 
 impl RegionShape {
@@ -228,6 +262,7 @@ impl RegionShape {
                 (0.0..=1.0).contains(&along) && (x - *from - axis * along).length() <= *radius
             }
             RegionShape::MeshTag(_) => false,
+            RegionShape::Labels { labels, case } => labels.binary_search(&case.label_at(x)).is_ok(),
         }
     }
 }
@@ -368,6 +403,12 @@ pub struct Outputs {
     pub pictures_at_time: Vec<f64>,
     /// Times of VTU files in a scene with a tool on a free path [s].
     pub fields_at_time: Vec<f64>,
+    /// Depths on the way in at which volumes are written for the patient [m], or times [s] in a scene without a tool.
+    pub volumes_at: Vec<f64>,
+    /// Times of volumes in a scene with a tool on a free path [s].
+    pub volumes_at_time: Vec<f64>,
+    /// Voxels of the label map from one voxel of these volumes to the next.
+    pub volume_stride: usize,
     /// Width of a picture in pixels.
     pub picture_width: u32,
     /// Upper end of the colour bar [Pa]; `None`: the largest value in the picture, rounded up.

@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn gauges_are_sorted_and_needles_plausible() {
-        assert_eq!(needles().len(), 12);
+        assert_eq!(needles().len(), 21);
         assert!(needles().windows(2).all(|w| w[0].outer_diameter > w[1].outer_diameter));
         assert!(
             needles()

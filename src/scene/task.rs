@@ -42,6 +42,8 @@ pub enum Obstacle {
         centre: DVec3,
         radius: f64,
     },
+    /// All of a region, by its index: what has a label in a patient, or a shape.
+    Region(usize),
     /// A cylinder between two points of its axis, with round ends.
     Cylinder {
         from: DVec3,

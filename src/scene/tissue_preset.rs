@@ -7,6 +7,8 @@ use crate::material::ElasticLaw;
 #[derive(Debug, Clone)]
 pub struct TissuePreset {
     pub name: String,
+    /// Further names that it is found by.
+    pub aliases: Vec<String>,
     /// One line: what it is.
     pub summary: String,
     /// Where the constants come from.

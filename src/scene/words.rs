@@ -59,7 +59,7 @@ pub fn units(_: &mut SchemaGenerator) -> Schema {
     one_of(LengthUnit::ALL.into_iter().map(LengthUnit::symbol))
 }
 
-/// Names of the built-in materials, read off their file: the presets themselves are made of the tables that this schema describes.
+/// Names and aliases of the built-in materials, read off their file: the presets themselves are made of the tables that this schema describes.
 fn preset_names() -> Vec<String> {
     #[derive(Deserialize)]
     struct Library {
@@ -68,10 +68,13 @@ fn preset_names() -> Vec<String> {
     #[derive(Deserialize)]
     struct Named {
         name: String,
+        #[serde(default)]
+        aliases: Vec<String>,
     }
     let library: Library = toml::from_str(include_str!("../../assets/materials.toml"))
         .expect("assets/materials.toml is part of the program and tested");
-    library.material.into_iter().map(|material| material.name).collect()
+    let (names, aliases): (Vec<_>, Vec<_>) = library.material.into_iter().map(|m| (m.name, m.aliases)).unzip();
+    names.into_iter().chain(aliases.into_iter().flatten()).collect()
 }
 
 /// Without a library of its own a material knows the built-in presets alone.

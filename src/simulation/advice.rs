@@ -15,13 +15,16 @@ use crate::scene::{Face, Scene};
 /// internal energy.
 pub const COARSEST: f64 = 0.7;
 
+/// The same for tetrahedra that are too fine: with 0.34 some turned inside out, with 0.41 none.
+pub const FINEST_TETRAHEDRA: f64 = 0.4;
+
 /// Largest jump of prescribed motion at an edge of the tissue, in cells: an edge of one cell length turns over at 1, and the cell beside
 /// it, whose other nodes are free, at a little more than half of that.
 pub const MOST_JUMP: f64 = 0.5;
 
 /// All that is told, one sentence each.
 pub fn advice(model: &Model) -> Vec<String> {
-    let parts = [inertia_that_shows, coarse_cells, deep_dimple, torn_edge];
+    let parts = [inertia_that_shows, unfit_cells, deep_dimple, torn_edge];
     parts.iter().filter_map(|part| part(model)).collect()
 }
 
@@ -51,14 +54,29 @@ fn inertia_that_shows(model: &Model) -> Option<String> {
     ))
 }
 
-/// Whether the cells are coarse against the needle.
-fn coarse_cells(model: &Model) -> Option<String> {
+/// Whether the cells are coarse against the needle, or tetrahedra too fine.
+fn unfit_cells(model: &Model) -> Option<String> {
     let plan = model.puncture.as_ref()?;
-    let across = model.scene.tissue.cell_size / (2.0 * plan.needle.radius);
+    // Cells of a mesh are as large as those on the path are on the mean, as edges of regular tetrahedra.
+    let edge = match &model.mesh {
+        Mesh::Block(_) => model.scene.tissue.cell_size,
+        Mesh::Tets(mesh) => {
+            let volume: f64 = plan.cells.iter().map(|path| mesh.volume(path.cell as usize)).sum();
+            (6.0 * std::f64::consts::SQRT_2 * volume / plan.cells.len().max(1) as f64).cbrt()
+        }
+    };
+    let across = edge / (2.0 * plan.needle.radius);
+    if across < FINEST_TETRAHEDRA && model.mesh.as_tets().is_some() {
+        return Some(format!(
+            "tetrahedra of {across:.2} needle diameters on the path: under a tip so fine ones turn inside out, since its springs pull at \
+             single nodes; a mesh with edges of {FINEST_TETRAHEDRA} to {COARSEST} diameters there is advised"
+        ));
+    }
     (across > COARSEST).then(|| {
         format!(
             "cells of {across:.2} needle diameters: the tip bends them rather than parting them, and the force depends on the mesh; \
-             tissue.cell_size_mm of half a diameter or less is advised"
+             {} of half a diameter or less is advised",
+            if model.mesh.as_tets().is_some() { "a mesh with cells" } else { "tissue.cell_size_mm" }
         )
     })
 }

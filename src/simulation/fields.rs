@@ -89,7 +89,7 @@ pub fn snapshot(
         }
     }
     if !model.cell_material.is_empty() {
-        fields.material = model.cell_material.iter().map(|m| f64::from(*m)).collect();
+        fields.material = model.composition.main.iter().map(|m| f64::from(*m)).collect();
     }
     fields.displacement = state.displacement;
     fields.stiffness = state.stiffness;

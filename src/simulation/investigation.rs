@@ -148,14 +148,14 @@ fn locate(
     let speeds = state.velocity.iter().map(speed).enumerate();
     let (node, speed) = speeds.fold((0, -1.0), |a, b| if b.1 > a.1 { b } else { a });
     let around =
-        (0..model.mesh.cell_count()).filter(|c| !model.mesh.is_gap(*c) && model.mesh.cell_nodes(*c).contains(&node));
+        (0..model.mesh.cell_count()).filter(|c| model.mesh.is_tissue(*c) && model.mesh.cell_nodes(*c).contains(&node));
     let stress = |cell: usize| {
         let value = fields.von_mises[cell];
         if value.is_finite() { value } else { f64::INFINITY }
     };
     let worst = match sign {
         Some(Sign::Inversion) => (0..model.mesh.cell_count())
-            .filter(|c| !model.mesh.is_gap(*c))
+            .filter(|c| model.mesh.is_tissue(*c))
             .min_by(|a, b| fields.jacobian[*a].total_cmp(&fields.jacobian[*b])),
         _ => around.max_by(|a, b| stress(*a).total_cmp(&stress(*b))),
     };

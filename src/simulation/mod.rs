@@ -118,7 +118,7 @@ impl Simulation {
     pub fn lead(&mut self, pose: &HandPose) {
         let until = self.clock.time_of(self.clock.first_step(self.led_frames + 1));
         if let Some(kinematics) = self.kinematics.as_mut().filter(|k| k.is_led()) {
-            kinematics.lead(pose, until);
+            kinematics.lead(&self.model.before_bone(&kinematics.last(), pose), until);
             self.led_frames += 1;
         }
     }

@@ -131,6 +131,9 @@ pub struct LayerFigures {
 pub struct PhysicalFigures {
     /// [N]
     pub peak_axial_force: f64,
+    /// Of bone against the tip [N]; 0: it was not touched.
+    #[serde(default)]
+    pub peak_bone_force: f64,
     pub mean_axial_force: Option<f64>,
     /// [N/s]
     pub largest_force_rate: Option<f64>,
@@ -193,6 +196,7 @@ impl PhysicalFigures {
     /// The figures of a run. `samples`: the trajectory of its needle, which must cover the time of the records.
     pub fn of(scene: &Scene, samples: &[Sample], records: &[FrameRecord]) -> PhysicalFigures {
         let mut figures = PhysicalFigures {
+            peak_bone_force: records.iter().map(|r| r.force.bone).fold(0.0, f64::max),
             peak_axial_force: records.iter().map(|r| r.force.axial).fold(0.0, f64::max),
             mean_axial_force: mean_axial_force(records),
             largest_force_rate: largest_force_rate(records),

@@ -75,6 +75,7 @@ fn physical_rows(p: &PhysicalFigures) -> Vec<(String, Option<f64>)> {
     let mut rows = vec![
         ("overshoot".into(), p.overshoot()),
         ("peak_axial_force".into(), Some(p.peak_axial_force)),
+        ("peak_bone_force".into(), (p.peak_bone_force > 0.0).then_some(p.peak_bone_force)),
         ("mean_axial_force".into(), p.mean_axial_force),
         ("largest_force_rate".into(), p.largest_force_rate),
         ("peak_lateral_force".into(), Some(p.peak_lateral_force)),

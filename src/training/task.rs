@@ -5,6 +5,7 @@
 //! avoid          least distance of the outside of the needle from the obstacle over all samples: of the tip, and of the shaft
 //!                behind the tip's cone with its radius taken off; must be above 0 and at least the clearance   [m]
 //! stop in layer  deepest point below the top face that the tip has cut to, in the material at rest             [m]
+//!                a region of a label map is known to a quarter of a millimetre
 //! core           mass or rest volume in the bore at the end                                              [kg], [m^3]
 //! time limit     elapsed time                                                                                  [s]
 //! ```
@@ -12,6 +13,7 @@
 //! whether a layer was left: before it gives way a layer is pushed ahead by millimetres.
 
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use crate::scene::{Goal, Obstacle, Task};
@@ -104,18 +106,63 @@ pub fn judge(
 
 /// Least distance of the outside of the needle from an obstacle [m], negative inside it; `None` without a needle or a sample.
 pub fn clearance_of(scene: &Scene, samples: &[Sample], obstacle: &Obstacle) -> Option<f64> {
-    let needle = scene.needle()?;
-    let (axis, radius) = match *obstacle {
-        Obstacle::Sphere { centre, radius } => ([centre, centre], radius),
-        Obstacle::Cylinder { from, to, radius } => ([from, to], radius),
+    let (axes, radius) = match *obstacle {
+        Obstacle::Sphere { centre, radius } => (vec![[centre, centre]], radius),
+        Obstacle::Cylinder { from, to, radius } => (vec![[from, to]], radius),
+        Obstacle::Region(index) => {
+            (points_of_region(scene, index).into_iter().map(|x| [x, x]).collect(), 0.5 * POINT_STEP)
+        }
     };
-    let distance = |sample: &Sample| {
+    let needle = scene.needle()?;
+    let distance = |sample: &Sample, axis: [DVec3; 2]| {
         let behind = |s: f64| sample.tip - sample.direction * s;
         let tip = segment_distance([sample.tip; 2], axis);
         let shaft = segment_distance([behind(needle.tip_length), behind(needle.length.max(needle.tip_length))], axis);
         tip.min(shaft - needle.radius) - radius
     };
-    samples.iter().map(distance).reduce(f64::min)
+    let nearest = |sample: &Sample| axes.iter().map(|axis| distance(sample, *axis)).reduce(f64::min);
+    // A needle that stands adds nothing.
+    let mut last: Option<&Sample> = None;
+    let moved = samples.iter().filter(|sample| {
+        let stands = last.is_some_and(|l| l.tip.distance(sample.tip) < STANDING && l.direction == sample.direction);
+        if !stands {
+            last = Some(sample);
+        }
+        !stands
+    });
+    moved.filter_map(nearest).reduce(f64::min)
+}
+
+/// Distance of the points that stand for a region [m].
+const POINT_STEP: f64 = 0.5e-3;
+/// Way of a tip that is not looked at again [m].
+const STANDING: f64 = 1e-6;
+
+/// Points on a lattice that lie at the border of a region, within the block of the scene [m].
+fn points_of_region(scene: &Scene, index: usize) -> Vec<DVec3> {
+    let size = scene.tissue.size;
+    let low = DVec3::new(-0.5 * size.x, -0.5 * size.y, -size.z);
+    let counts = ((size + DVec3::Z * scene.tissue.top) / POINT_STEP).floor();
+    let [nx, ny, nz] = counts.to_array().map(|n| n.max(1.0) as usize);
+    let inside: Vec<bool> =
+        (0..nx * ny * nz).into_par_iter().map(|n| scene.region_at(low + lattice(n, nx, ny)) == Some(index)).collect();
+    let at = |i: usize, j: usize, k: usize| inside[(k * ny + j) * nx + i];
+    (0..inside.len())
+        .filter(|n| inside[*n])
+        .filter(|n| {
+            let (i, j, k) = (n % nx, n / nx % ny, n / (nx * ny));
+            let border = i == 0 || j == 0 || k == 0 || i + 1 == nx || j + 1 == ny || k + 1 == nz;
+            border
+                || !(at(i - 1, j, k) && at(i + 1, j, k) && at(i, j - 1, k) && at(i, j + 1, k))
+                || !(at(i, j, k - 1) && at(i, j, k + 1))
+        })
+        .map(|n| low + lattice(n, nx, ny))
+        .collect()
+}
+
+/// Middle of a cube of the lattice.
+fn lattice(n: usize, nx: usize, ny: usize) -> DVec3 {
+    DVec3::new((n % nx) as f64 + 0.5, (n / nx % ny) as f64 + 0.5, (n / (nx * ny)) as f64 + 0.5) * POINT_STEP
 }
 
 /// Least distance of two straight lines between points [m]; a line may be a point.

@@ -49,7 +49,7 @@ const fn optional(key: &'static str, label: &'static str, unit: Unit, better: Be
 
 /// All figures, in the order in which they are shown. A key that ends in a dot stands for one row per layer or target,
 /// whose name is put behind key and label.
-pub const FIGURES: [FigureText; 33] = [
+pub const FIGURES: [FigureText; 34] = [
     figure("overshoot", "Overshoot behind the last layer", units::MILLIMETRE, Better::Lower),
     figure("passes", "Passes through the surface", units::ONE, Better::Lower),
     figure("redirections", "Redirections inside tissue", units::ONE, Better::Lower),
@@ -60,6 +60,7 @@ pub const FIGURES: [FigureText; 33] = [
     optional("core_mass", "Core in the bore", units::MILLIGRAM, Better::Higher),
     optional("core_length", "Core length at rest", units::MILLIMETRE, Better::Higher),
     figure("peak_axial_force", "Largest axial force", units::NEWTON, Better::Lower),
+    optional("peak_bone_force", "Largest force on bone", units::NEWTON, Better::Lower),
     figure("mean_axial_force", "Mean axial force in tissue", units::NEWTON, Better::Lower),
     figure("largest_force_rate", "Fastest rise of force (0.1 s)", units::NEWTON_PER_SECOND, Better::Lower),
     figure("peak_lateral_force", "Largest lateral force", units::NEWTON, Better::Lower),

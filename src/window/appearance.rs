@@ -50,6 +50,10 @@ pub struct Look {
     /// How much of such tissue is drawn, 0..1.
     pub veil: f32,
     pub targets: bool,
+    /// Parts in natural colours where the scene has labels, else a field.
+    pub natural: bool,
+    /// How much of the skin is drawn over them, 0..1.
+    pub skin: f32,
     pub probe: Probe,
     /// Size of the texts while its slider is held.
     zoom: Option<f32>,
@@ -63,20 +67,24 @@ impl Default for Look {
             through: 0,
             veil: 0.25,
             targets: true,
+            natural: true,
+            skin: 0.4,
             probe: Probe::default(),
             zoom: None,
         }
     }
 }
 
-/// The choices on the left. `targets`: the scene has some.
-pub fn controls(ui: &mut egui::Ui, look: &mut Look, targets: bool) {
-    egui::ComboBox::from_label(texts::COLOURS).selected_text(look.map.name()).show_ui(ui, |ui| {
-        for map in ColourMap::ALL {
-            ui.selectable_value(&mut look.map, map, map.name());
-        }
-    });
-    ui.add(egui::Slider::new(&mut look.opacity, 0.0..=1.0).text(texts::OPACITY));
+/// The choices on the left. `targets`: the scene has some; `natural`: parts are shown in natural colours, no field.
+pub fn controls(ui: &mut egui::Ui, look: &mut Look, targets: bool, natural: bool) {
+    if !natural {
+        egui::ComboBox::from_label(texts::COLOURS).selected_text(look.map.name()).show_ui(ui, |ui| {
+            for map in ColourMap::ALL {
+                ui.selectable_value(&mut look.map, map, map.name());
+            }
+        });
+        ui.add(egui::Slider::new(&mut look.opacity, 0.0..=1.0).text(texts::OPACITY));
+    }
     if targets {
         ui.checkbox(&mut look.targets, texts::TARGETS);
     }
@@ -88,6 +96,34 @@ pub fn controls(ui: &mut egui::Ui, look: &mut Look, targets: bool) {
     if (slider.changed() && !slider.dragged()) || slider.drag_stopped() {
         ui.ctx().set_zoom_factor(zoom);
     }
+}
+
+/// Whether parts are shown in natural colours, with their names, or a field; `parts`: names and colours, empty without labels. True where
+/// parts are shown.
+pub fn parts(ui: &mut egui::Ui, look: &mut Look, parts: &[(String, [u8; 3])]) -> bool {
+    if parts.is_empty() {
+        return false;
+    }
+    ui.horizontal(|ui| {
+        for (natural, name) in [(true, texts::NATURAL), (false, texts::FIELD_COLOURS)] {
+            ui.radio_value(&mut look.natural, natural, name);
+        }
+    });
+    if look.natural {
+        ui.add(egui::Slider::new(&mut look.skin, 0.0..=1.0).text(texts::SKIN_SHOWN));
+        ui.vertical(|ui| {
+            ui.spacing_mut().item_spacing.y = 1.0;
+            for (name, [r, g, b]) in parts {
+                let colour = egui::Color32::from_rgb(*r, *g, *b);
+                ui.horizontal(|ui| {
+                    let (square, _) = ui.allocate_exact_size(egui::Vec2::splat(11.0), egui::Sense::hover());
+                    ui.painter().rect_filled(square, 1.0, colour);
+                    ui.small(name);
+                });
+            }
+        });
+    }
+    look.natural
 }
 
 /// Which layers are seen through; `names` by number of the material. True where that has changed.

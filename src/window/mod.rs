@@ -8,6 +8,7 @@
 //! physics: it sends poses and reads records.
 
 pub mod accuracy;
+pub mod anatomy_view;
 pub mod app;
 pub mod appearance;
 mod band;
@@ -26,6 +27,7 @@ pub mod marks;
 #[cfg(feature = "gamepad")]
 pub mod pads;
 pub mod panels;
+pub mod parts;
 pub mod practice;
 pub mod probe;
 pub mod reach;

@@ -3,6 +3,7 @@
 use egui_plot::{AxisHints, Corner, FilledArea, GridInput, GridMark, Legend, Line, Plot, PlotPoints};
 
 use super::accuracy::Accuracy;
+use super::anatomy_view::Entry;
 use super::appearance::{self, ColourMap, Look};
 use super::camera::{Camera, Preset};
 use super::hand::Desk;
@@ -32,6 +33,8 @@ pub struct Choices {
     /// Made when it is looked at first.
     pub accuracy: Option<Accuracy>,
     pub look: Look,
+    /// Names and colours of the parts of a scene with labels.
+    pub parts: Vec<Entry>,
 }
 
 impl Choices {
@@ -46,6 +49,7 @@ impl Choices {
             save_as: String::new(),
             accuracy: None,
             look: Look::default(),
+            parts: Vec::new(),
         }
     }
 }
@@ -113,10 +117,13 @@ pub fn controls(
     }
     tuning(ui, practice, choices);
     ui.separator();
-    field(ui, practice, choices);
-    appearance::controls(ui, &mut choices.look, !practice.scene().targets.is_empty());
+    let natural = appearance::parts(ui, &mut choices.look, &choices.parts);
+    if !natural {
+        field(ui, practice, choices);
+    }
+    appearance::controls(ui, &mut choices.look, !practice.scene().targets.is_empty(), natural);
     let regions = &practice.scene().regions;
-    if !regions.is_empty() {
+    if !regions.is_empty() && !natural {
         let names = std::iter::once(texts::REMAINDER).chain(regions.iter().map(|region| region.name.as_str()));
         wishes.recut |= appearance::layers(ui, &mut choices.look, names);
     }

@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use wgpu::util::DeviceExt;
 
+use super::anatomy_view::{self, AnatomyView};
 use super::appearance::{ColourMap, Look};
 use super::camera::Camera;
 use super::section::{self, Outline, RestPlane, TissueCorner};
@@ -15,7 +16,7 @@ use crate::{Error, Result};
 const SHADER: &str = include_str!("../../shaders/render/tissue.wgsl");
 /// What comes to it where faces may part.
 const PARTED: &str = include_str!("../../shaders/render/parted.wgsl");
-const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// The colour scale: ends in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,6 +75,8 @@ pub struct SceneView {
     /// Materials that are seen through there, as in [`Look::through`].
     through: u32,
     depth: Option<(wgpu::Extent3d, wgpu::TextureView)>,
+    /// Parts in natural colours, where the scene has labels.
+    anatomy: Option<AnatomyView>,
 }
 
 /// Colours of the scale from 0 to 1, sRGB.
@@ -166,6 +169,14 @@ impl SceneView {
         let veil_bindings = bindings(device, &veil, &resources);
         let layer_bindings = bindings(device, &layer_veil, &resources);
         let tool_bindings = bindings(device, &tool, &[view.as_entire_binding()]);
+        let anatomy = model.scene.case.as_ref().and_then(|_| {
+            let source = format!("{SHADER}{}", anatomy_view::SHADER);
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("anatomy"),
+                source: wgpu::ShaderSource::Wgsl(gpu.drawing(&source)),
+            });
+            AnatomyView::new(gpu, model, &module, format, (&view, &drawn[0]))
+        });
         let nothing = || {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: None,
@@ -183,6 +194,7 @@ impl SceneView {
             outline: Outline::of(mesh, |_| false),
             through: 0,
             depth: None,
+            anatomy,
             backdrop,
             tissue,
             veil,
@@ -210,7 +222,8 @@ impl SceneView {
     /// # Errors
     /// As [`SceneView::new`].
     pub fn take_model(&mut self, gpu: &Gpu, engine: &GpuEngine, model: &Model) -> Result<bool> {
-        if self.copies.is_some() == model.separation.pairs.is_empty() {
+        // Another cell edge or another patient: the surfaces lie in other cells.
+        if self.copies.is_some() == model.separation.pairs.is_empty() || model.scene.case.is_some() {
             return Ok(false);
         }
         (self.rest, self.copies) = mesh_buffers(&gpu.device, model);
@@ -231,6 +244,9 @@ impl SceneView {
         self.tissue_bindings = bindings(&gpu.device, &self.tissue, &resources);
         self.veil_bindings = bindings(&gpu.device, &self.veil, &resources);
         self.layer_bindings = bindings(&gpu.device, &self.layer_veil, &resources);
+        if let Some(anatomy) = &mut self.anatomy {
+            anatomy.take_buffers(gpu, &self.view, &drawn[0]);
+        }
         Ok(())
     }
 
@@ -245,6 +261,9 @@ impl SceneView {
         self.corners = vertices(gpu, &corners).0;
         self.triangles = filled(gpu, &numbers, wgpu::BufferUsages::INDEX);
         (self.surface, self.solid) = (cut.surface as u32, cut.solid as u32);
+        if let Some(anatomy) = &mut self.anatomy {
+            anatomy.cut(gpu, model, plane);
+        }
     }
 
     /// Puts the tool, and what else stands in the view, to its place.
@@ -275,6 +294,9 @@ impl SceneView {
             self.depth = Some((size, texture.create_view(&Default::default())));
         }
         let Some((_, depth)) = &self.depth else { return };
+        let anatomy = self.anatomy.as_ref().filter(|_| look.natural);
+        let [row, layer] = self.anatomy.as_ref().map_or([0.0; 2], AnatomyView::strides);
+        let opacity = if anatomy.is_some() { look.skin } else { look.opacity };
         let towards = (camera.eye() - camera.centre).normalize_or_zero();
         let view = View {
             view_projection: camera.view_projection(area.width / area.height.max(1.0)).to_cols_array_2d(),
@@ -285,7 +307,7 @@ impl SceneView {
                 scale.field.lane.number().unwrap_or(0) as f32,
                 f32::from(u8::from(scale.logarithmic)),
             ],
-            surface: [look.opacity, look.veil, 0.0, 0.0],
+            surface: [opacity, look.veil, row, layer],
         };
         gpu.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
         if self.map != look.map {
@@ -317,6 +339,21 @@ impl SceneView {
         pass.set_scissor_rect(area.x as u32, area.y as u32, width as u32, height as u32);
         pass.set_pipeline(&self.backdrop);
         pass.draw(0..3, 0..1);
+        match anatomy {
+            Some(anatomy) => anatomy.draw(&mut pass),
+            None => self.draw_field(&mut pass, look),
+        }
+        let (corners, count) = &self.tool_corners;
+        if *count > 0 {
+            pass.set_pipeline(&self.tool);
+            pass.set_bind_group(0, &self.tool_bindings, &[]);
+            pass.set_vertex_buffer(0, corners.slice(..));
+            pass.draw(0..*count, 0..1);
+        }
+    }
+
+    /// Draws the tissue in the colours of its field.
+    fn draw_field(&self, pass: &mut wgpu::RenderPass, look: &Look) {
         // Discarding pixels keeps an adapter from leaving out hidden ones early: only where the surface is seen through.
         let whole = look.opacity >= 1.0;
         let (surface, surface_bindings) =
@@ -334,13 +371,6 @@ impl SceneView {
                 pass.set_bind_group(0, bindings, &[]);
                 pass.draw_indexed(range, 0, 0..1);
             }
-        }
-        let (corners, count) = &self.tool_corners;
-        if *count > 0 {
-            pass.set_pipeline(&self.tool);
-            pass.set_bind_group(0, &self.tool_bindings, &[]);
-            pass.set_vertex_buffer(0, corners.slice(..));
-            pass.draw(0..*count, 0..1);
         }
     }
 }
@@ -422,7 +452,7 @@ pub(super) fn vertices<T: Pod>(gpu: &Gpu, corners: &[T]) -> (wgpu::Buffer, u32) 
     filled(gpu, corners, wgpu::BufferUsages::VERTEX)
 }
 
-fn filled<T: Pod>(gpu: &Gpu, entries: &[T], usage: wgpu::BufferUsages) -> (wgpu::Buffer, u32) {
+pub(super) fn filled<T: Pod>(gpu: &Gpu, entries: &[T], usage: wgpu::BufferUsages) -> (wgpu::Buffer, u32) {
     let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: Some("corners"),
         // A buffer of no bytes cannot be bound.

@@ -60,7 +60,7 @@ impl Outline {
     pub fn of(mesh: &Mesh, through: impl Fn(usize) -> bool) -> Self {
         let mut owners: HashMap<Vec<u32>, FaceOwners> = HashMap::new();
         let through: Vec<bool> = (0..mesh.cell_count()).map(through).collect();
-        for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell)) {
+        for cell in (0..mesh.cell_count()).filter(|cell| mesh.is_tissue(*cell)) {
             let nodes = mesh.cell_nodes(cell);
             let mut add = |face: &[usize]| {
                 let face: Vec<u32> = face.iter().map(|n| nodes[*n] as u32).collect();
@@ -147,6 +147,13 @@ pub fn slice(mesh: &Mesh, plane: RestPlane) -> Vec<TissueCorner> {
     corners
 }
 
+/// As [`slice`], of other cells than those that deform.
+pub fn slice_of(mesh: &Mesh, plane: RestPlane, is_wanted: impl Fn(usize) -> bool) -> Vec<TissueCorner> {
+    let mut corners = Vec::new();
+    slice_cells(mesh, plane, &distances(mesh, Some(plane)), is_wanted, &mut corners);
+    corners
+}
+
 /// How far every node lies beyond the plane [m]; all are inside without one.
 fn distances(mesh: &Mesh, plane: Option<RestPlane>) -> Vec<f64> {
     let beyond = |node: usize| plane.map_or(-1.0, |p| p.normal.dot(mesh.rest_position(node)) - p.offset);
@@ -160,9 +167,19 @@ fn slice_into(
     is_wanted: impl Fn(usize) -> bool,
     corners: &mut Vec<TissueCorner>,
 ) {
+    slice_cells(mesh, plane, distance, |cell| mesh.is_tissue(cell) && is_wanted(cell), corners);
+}
+
+fn slice_cells(
+    mesh: &Mesh,
+    plane: RestPlane,
+    distance: &[f64],
+    is_wanted: impl Fn(usize) -> bool,
+    corners: &mut Vec<TissueCorner>,
+) {
     let mut polygon = Vec::with_capacity(8);
     let (first, second) = crate::needle::lateral_axes(plane.normal);
-    for cell in (0..mesh.cell_count()).filter(|cell| !mesh.is_gap(*cell) && is_wanted(*cell)) {
+    for cell in (0..mesh.cell_count()).filter(|cell| is_wanted(*cell)) {
         let nodes = mesh.cell_nodes(cell);
         let edges: &[[usize; 2]] = if nodes.len() == 8 { &HEXAHEDRON_EDGES } else { &TETRAHEDRON_EDGES };
         polygon.clear();

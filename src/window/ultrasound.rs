@@ -10,6 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3};
 use wgpu::util::DeviceExt;
 
+use super::parts::{self, Parts};
 use super::probe::{ATTENUATION, Orientation, Probe, ProbePlane, in_slice};
 use super::scene_view::{bindings, vertices};
 use super::section::{self, TissueCorner};
@@ -37,7 +38,7 @@ const SPECKLE: [f64; 2] = [0.34e-3, 0.17e-3];
 /// From black to white [dB].
 pub const DYNAMIC_RANGE: f64 = 60.0;
 /// Entries of `echoes` in the shader.
-const MOST_ECHOES: usize = 64;
+const MOST_ECHOES: usize = 256;
 /// What tissue under the needle loses [dB].
 const SHADOW: f64 = 14.0;
 /// Columns of the shadow, and points of the needle on which it rests.
@@ -75,7 +76,10 @@ struct Slice {
     grain: [f32; 4],
     scan: [f32; 4],
     echo_count: u32,
-    _pad: [u32; 3],
+    first_part: u32,
+    part_count: u32,
+    _pad: u32,
+    parts_low: [f32; 4],
 }
 
 /// Host side of `Echo` in the shader.
@@ -136,6 +140,10 @@ fn echoes(scene: &Scene) -> Vec<Echo> {
     let none = [0.0; 4];
     // The skin line lies a line's width inside: half of one on the very edge would be cut off.
     let mut echoes = vec![echo(0, slab(SKIN, 1.0), none, level(&scene.material.name), 0.3, 0.2)];
+    // Labels tell where the tissue is.
+    if scene.case.is_some() {
+        echoes.clear();
+    }
     let mut known = vec![scene.material.name.as_str()];
     for region in &scene.regions {
         let name = region.material.name.as_str();
@@ -147,7 +155,8 @@ fn echoes(scene: &Scene) -> Vec<Echo> {
             RegionShape::Box { low, high } => (1, of(*low, 0.0), of(*high, 0.0)),
             RegionShape::Sphere { centre, radius } => (2, of(*centre, *radius), none),
             RegionShape::Cylinder { from, to, radius } => (3, of(*from, *radius), of(*to, 0.0)),
-            RegionShape::MeshTag(_) => continue,
+            // Labels are drawn from a texture of their own.
+            RegionShape::MeshTag(_) | RegionShape::Labels { .. } => continue,
         };
         // A membrane is thin and bright.
         let edge = if region.material.membrane_energy.is_some() { 0.3 } else { 0.16 };
@@ -156,9 +165,12 @@ fn echoes(scene: &Scene) -> Vec<Echo> {
     for target in &scene.targets {
         echoes.push(echo(2, of(target.position, target.radius), none, TARGET_LEVEL, 0.1, 0.5));
     }
-    echoes.truncate(MOST_ECHOES);
+    echoes.truncate(MOST_SHAPES);
     echoes
 }
+
+/// Entries of `echoes` that are shapes; behind them stand the parts of a label map.
+const MOST_SHAPES: usize = 64;
 
 /// A corner of the needle in the picture, as `needle_corner` takes it.
 #[repr(C)]
@@ -322,6 +334,7 @@ pub fn shadow_triangles(
 /// The slice of one simulation on its device.
 pub struct Ultrasound {
     tissue: wgpu::RenderPipeline,
+    parts: Option<Parts>,
     shadow: wgpu::RenderPipeline,
     needle: wgpu::RenderPipeline,
     /// In the order of the pipelines.
@@ -412,6 +425,11 @@ impl Ultrasound {
         let slice = filled("slice", bytemuck::bytes_of(&Slice::zeroed()), uniform);
         let mut table = echoes(scene);
         let echo_count = table.len() as u32;
+        let parts = Parts::of(scene, mesh);
+        if let Some(parts) = &parts {
+            let levels = parts.levels.iter().take(MOST_ECHOES - table.len());
+            table.extend(levels.map(|level| Echo { level: -level, ..Echo::zeroed() }));
+        }
         table.resize(MOST_ECHOES, Echo::zeroed());
         let table = filled("echoes", bytemuck::cast_slice(&table), uniform);
         let rest: Vec<[f32; 4]> =
@@ -423,7 +441,11 @@ impl Ultrasound {
             .ok_or_else(|| Error::Device("the engine has no buffer node_displacement".into()))?;
         let [of_slice, of_table, of_rest] = [&slice, &table, &rest].map(wgpu::Buffer::as_entire_binding);
         let bindings = [
-            bindings(device, &tissue, &[of_slice.clone(), of_table, displacement.resource(), of_rest]),
+            {
+                let texture = parts::texture(gpu, parts.as_ref());
+                let parts = wgpu::BindingResource::TextureView(&texture);
+                bindings(device, &tissue, &[of_slice.clone(), of_table, displacement.resource(), of_rest, parts])
+            },
             bindings(device, &shadow, std::slice::from_ref(&of_slice)),
             bindings(device, &needle, std::slice::from_ref(&of_slice)),
         ];
@@ -441,6 +463,7 @@ impl Ultrasound {
         });
         let ultrasound = Ultrasound {
             tissue,
+            parts,
             shadow,
             needle,
             bindings,
@@ -473,7 +496,14 @@ impl Ultrasound {
         // The material plane changes only when the probe is moved.
         let place = (probe.orientation, probe.offset);
         if self.cut_at != Some(place) {
-            self.corners = vertices(gpu, &section::slice(mesh, plane.rest_plane()));
+            let rest = plane.rest_plane();
+            self.corners = vertices(
+                gpu,
+                &match &self.parts {
+                    Some(parts) => section::slice_of(mesh, rest, |cell| parts.is_heard(mesh, cell)),
+                    None => section::slice(mesh, rest),
+                },
+            );
             self.cut_at = Some(place);
         }
         let axis = |v: DVec3| v.extend(v.dot(plane.origin)).as_vec4().into();
@@ -484,7 +514,10 @@ impl Ultrasound {
             grain: [SPECKLE[0], SPECKLE[1], probe.offset / probe.beam_width, window.pixel()].map(|x| x as f32),
             scan: [probe.gain, ATTENUATION - probe.time_gain, DYNAMIC_RANGE, 0.0].map(|x| x as f32),
             echo_count: self.echo_count,
-            _pad: [0; 3],
+            first_part: self.echo_count,
+            part_count: self.parts.as_ref().map_or(0, |parts| parts.levels.len() as u32),
+            _pad: 0,
+            parts_low: self.parts.as_ref().map_or([0.0; 4], |parts| parts.low),
         };
         gpu.queue.write_buffer(&self.slice, 0, bytemuck::bytes_of(&slice));
         let (shadow, needle) = match needle {

@@ -8,6 +8,7 @@ use assert_cmd::cargo::CommandCargoExt;
 use serde_json::Value;
 use tempfile::TempDir;
 
+mod import;
 mod refusals;
 mod runs;
 

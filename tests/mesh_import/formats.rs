@@ -55,8 +55,15 @@ fn formats_with_names_keep_them() {
 
 /// VTK's own programs write XML under .vtk, and others the reverse: the content says which it is.
 #[test]
-fn either_vtk_format_is_read_under_either_extension() {
-    for (file, name) in [("cube_text.vtu", "a.vtk"), ("cube_zlib.vtu", "a.vtk"), ("cube_51_text.vtk", "a.vtu")] {
+fn the_content_tells_the_format() {
+    for (file, name) in [
+        ("cube_text.vtu", "a.vtk"),
+        ("cube_zlib.vtu", "a.inp"),
+        ("cube_51_text.vtk", "a.msh"),
+        ("cube_part.inp", "a.vtu"),
+        ("cube_1_text.msh", "mesh"),
+        ("cube_41_binary.msh", "a.stl"),
+    ] {
         let bytes = std::fs::read(folder().join(file)).unwrap();
         let under = |name: &str| parse(name, &bytes, MILLIMETRES).unwrap_or_else(|e| panic!("{e}")).mesh;
         assert!(under(name) == under(file), "{file} as {name}");
@@ -148,4 +155,117 @@ fn gmsh_without_groups_and_with_several() {
     let imported = parse_text("a.msh", text).unwrap();
     assert_eq!(imported.mesh.regions, ["b c"]);
     assert_eq!(imported.notices, ["Volume 6 is in several physical groups; the one listed last is its region."]);
+}
+
+/// Two tetrahedra with a node in the middle of each edge: their corners, and all ten nodes of each (ids from 1).
+fn ten_node() -> (Vec<[f64; 3]>, Vec<Vec<usize>>) {
+    let (corners, tets) = TWO_TETS;
+    let mut nodes = corners.to_vec();
+    let mut edges = std::collections::BTreeMap::new();
+    let mut all = Vec::new();
+    for tet in tets {
+        let mut own = tet.to_vec();
+        for (a, b) in [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)] {
+            let key = (tet[a].min(tet[b]), tet[a].max(tet[b]));
+            own.push(*edges.entry(key).or_insert_with(|| {
+                let (x, y) = (corners[key.0 - 1], corners[key.1 - 1]);
+                // A little off the middle: a curved edge.
+                nodes.push(std::array::from_fn(|i| 0.5 * (x[i] + y[i]) + 0.1));
+                nodes.len()
+            }));
+        }
+        all.push(own);
+    }
+    (nodes, all)
+}
+
+fn joined(values: &[usize], less: usize, between: &str) -> String {
+    values.iter().map(|v| (v - less).to_string()).collect::<Vec<_>>().join(between)
+}
+
+#[test]
+fn ten_node_tetrahedra_are_taken_by_their_corners() {
+    let (nodes, tets) = ten_node();
+    let reference = parse_text("a.msh", &gmsh_text(&TWO_TETS.0, &TWO_TETS.1)).unwrap().mesh;
+    let rows = |between: &str| nodes.iter().map(|x| x.map(|x| x.to_string()).join(between)).collect::<Vec<_>>();
+    let numbered = |between: &str| -> String {
+        rows(between).iter().enumerate().map(|(n, row)| format!("{}{between}{row}\n", n + 1)).collect()
+    };
+    let mut gmsh =
+        format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n{}$EndNodes\n", nodes.len(), numbered(" "));
+    // A triangle of second order that marks a node set, and the tetrahedra.
+    gmsh += &format!("$Elements\n3\n1 9 2 7 1 1 2 3 {}\n", joined(&tets[0][4..7], 0, " "));
+    for (n, tet) in tets.iter().enumerate() {
+        gmsh += &format!("{} 11 2 1 1 {}\n", n + 2, joined(tet, 0, " "));
+    }
+    gmsh += "$EndElements\n";
+    let mut gmsh_4 = format!(
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 {0} 1 {0}\n3 1 0 {0}\n{1}{2}\n$EndNodes\n$Elements\n1 2 1 2\n3 1 11 2\n",
+        nodes.len(),
+        (1..=nodes.len()).map(|n| format!("{n}\n")).collect::<String>(),
+        rows(" ").join("\n"),
+    );
+    for (n, tet) in tets.iter().enumerate() {
+        gmsh_4 += &format!("{} {}\n", n + 1, joined(tet, 0, " "));
+    }
+    gmsh_4 += "$EndElements\n";
+    let mut vtk = format!(
+        "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n{}\nCELLS 2 22\n",
+        nodes.len(),
+        rows(" ").join("\n")
+    );
+    for tet in &tets {
+        vtk += &format!("10 {}\n", joined(tet, 1, " "));
+    }
+    vtk += "CELL_TYPES 2\n24\n24\n";
+    let vtu = format!(
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"><UnstructuredGrid>\
+         <Piece NumberOfPoints=\"{}\" NumberOfCells=\"2\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">\
+         {}</DataArray></Points><Cells><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">{}</DataArray>\
+         <DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">10 20</DataArray>\
+         <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">24 24</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>",
+        nodes.len(),
+        rows(" ").join(" "),
+        tets.iter().map(|tet| joined(tet, 1, " ")).collect::<Vec<_>>().join(" "),
+    );
+    let mut inp = format!("*NODE\n{}*ELEMENT, TYPE=C3D10M, ELSET=all\n", numbered(", "));
+    for (n, tet) in tets.iter().enumerate() {
+        // A record goes on behind a comma.
+        inp += &format!("{}, {},\n{}\n", n + 1, joined(&tet[..7], 0, ", "), joined(&tet[7..], 0, ", "));
+    }
+    for (name, text) in [("a.msh", &gmsh), ("b.msh", &gmsh_4), ("a.vtk", &vtk), ("a.vtu", &vtu), ("a.inp", &inp)] {
+        let imported = parse_text(name, text).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert!(geometry(&imported.mesh) == geometry(&reference), "{name}");
+        let told = "2 ten-node tetrahedra are taken by their four corners";
+        assert!(imported.notices.iter().any(|notice| notice.contains(told)), "{name}: {:?}", imported.notices);
+    }
+    assert_eq!(parse_text("a.msh", &gmsh).unwrap().mesh.node_sets["surface-7"].len(), 3);
+    let wrong = gmsh.replacen(&format!(" {}\n", tets[0][9]), " 99\n", 1);
+    assert_contains(&refusal("a.msh", wrong.as_bytes()), &["names node 99, which is not in the file"]);
+}
+
+#[test]
+fn abaqus_files_in_several_parts() {
+    let place = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(place.path().join(name), text).unwrap();
+    std::fs::create_dir(place.path().join("parts")).unwrap();
+    let whole = std::fs::read_to_string(folder().join("cube_gmsh.inp")).unwrap();
+    // The data of the nodes, and of the first elements, in files of their own.
+    let begin = whole.to_uppercase().find("*NODE").unwrap();
+    let first = begin + whole[begin..].find('\n').unwrap() + 1;
+    let end = first + whole[first..].find("\n*").unwrap() + 1;
+    write("nodes.inp", &whole[first..end]);
+    write("parts/more.inp", "*Include, input=\"parts/rest.inp\"\n");
+    write("parts/rest.inp", &whole[end..]);
+    write("main.inp", &format!("{}*INCLUDE, INPUT=nodes.inp\n*INCLUDE, INPUT=parts/more.inp\n", &whole[..first]));
+    let read_main = || read(&place.path().join("main.inp"), LengthUnit::Millimetre);
+    let reference = read(&folder().join("cube_gmsh.inp"), LengthUnit::Millimetre).unwrap().mesh;
+    assert!(read_main().unwrap_or_else(|e| panic!("{e}")).mesh == reference);
+    // Messages name the file that the line stands in.
+    write("nodes.inp", &whole[first..end].replacen(", ", ", x", 1));
+    assert_contains(&read_main().unwrap_err().to_string(), &["nodes.inp:1: ", "is not a number"]);
+    write("nodes.inp", "*INCLUDE, INPUT=../nodes.inp\n");
+    assert_contains(&read_main().unwrap_err().to_string(), &["nodes.inp:1: ", "not in the folder of the file"]);
+    std::fs::remove_file(place.path().join("nodes.inp")).unwrap();
+    assert_contains(&read_main().unwrap_err().to_string(), &["main.inp:", "INPUT=nodes.inp: cannot be read"]);
 }

@@ -25,6 +25,7 @@ fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
         loaded_faces,
         driven_faces,
         regions: false,
+        empty_cells: false,
         tetrahedra: false,
         free_path: false,
         opening: false,
@@ -35,7 +36,7 @@ fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
     }
 }
 
-/// Features of a mesh of tetrahedra, whose faces cannot be loaded yet.
+/// Features of a mesh of tetrahedra without loads.
 fn tetrahedra(driven_faces: bool, regions: bool) -> Features {
     Features { tetrahedra: true, regions, ..scene(false, driven_faces) }
 }
@@ -44,6 +45,7 @@ fn tetrahedra(driven_faces: bool, regions: bool) -> Features {
 fn scenes() -> Vec<Features> {
     let mut scenes = vec![scene(false, false), scene(true, false), scene(false, true), scene(true, true)];
     scenes.push(Features { regions: true, ..scene(false, false) });
+    scenes.push(Features { regions: true, empty_cells: true, ..scene(false, false) });
     scenes.push(Features { free_path: true, ..scene(false, false) });
     scenes.push(Features { opening: true, ..scene(false, false) });
     scenes.push(Features { opening: true, regions: true, ..scene(true, true) });
@@ -51,6 +53,7 @@ fn scenes() -> Vec<Features> {
     scenes.push(Features { slit: true, ..scene(true, true) });
     scenes.push(Features { free_path: true, regions: true, ..scene(true, true) });
     scenes.extend([tetrahedra(false, false), tetrahedra(true, false), tetrahedra(false, true)]);
+    scenes.push(Features { loaded_faces: true, ..tetrahedra(true, true) });
     scenes
 }
 
@@ -118,12 +121,15 @@ fn variants() -> &'static [Variant] {
         let (none, every) = (effect_set(|_| false), effect_set(|_| true));
         let of_laws = scenes_of_laws().into_iter().flat_map(|f| [(none.clone(), f.clone()), (every.clone(), f)]);
         let of_effects = all_sets().into_iter().flat_map(|set| scenes().into_iter().map(move |f| (set.clone(), f)));
-        // Beside none and all of them an effect that a program brings along; with regions, a free path or a bore too a device would have to
-        // bind one array more than a portable one does, which the engine refuses.
+        // Beside none and all of them an effect that a program brings along; with regions, a free path or a bore too, or a path through
+        // tetrahedra, a device would have to bind one array more than a portable one does, which the engine refuses.
         let with_own = |set: EffectSet| EffectSet { own: vec![swelling::SWELLING.chosen()], ..set };
         let of_own = scenes()
             .into_iter()
-            .flat_map(|f| [none.clone(), every.clone()].map(|set| (with_own(set), f.clone())))
+            .flat_map(|f| {
+                let most = if f.tetrahedra { effect_set(|key| key != "puncture") } else { every.clone() };
+                [none.clone(), most].map(|set| (with_own(set), f.clone()))
+            })
             .filter(|(set, features)| {
                 set.viscoelastic.is_none() || !(features.regions || features.free_path || features.bore)
             })
@@ -529,7 +535,7 @@ fn an_effect_has_at_most_one_block_per_stage_in_the_order_of_the_table() {
 
 #[test]
 fn tools_leave_no_trace_in_tetrahedra() {
-    let needs_block = |key: &str| EFFECTS.iter().any(|e| e.key == key && e.kind.needs_block());
+    let needs_block = |key: &str| EFFECTS.iter().any(|e| e.key == key && e.needs_block());
     let (with, without) = (effect_set(|_| true), effect_set(|key| !needs_block(key)));
     let features = tetrahedra(true, true);
     assert_eq!(stages(&with, &features), stages(&without, &features));

@@ -1,5 +1,7 @@
 //! Tetrahedra with averaged nodal pressure: reference cells, patch, energy, both engines, known reactions, hard meshes.
 
+mod needle;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;

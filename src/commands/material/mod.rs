@@ -22,7 +22,7 @@ use crate::scene::document::closest;
 use crate::scene::{Scene, presets};
 use crate::units::four_digits;
 use crate::whole_file;
-use text::{Record, csv, effect_keys, head, record, table};
+use text::{Record, csv, effect_keys, head, preset_list, record, table};
 
 const KPA: f64 = 1e3;
 const MM: f64 = 1e-3;
@@ -38,6 +38,9 @@ const COLUMNS: usize = 80;
 pub struct MaterialArgs {
     /// Tissue preset, e.g. across-fibre; or give constants, or --scene
     preset: Option<String>,
+    /// List the presets with their moduli at rest, toughness and aliases, and end
+    #[arg(long, exclusive = true)]
+    list: bool,
     /// Elastic law of the constants [default: mooney_rivlin]
     #[arg(long, value_parser = law_parser(), help_heading = CONSTANTS)]
     law: Option<LawWord>,
@@ -223,6 +226,9 @@ struct Subject {
 /// Runs the test and renders it. What concerns the user beside the rows goes to standard error, so that JSON and CSV
 /// stay clean.
 pub fn material(args: &MaterialArgs) -> Result<String> {
+    if args.list {
+        return Ok(preset_list(presets::tissues()));
+    }
     let subject = subject(args)?;
     let law = &subject.material.law;
     let verdict = law.verdict();
@@ -398,7 +404,8 @@ fn elastic(law: ElasticLaw) -> Material {
 fn from_preset(name: &str) -> Result<Subject> {
     let Some(preset) = presets::tissue(name) else {
         let names: Vec<&str> = presets::tissues().iter().map(|p| p.name.as_str()).collect();
-        let near = closest(name, names.iter().copied()).map(|n| format!("did you mean `{n}`? ")).unwrap_or_default();
+        let near = presets::near_name(presets::tissues(), name).map(|n| format!("did you mean `{n}`? "));
+        let near = near.unwrap_or_default();
         return Err(Error::input(
             format!("there is no tissue preset `{name}`"),
             format!("{near}Presets: {}", names.join(", ")),

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::*;
+use crate::scene::tissue_preset::TissuePreset;
 
 /// Keys of the effects that are on, or `elastic`.
 pub(super) fn effect_keys(material: &Material) -> String {
@@ -143,6 +144,22 @@ pub(super) fn head(args: &MaterialArgs, subject: &Subject) -> String {
         line("", &format!("{}: {}", chosen.effect.effect.key, chosen.describe()));
     }
     line("test", &format!("loading axis x, rate {} 1/s; stresses in kPa", args.rate));
+    text
+}
+
+/// The presets of a library: moduli at rest, toughness and summary in a row, aliases below it.
+pub(super) fn preset_list(presets: &[TissuePreset]) -> String {
+    let width = presets.iter().map(|preset| preset.name.chars().count()).max().unwrap_or_default();
+    let mut text = format!("{:<width$} {:>9} {:>7} {:>9}  summary\n", "preset", "E kPa", "nu", "J_c J/m^2");
+    for preset in presets {
+        let young = four_digits(preset.law.youngs_modulus() / KPA);
+        let nu = four_digits(preset.law.poisson_ratio());
+        let toughness = preset.toughness.map_or("-".to_string(), |j| four_digits(j).to_string());
+        let _ = writeln!(text, "{:<width$} {young:>9} {nu:>7} {toughness:>9}  {}", preset.name, preset.summary);
+        if !preset.aliases.is_empty() {
+            wrapped(&mut text, "", &format!("also: {}", preset.aliases.join(", ")));
+        }
+    }
     text
 }
 

@@ -26,7 +26,7 @@ use crate::output::checkpoint::{RunCheckpoint, fingerprint};
 use crate::output::forensics::FORENSICS;
 use crate::output::{
     CurveFigures, DrivenFace, FieldFiles, OutputFolder, PictureMoment, Progress, Status, Summary, Tables,
-    TargetFigures, folder, write_force_chart, write_parts_chart, write_sample_chart,
+    TargetFigures, folder, volumes, write_force_chart, write_parts_chart, write_sample_chart,
 };
 use crate::process;
 use crate::reading;
@@ -98,12 +98,14 @@ pub struct RunOutcome {
     pub summary: Summary,
 }
 
-/// A moment at which the scene wants a picture or a field file.
+/// A moment at which the scene wants a picture, a field file or volumes.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
     frame: u64,
     picture: Option<PictureMoment>,
     field: bool,
+    /// Volumes for the patient.
+    volumes: Option<PictureMoment>,
 }
 
 /// Frames between two images that a run keeps in memory, to go back to when something goes wrong.
@@ -233,7 +235,7 @@ impl<'a> Run<'a> {
         let tables = Tables::with_band(&output, &driven, hollow, &scene, &records, beside.is_some())?;
         let mut run = Run {
             moments: moments(&simulation),
-            fields: FieldFiles::new(&output),
+            fields: FieldFiles::new(&output).naming(material_names(&scene)),
             device: simulation.device().cloned(),
             clock: Clock::start((0.0, Some(0.0))),
             records,
@@ -258,7 +260,8 @@ impl<'a> Run<'a> {
                     checkpoint.adapter
                 );
             }
-            run.fields = FieldFiles::resumed(&run.output, checkpoint.fields.clone());
+            let written = checkpoint.fields.clone();
+            run.fields = FieldFiles::resumed(&run.output, written).naming(material_names(&run.scene));
             run.cells_in_needle = checkpoint.cells_in_needle;
             run.clock = Clock::start((checkpoint.wall, checkpoint.cpu));
         }
@@ -583,7 +586,13 @@ fn write_charts(
     written
 }
 
-/// The frames at which pictures and field files are due.
+/// Names for the numbers of the field `material`: the tissue itself, then its regions.
+fn material_names(scene: &Scene) -> Vec<String> {
+    let regions = scene.regions.iter().map(|region| region.name.clone());
+    std::iter::once(scene.material.name.clone()).chain(regions).collect()
+}
+
+/// The frames at which pictures, field files and volumes are due.
 fn moments(simulation: &Simulation) -> Vec<Moment> {
     let outputs = &simulation.model.scene.outputs;
     let frame_of_time = |t: f64| (t <= simulation.duration() + simulation.dt()).then(|| simulation.frame_at(t));
@@ -594,13 +603,19 @@ fn moments(simulation: &Simulation) -> Vec<Moment> {
     };
     let has_tool = simulation.model.kinematics.is_some();
     let name = |v: f64| if has_tool { PictureMoment::Depth(v) } else { PictureMoment::Time(v) };
-    let picture = |frame: Option<u64>, at| Some(Moment { frame: frame?, picture: Some(at), field: false });
-    let field = |frame: Option<u64>| Some(Moment { frame: frame?, picture: None, field: true });
+    let picture =
+        |frame: Option<u64>, at| Some(Moment { frame: frame?, picture: Some(at), field: false, volumes: None });
+    let field = |frame: Option<u64>| Some(Moment { frame: frame?, picture: None, field: true, volumes: None });
+    let volume =
+        |frame: Option<u64>, at| Some(Moment { frame: frame?, picture: None, field: false, volumes: Some(at) });
     let by_time = outputs.pictures_at_time.iter().map(|t| picture(frame_of_time(*t), PictureMoment::Time(*t)));
     let pictures = outputs.pictures_at.iter().map(|v| picture(frame_of(*v), name(*v))).chain(by_time);
     let fields = outputs.fields_at.iter().map(|v| field(frame_of(*v)));
     let fields = fields.chain(outputs.fields_at_time.iter().map(|t| field(frame_of_time(*t))));
-    pictures.chain(fields).flatten().collect()
+    let volumes = outputs.volumes_at.iter().map(|v| volume(frame_of(*v), name(*v)));
+    let volumes =
+        volumes.chain(outputs.volumes_at_time.iter().map(|t| volume(frame_of_time(*t), PictureMoment::Time(*t))));
+    pictures.chain(fields).chain(volumes).flatten().collect()
 }
 
 fn write_moment(
@@ -619,7 +634,19 @@ fn write_moment(
     if let Some(at) = moment.picture {
         let device = device.map(|g| (&g.device, &g.queue));
         let image = render::draw(&model.scene, &model.mesh, &snapshot, device)?;
-        image.write_png(&output.picture(at))?;
+        let path = output.picture(at);
+        image.write_png(&path)?;
+        if model.scene.case.is_some() {
+            let (scene, mesh) = (&model.scene, &model.mesh);
+            let images =
+                [render::draw_anatomy(scene, mesh, &snapshot, device)?, render::body::draw(scene, mesh, &snapshot)];
+            for (image, path) in images.iter().zip(OutputFolder::anatomy_beside(&path)) {
+                image.as_ref().map(|image| image.write_png(&path)).transpose()?;
+            }
+        }
+    }
+    if let Some(at) = moment.volumes {
+        volumes::write(output, model, &snapshot, at, model.scene.outputs.volume_stride)?;
     }
     Ok(snapshot.cells_in_needle)
 }

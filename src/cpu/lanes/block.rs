@@ -22,6 +22,8 @@ use crate::model::Model;
 pub(super) const PLACE: usize = 6;
 /// f32 per row of cells in [`LaneBlock::lines`]: force of every axis on four lines of nodes, and the bound of all.
 pub(super) const LINES: usize = 13;
+/// f32 per row of cells in [`Grid::mixed`]: c1, c2, c3, c01, bulk modulus, hourglass modulus, and 1 where a cell holds tissue.
+pub(super) const MIXED: usize = 7;
 /// What varies along x: an entry per cell, zeros behind the last and for gaps.
 #[derive(Debug, Default)]
 pub(super) struct EdgesX {
@@ -63,6 +65,11 @@ pub(super) struct Grid {
     pub y: Vec<Edge>,
     pub z: Vec<Edge>,
     pub materials: Vec<LaneMaterial>,
+    /// Constants of every cell, in rows of `stride`; empty where there is one material only.
+    pub mixed: Vec<f32>,
+    /// True where no material has c2 or c3, and where one has c01.
+    pub is_linear: bool,
+    pub has_c01: bool,
     pub quartic: f64,
     /// 1 for cells where open faces meet, in rows of `stride`; empty: none.
     pub on_edge: Vec<f32>,
@@ -98,6 +105,7 @@ impl LaneBlock {
         if on_edge.iter().all(|e| *e == 0.0) {
             on_edge.clear();
         }
+        let mixed = mixed_rows(model, block, &materials, stride);
         let lines = (ny + 1) * (nz + 1) * stride;
         Ok(LaneBlock {
             grid: Grid {
@@ -112,6 +120,9 @@ impl LaneBlock {
                 },
                 y: edges(1),
                 z: edges(2),
+                is_linear: materials.iter().all(|m| m.law.is_linear()),
+                has_c01: materials.iter().any(|m| m.law.c01 != 0.0),
+                mixed,
                 materials,
                 quartic: elements.quartic(),
                 on_edge,
@@ -145,7 +156,8 @@ impl LaneBlock {
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        4 * (self.places.len() + self.lines.len() + self.grid.on_edge.len()) + self.nodes.bytes()
+        4 * (self.places.len() + self.lines.len() + self.grid.on_edge.len() + self.grid.mixed.len())
+            + self.nodes.bytes()
     }
 
     /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it).
@@ -177,6 +189,27 @@ impl LaneBlock {
         let keep = |places: &mut [f32], u: &[DVec3]| set_places(stride, places, u);
         self.nodes.integrate(self.grid.arch, &self.team, step, (u, v), (places.collect(), keep))
     }
+}
+
+/// Constants of every cell, row by row.
+fn mixed_rows(model: &Model, block: &BlockMesh, materials: &[LaneMaterial], stride: usize) -> Vec<f32> {
+    if model.cell_material.is_empty() {
+        return Vec::new();
+    }
+    let [nx, ny, nz] = block.cells();
+    let mut mixed = vec![0.0; ny * nz * MIXED * stride];
+    for (row, values) in mixed.chunks_exact_mut(MIXED * stride).enumerate() {
+        for i in 0..nx {
+            let cell = row * nx + i;
+            let m = &materials[model.material_index(cell)];
+            let holds = if block.is_empty(cell) { 0.0 } else { 1.0 };
+            let numbers = [m.law.c1, m.law.c2, m.law.c3, m.law.c01, m.bulk_modulus, m.hourglass, holds];
+            for (number, value) in numbers.into_iter().enumerate() {
+                values[number * stride + i] = value as f32;
+            }
+        }
+    }
+    mixed
 }
 
 /// Keeps the displacement of a line of nodes as `u = high + low`.

@@ -79,12 +79,11 @@ impl LaneCells {
         }
     }
 
-    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it); a path
-    /// lies in a block only.
+    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it).
     pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3], stiffness: &[f64]) {
         match self {
             LaneCells::Block(cells) => cells.compute(model, elements, displacement, stiffness),
-            LaneCells::Tets(cells) => cells.compute(model, elements, displacement),
+            LaneCells::Tets(cells) => cells.compute(model, elements, displacement, stiffness),
         }
     }
 

@@ -6,13 +6,13 @@
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
-use super::block::{Grid, LINES, PLACE};
+use super::block::{Grid, LINES, MIXED, PLACE};
 use super::nodes::NODE;
 use super::number::Lanes;
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, Elements};
 use crate::material::number::Number;
-use crate::material::regular::{Regular, dot};
+use crate::material::regular::{Constants, Regular, dot};
 use crate::mesh::CORNERS;
 use crate::model::Model;
 
@@ -97,14 +97,80 @@ fn cell_row<S: Simd>(simd: S, rows: &CellRows, [j, k]: [usize; 2], forces: &mut 
     let line = |j: usize, k: usize| &places[(k * (ny + 1) + j) * PLACE * stride..][..PLACE * stride];
     let node_lines = [line(j, k), line(j + 1, k), line(j, k + 1), line(j + 1, k + 1)];
     let on_edge = grid.on_edge.get((k * ny + j) * stride..(k * ny + j + 1) * stride);
+    let empty = model.mesh.block().empty.as_slice();
     for i in (0..nx).step_by(Lanes::<S>::COUNT) {
         let last = (i + Lanes::<S>::COUNT).min(nx);
         let kind = |i: usize| model.material_index(first_cell + i);
         let first = kind(i);
         let is_uniform = model.cell_material.is_empty() || (i..last).all(|i| kind(i) == first);
         let vector = Vector { i, edges: [j, k], node_lines, on_edge, intact };
-        if !is_uniform || !lane_forces(simd, grid, &grid.materials[first], &vector, forces) {
+        if !empty.is_empty() && (i..last).all(|i| empty[first_cell + i]) {
+            nothing(simd, &vector, forces);
+            continue;
+        }
+        let material = match is_uniform {
+            true => MaterialLanes::uniform(simd, &grid.materials[first]),
+            false => MaterialLanes::mixed(simd, grid, &grid.mixed[(k * ny + j) * MIXED * stride..], i),
+        };
+        if !lane_forces(simd, grid, &material, &vector, forces) {
             cells_one_by_one(rows, first_cell, i..last, forces);
+        }
+    }
+}
+
+/// No forces of a vector in which no cell holds tissue.
+#[inline(always)]
+fn nothing<S: Simd>(simd: S, at: &Vector, forces: &mut RowForces) {
+    let zero = Lanes::splat(simd, 0.0);
+    for corner in 0..PLACES {
+        for axis in 0..3 {
+            let place = forces.place(corner, axis, at.i);
+            zero.store(&mut forces.values, place);
+        }
+    }
+    let place = forces.bound(at.i);
+    zero.store(&mut forces.values, place);
+}
+
+/// Constants of the materials of a vector.
+struct MaterialLanes<S: Simd> {
+    law: Constants<Lanes<S>>,
+    bulk: Lanes<S>,
+    hourglass: Lanes<S>,
+    /// 1 where a cell holds tissue, 0 where it is empty; `None`: all do.
+    holds: Option<Lanes<S>>,
+}
+
+impl<S: Simd> MaterialLanes<S> {
+    /// One material.
+    #[inline(always)]
+    fn uniform(simd: S, material: &LaneMaterial) -> Self {
+        MaterialLanes {
+            law: material.law.in_lanes(Lanes::splat(simd, 0.0)),
+            bulk: Lanes::splat(simd, material.bulk_modulus as f32),
+            hourglass: Lanes::splat(simd, material.hourglass as f32),
+            holds: None,
+        }
+    }
+
+    /// Those of the cells from `i` on of a row.
+    #[inline(always)]
+    fn mixed(simd: S, grid: &Grid, row: &[f32], i: usize) -> Self {
+        let stride = grid.stride;
+        let number = |number: usize| number * stride + i;
+        let law = Constants {
+            c1: Lanes::load(simd, row, number(0)),
+            c2: Lanes::load(simd, row, number(1)),
+            c3: Lanes::load(simd, row, number(2)),
+            c01: Lanes::load(simd, row, number(3)),
+            is_linear: grid.is_linear,
+            has_c01: grid.has_c01,
+        };
+        MaterialLanes {
+            law,
+            bulk: Lanes::load(simd, row, number(4)),
+            hourglass: Lanes::load(simd, row, number(5)),
+            holds: Some(Lanes::load(simd, row, number(6))),
         }
     }
 }
@@ -158,7 +224,13 @@ fn spread<N: Number>(mut v: [N; PLACES]) -> [N; PLACES] {
 
 /// Forces and bounds of a vector; false where a cell has left the range of these forms.
 #[inline(always)]
-fn lane_forces<S: Simd>(simd: S, grid: &Grid, material: &LaneMaterial, at: &Vector, forces: &mut RowForces) -> bool {
+fn lane_forces<S: Simd>(
+    simd: S,
+    grid: &Grid,
+    material: &MaterialLanes<S>,
+    at: &Vector,
+    forces: &mut RowForces,
+) -> bool {
     let stride = grid.stride;
     // No closures and no adapters of iterators from here on: what is not inlined falls back to calls per operation.
     let [ey, ez] = [grid.y[at.edges[0]], grid.z[at.edges[1]]];
@@ -185,9 +257,17 @@ fn lane_forces<S: Simd>(simd: S, grid: &Grid, material: &LaneMaterial, at: &Vect
             h[b][axis] = modes[axis][1 << b] * quarter[b];
         }
     }
+    if let Some(holds) = material.holds {
+        // An empty cell may be as crooked as it likes.
+        for b in 0..3 {
+            for axis in 0..3 {
+                h[b][axis] = h[b][axis] * holds;
+            }
+        }
+    }
     let Some(state) = Regular::new(h) else { return false };
     let intact = Lanes::load(simd, at.intact, at.i);
-    let bulk = Lanes::splat(simd, material.bulk_modulus as f32);
+    let bulk = material.bulk;
     let p = state.stress(&material.law, bulk * state.dj);
     let volume = Lanes::load(simd, &grid.x.length, at.i) * Lanes::splat(simd, ey.length * ez.length);
     let edge = Lanes::load(simd, &grid.x.cube_root, at.i) * Lanes::splat(simd, ey.cube_root * ez.cube_root);
@@ -202,7 +282,7 @@ fn lane_forces<S: Simd>(simd: S, grid: &Grid, material: &LaneMaterial, at: &Vect
     }
     let q2 = q2 * Lanes::splat(simd, 1.0 / 64.0);
     let folding = Lanes::splat(simd, grid.quartic as f32) * q2 * inverse_square;
-    let hourglass = Lanes::splat(simd, material.hourglass as f32) * edge;
+    let hourglass = material.hourglass * edge;
     let kh = intact * hourglass * (one + folding) * Lanes::splat(simd, 1.0 / 64.0);
     let by_stress = intact * volume;
     for axis in 0..3 {

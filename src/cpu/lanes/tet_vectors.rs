@@ -11,8 +11,9 @@ use super::number::Lanes;
 use super::tets::{GRADIENT, NO_CELL, Place, SHAPE, TetShapes};
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, CellShape, Elements};
-use crate::material::kinematics::{J_CONTINUATION, jacobian_minus_one};
+use crate::material::kinematics::jacobian_minus_one;
 use crate::material::number::Number;
+use crate::material::regular::LEAST_J;
 use crate::material::regular::{Regular, Tensor, dot};
 use crate::material_point::Volumetric;
 use crate::mesh::Mesh;
@@ -139,16 +140,18 @@ impl Forces<'_> {
     /// The same of slots, one by one in f64, with these means of the pressures at their corners.
     #[cold]
     fn one_by_one(&self, first: usize, means: &[f32], forces: &mut [[f32; 4]]) {
-        let slots = self.shapes.cells[first..].iter().zip(means).zip(forces.chunks_exact_mut(4));
-        for ((cell, mean), forces) in slots.filter(|((cell, _), _)| **cell != NO_CELL) {
+        let cells = self.shapes.cells[first..].iter().zip(&self.shapes.remaining[first..]);
+        let slots = cells.zip(means).zip(forces.chunks_exact_mut(4));
+        for (((cell, remaining), mean), forces) in slots.filter(|(((cell, _), _), _)| **cell != NO_CELL) {
+            let remaining = f64::from(*remaining);
             let cell = *cell as usize;
             let shape = CellShape::new(&self.model.mesh, cell);
             let dj = jacobian_minus_one(shape.displacement_gradient(&shape.gather(self.displacement)));
-            let flat = (1.0 + dj - J_CONTINUATION).min(0.0);
-            let stress = f64::from(*mean) + self.model.material(cell).law.bulk_modulus * flat;
+            let flat = (1.0 + dj - self.elements.flat_below()).min(0.0);
+            let stress = f64::from(*mean) + remaining * self.model.material(cell).law.bulk_modulus * flat;
             // The energy serves histories, which lanes do not know.
             let averaged = Some(Volumetric { stress, energy: 0.0 });
-            let input = CellInput { averaged, remaining: 1.0, point: None, advance: None };
+            let input = CellInput { averaged, remaining, point: None, advance: None };
             let (of_cell, _) = self.elements.corner_forces(self.model, cell, self.displacement, input);
             for (corner, numbers) in forces.iter_mut().enumerate() {
                 let [x, y, z] = of_cell.force[corner].as_vec3().to_array();
@@ -188,6 +191,9 @@ impl WithSimd for ForcedGroups<'_> {
                 constants: &shapes.constants[first * SHAPE..][..SHAPE * WIDEST],
                 gradients: &gradients[first * GRADIENT..][..GRADIENT * WIDEST],
                 means: &means,
+                remaining: &shapes.remaining[first..first + WIDEST],
+                flat_below: input.elements.flat_below(),
+                weakened: shapes.weakened && shapes.remaining[first..first + WIDEST].iter().any(|left| *left != 1.0),
             };
             let mut exact = [false; WIDEST];
             let mut i = 0;
@@ -210,6 +216,11 @@ struct Group<'a> {
     constants: &'a [f32],
     gradients: &'a [f32],
     means: &'a [f32],
+    /// Part of its stiffness that a path has left, of every slot, and whether it has taken any.
+    remaining: &'a [f32],
+    weakened: bool,
+    /// J below which a cell has a pressure of its own.
+    flat_below: f64,
 }
 
 /// From rows of slots by corner and number to numbers by slot and corner. (Shuffles of four by four came out no faster.)
@@ -238,7 +249,19 @@ fn lane_forces<S: Simd>(simd: S, material: &LaneMaterial, group: &Group, i: usiz
     }
     let Some(state) = Regular::new(h) else { return false };
     let volume = Lanes::load(simd, group.constants, VOLUME * WIDEST + i);
-    let p = state.stress(&material.law, Lanes::load(simd, group.means, i));
+    let law = material.law.in_lanes(volume);
+    let mut pressure = Lanes::load(simd, group.means, i);
+    // The mean pressure carries over from neighbours that may be intact.
+    let law_left = match group.weakened {
+        true => law.weakened(Lanes::load(simd, group.remaining, i)),
+        false => law,
+    };
+    if group.flat_below > LEAST_J {
+        let flat = (state.dj + volume.of(1.0 - group.flat_below)).smaller(zero);
+        let own = volume.of(material.bulk_modulus) * Lanes::load(simd, group.remaining, i);
+        pressure = own.mul_add(flat, pressure);
+    }
+    let p = state.stress(&law_left, pressure);
     let force = at_corners(p, gradient);
     for corner in 0..4 {
         for axis in 0..3 {
@@ -246,7 +269,7 @@ fn lane_forces<S: Simd>(simd: S, material: &LaneMaterial, group: &Group, i: usiz
         }
     }
     let bulk = Lanes::splat(simd, material.bulk_modulus as f32);
-    let [straight, turned] = state.tangent_bound(&material.law, bulk);
+    let [straight, turned] = state.tangent_bound(&law, bulk);
     let cof = at_corners(state.cofactor(), gradient);
     let (mut turning, mut shearing) = ([zero; 4], [zero; 4]);
     for corner in 0..4 {

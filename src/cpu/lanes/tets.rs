@@ -58,6 +58,11 @@ pub(super) struct TetShapes {
     around: Vec<u32>,
     /// `K_a/V_a` of every node [Pa/m^3].
     stiffness: Vec<f32>,
+    /// Part of its stiffness that a path has left, of every slot, and whether it has taken any.
+    pub remaining: Vec<f32>,
+    pub weakened: bool,
+    /// Slot of every cell.
+    slots: Vec<u32>,
 }
 
 impl TetShapes {
@@ -85,20 +90,17 @@ impl TetShapes {
         }
         let (offsets, cells_around) = cells_of_nodes(mesh);
         let mut around = Vec::with_capacity(cells_around.len());
-        let mut stiffness = Vec::with_capacity(mesh.positions.len());
         for (node, range) in offsets.windows(2).enumerate() {
-            let (mut volume, mut weighted) = (0.0, 0.0);
             for cell in cells_around[range[0]..range[1]].iter().map(|c| *c as usize) {
                 let corner = mesh.tets[cell].iter().position(|n| *n as usize == node).unwrap_or(0);
                 around.push(4 * slots[cell] + corner as u32);
-                let share = 0.25 * mesh.volume(cell);
-                volume += share;
-                weighted += share * model.material(cell).law.bulk_modulus;
             }
-            stiffness.push(if volume > 0.0 { (weighted / (volume * volume)) as f32 } else { 0.0 });
         }
-        TetShapes {
+        let mut shapes = TetShapes {
             arch: Arch::new(),
+            remaining: vec![1.0; cells.len()],
+            weakened: false,
+            slots,
             cells,
             corners,
             constants,
@@ -106,7 +108,36 @@ impl TetShapes {
             materials,
             offsets: offsets.into_iter().map(|o| o as u32).collect(),
             around,
-            stiffness,
+            stiffness: Vec::new(),
+        };
+        shapes.stiffness = (0..mesh.positions.len()).map(|node| shapes.node_stiffness(model, mesh, node)).collect();
+        shapes
+    }
+
+    /// `K_a/V_a` of a node [Pa/m^3].
+    fn node_stiffness(&self, model: &Model, mesh: &TetMesh, node: usize) -> f32 {
+        let (mut volume, mut weighted) = (0.0, 0.0);
+        for slot in self.around(node).iter().map(|corner| *corner as usize / 4) {
+            let cell = self.cells[slot] as usize;
+            let share = 0.25 * mesh.volume(cell);
+            volume += share;
+            weighted += share * (model.material(cell).law.bulk_modulus * f64::from(self.remaining[slot]));
+        }
+        if volume > 0.0 { (weighted / (volume * volume)) as f32 } else { 0.0 }
+    }
+
+    /// Takes in the stiffness that a path has left.
+    fn weaken(&mut self, model: &Model, stiffness: &[f64]) {
+        let (Some(plan), Some(mesh)) = (&model.puncture, model.mesh.as_tets()) else { return };
+        for cell in plan.cells.iter().map(|path| path.cell as usize).filter(|cell| *cell < stiffness.len()) {
+            let (slot, left) = (self.slots[cell] as usize, stiffness[cell] as f32);
+            if self.remaining[slot] != left {
+                self.remaining[slot] = left;
+                self.weakened = true;
+                for node in mesh.tets[cell].map(|n| n as usize) {
+                    self.stiffness[node] = self.node_stiffness(model, mesh, node);
+                }
+            }
         }
     }
 
@@ -201,16 +232,19 @@ impl LaneTets {
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        let TetShapes { cells, corners, constants, group_material, offsets, around, stiffness, .. } = &self.shapes;
-        let words = cells.len() + 4 * corners.len() + constants.len() + group_material.len() + offsets.len();
+        let TetShapes { cells, corners, constants, group_material, offsets, around, stiffness, slots, .. } =
+            &self.shapes;
+        let words =
+            2 * cells.len() + slots.len() + 4 * corners.len() + constants.len() + group_material.len() + offsets.len();
         let changing = self.gradients.len() + self.changes.len() + self.pressures.len() + 4 * self.forces.len();
         4 * (words + around.len() + stiffness.len() + changing)
             + size_of_val(self.places.as_slice())
             + self.nodes.bytes()
     }
 
-    /// Forces and bounds of all cells at the nodes, for this displacement.
-    pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3]) {
+    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it).
+    pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3], stiffness: &[f64]) {
+        self.shapes.weaken(model, stiffness);
         let LaneTets { shapes, team, places, gradients, changes, pressures, forces, nodes } = self;
         let part = team.part(shapes.group_material.len());
         let parts = gradients.chunks_mut(part * WIDEST * GRADIENT).zip(changes.chunks_mut(part * WIDEST));

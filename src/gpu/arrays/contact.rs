@@ -8,6 +8,7 @@ use super::{Array, Life, Place, bytes_of, read_all, to_bytes, vec4, vector, zero
 use crate::effects::parameters::ShaderNumbers;
 use crate::engine::ContactState;
 use crate::gpu::layout::Layout;
+use crate::mesh::Mesh;
 use crate::model::{ContactSurface, Model};
 use crate::needle::Tool;
 
@@ -70,32 +71,34 @@ fn indentation_params(model: &Model) -> IndentationParams {
 }
 
 fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
-    let cells = model.mesh.block().cells();
+    // Grid coordinates of a node of a block, and the slot of `corner_force` that is its own.
+    let place = |node: usize| match (&model.mesh, layout) {
+        (Mesh::Block(block), Layout::Strips(strips)) => {
+            let at = block.node_coordinates(node);
+            (at.map(|i| i as u32), strips.owned_slot(at, block.cells()))
+        }
+        _ => ([0; 3], 4 * layout.fours().first[node]),
+    };
     let mut nodes: Vec<ContactNode> = model
         .contact_nodes
         .iter()
         .map(|c| {
             let node = c.node as usize;
-            let [i, j, k] = model.mesh.block().node_coordinates(node);
+            let ([i, j, k], slot) = place(node);
             let [ring_low, ring_high] = match c.faces {
                 Some(faces) => [0, 4].map(|at| std::array::from_fn(|p| faces.ring[at + p])),
                 None => [[0; 4]; 2],
             };
             ContactNode {
                 rest: vec4(model.mesh.rest_position(node)),
-                grid: [i as u32, j as u32, k as u32, 0],
+                grid: [i, j, k, 0],
                 surface: match c.surface {
                     ContactSurface::OpenedPath => [0.0; 4],
                     ContactSurface::Slit { side } => vec4(side),
                     ContactSurface::OuterWall => [0.0, 0.0, 0.0, 1.0],
                     ContactSurface::Bore => [0.0, 0.0, 0.0, -1.0],
                 },
-                numbers: [
-                    c.node,
-                    layout.strips().owned_slot([i, j, k], cells),
-                    c.pushed.into(),
-                    c.faces.map_or(0, |f| f.present),
-                ],
+                numbers: [c.node, slot, c.pushed.into(), c.faces.map_or(0, |f| f.present)],
                 sizes: [c.rest_radius, c.rest_axial, model.node_mass[node], c.share].map(|x| x as f32),
                 ring_low,
                 ring_high,

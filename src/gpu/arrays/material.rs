@@ -9,16 +9,14 @@ use super::super::structs::{
 };
 use super::{Array, Place, bytes_of, read_all, to_bytes, vec4, vector, zeros};
 use crate::effects::parameters::ShaderNumbers;
-use crate::engine::elements::HOURGLASS_MODULUS;
+use crate::engine::elements::{Elements, HOURGLASS_MODULUS};
+use crate::gpu::layout::Layout;
 use crate::material_point::{Material as Constants, PointState};
 use crate::model::{LARGEST_MATERIAL_COUNT, Model};
 
 pub(super) const ARRAYS: &[Array] = &[
     Array::constant("materials", |s| bytes_of(&per_material(s.model, |m| material(s.model, m)))),
-    Array::constant("cell_material", |s| {
-        bytes_of(&s.model.cell_material.iter().map(|m| u32::from(*m)).collect::<Vec<_>>())
-    })
-    .at(Place::Sampled(1)),
+    Array::constant("cell_material", |s| bytes_of(&cell_materials(s.model, s.layout))).at(Place::Sampled(1)),
     Array::constant("plasticity", |s| {
         bytes_of(&per_material(s.model, |m| m.plasticity.unwrap_or_default().packed()).concat())
     }),
@@ -97,7 +95,21 @@ pub(super) const ARRAYS: &[Array] = &[
     ),
 ];
 
-/// One entry per material of a scene; the rest of the 16 repeats the first.
+/// Index of the material of every cell. Where cells are empty, 256 is added where open sides of the tissue meet, and behind the cells stand
+/// the strips that hold tissue.
+fn cell_materials(model: &Model, layout: &Layout) -> Vec<u32> {
+    let mut words: Vec<u32> = model.cell_material.iter().map(|m| u32::from(*m)).collect();
+    if model.mesh.as_block().is_some_and(|block| !block.empty.is_empty()) {
+        let elements = Elements::new(model);
+        for (cell, word) in words.iter_mut().enumerate() {
+            *word += if elements.is_on_edge(model, cell) { 256 } else { 0 };
+        }
+        words.extend(layout.strips().busy());
+    }
+    words
+}
+
+/// One entry per material of a model; the rest of the 256 repeats the first.
 pub(super) fn per_material<T: Clone>(model: &Model, entry: impl Fn(&Constants) -> T) -> Vec<T> {
     let mut entries: Vec<T> = model.materials.iter().map(&entry).collect();
     entries.resize(LARGEST_MATERIAL_COUNT, entries[0].clone());

@@ -36,6 +36,7 @@ pub(super) const ARRAYS: &[Array] = &[
         bytes_of(&s.model.mesh.block().lines.iter().flatten().map(|x| *x as f32).collect::<Vec<_>>())
     })
     .at(Place::Sampled(1)),
+    Array::constant("busy_nodes", |s| bytes_of(&busy_nodes(s.model).concat())).at(Place::Sampled(1)),
     Array::constant("tied_nodes", |s| bytes_of(&tied_nodes(s.model))).at(Place::Sampled(4)),
     Array::constant("tetrahedra", |s| bytes_of(&tetrahedra(s.model, s.layout))).at(Place::Sampled(4)),
     Array::constant("mesh_nodes", |s| bytes_of(&mesh_nodes(s.model, s.layout))).at(Place::Sampled(4)),
@@ -60,6 +61,20 @@ pub(super) const ARRAYS: &[Array] = &[
     Array::state("pressed_nodes", |s| zeros(s.nodes(), 16)),
     Array::state("node_dilatation", |s| zeros(s.nodes(), 4)),
 ];
+
+/// Groups of 64 nodes among which one moves: the place of each, and a bit per node that stands still.
+pub fn busy_nodes(model: &Model) -> Vec<[u32; 3]> {
+    let count = model.mesh.node_count();
+    let stands = |node: usize| model.composition.held.get(node).is_some_and(|held| *held);
+    let group = |group: usize| {
+        let mut words = [group as u32, 0, 0];
+        for lane in (0..64).filter(|lane| group * 64 + lane >= count || stands(group * 64 + lane)) {
+            words[1 + lane / 32] |= 1 << (lane % 32);
+        }
+        words
+    };
+    (0..count.div_ceil(64)).map(group).filter(|words| words[1..] != [u32::MAX; 2]).collect()
+}
 
 /// Edges of the cells along the axes, and of columns that are no boxes.
 fn cell_edges(model: &Model) -> Vec<CellEdge> {
@@ -113,11 +128,7 @@ fn tetrahedra(model: &Model, layout: &Layout) -> Vec<Tetrahedron> {
 
 fn mesh_nodes(model: &Model, layout: &Layout) -> Vec<MeshNode> {
     let Some(mesh) = model.mesh.as_tets() else { return Vec::new() };
-    let mut volume = vec![0.0; mesh.positions.len()];
-    for (cell, tet) in mesh.tets.iter().enumerate() {
-        let share = 0.25 * mesh.volume(cell);
-        tet.iter().for_each(|n| volume[*n as usize] += share);
-    }
+    let volume = mesh.node_volumes();
     let (low, high) = mesh.bounds();
     let first = &layout.fours().first;
     (0..mesh.positions.len())

@@ -21,7 +21,7 @@ use super::layout::Layout;
 use crate::engine::{FrameSums, State};
 use crate::model::Model;
 
-pub use mesh::{STEP_INPUT, STEP_STRIDE, centre_line, displacement, step_input};
+pub use mesh::{STEP_INPUT, STEP_STRIDE, busy_nodes, centre_line, displacement, step_input};
 pub use opening::opening_counts;
 pub use puncture::free_cell_count;
 pub use sums::{CONTACT_PARTS, FACE_PARTS, SEPARATION_PARTS};

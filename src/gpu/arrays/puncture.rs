@@ -3,10 +3,13 @@
 use bytemuck::Zeroable;
 use glam::DVec3;
 
-use super::super::structs::{FreeCell, FreeTip, PathCell, PunctureParams, TipAnchor, TipAnchorLoad, TipState};
+use super::super::structs::{
+    FreeCell, FreeTip, LinePiece, PathCell, PunctureParams, TipAnchor, TipAnchorLoad, TipState,
+};
 use super::{Array, Life, Place, bytes_of, read_all, to_bytes, vec4, vector, zeros};
 use crate::effects::adhesion::Bond;
 use crate::engine::State;
+use crate::mesh::{Mesh, TetLine};
 use crate::model::{FreePlan, LARGEST_ANCHOR_COUNT, LARGEST_SEGMENT_COUNT, Model};
 use crate::needle::free_path as needle;
 use crate::needle::tip_contact::Touch;
@@ -14,6 +17,7 @@ use crate::needle::tip_contact::Touch;
 pub(super) const ARRAYS: &[Array] = &[
     Array::constant("puncture", |s| bytes_of(&[puncture_params(s.model)])),
     Array::constant("tip_anchors", |s| bytes_of(&tip_anchors(s.model))).at(Place::Sampled(4)),
+    Array::constant("line_pieces", |s| bytes_of(&line_pieces(s.model))).at(Place::Sampled(4)),
     Array::new("path_cells", Life::Told, |s| bytes_of(&path_cells(s.model))),
     Array::state("cell_stiffness", |s| bytes_of(&vec![1.0f32; s.model.mesh.cell_count()])).at(Place::Texels).exchanged(
         |bytes, _, state| state.stiffness = read_all::<f32>(bytes).map(f64::from).collect(),
@@ -53,13 +57,39 @@ pub(super) const ARRAYS: &[Array] = &[
 ];
 
 fn tip_anchors(model: &Model) -> Vec<TipAnchor> {
-    let anchors = model.puncture.as_ref().map_or(&[][..], |p| &p.anchors);
-    let block = model.mesh.block();
-    let anchor = |a: &crate::model::TipAnchor| {
-        let ([i, j, _], local) = block.locate(a.surface);
-        TipAnchor { surface: vec4(a.surface), column: [i as u32, j as u32, 0, 0], local: vec4(local) }
+    let Some(plan) = &model.puncture else { return Vec::new() };
+    if let Mesh::Block(block) = &model.mesh {
+        let anchor = |a: &crate::model::TipAnchor| {
+            let ([i, j, _], local) = block.locate(a.surface);
+            TipAnchor { surface: vec4(a.surface), column: [i as u32, j as u32, 0, 0], local: vec4(local) }
+        };
+        return plan.anchors.iter().map(anchor).collect();
+    }
+    let mut first = 0;
+    let anchor = |(anchor, line): (&crate::model::TipAnchor, &TetLine)| {
+        let column = [first, first + line.pieces.len() as u32, 0, 0];
+        first = column[1];
+        TipAnchor { surface: vec4(anchor.surface), column, ..TipAnchor::zeroed() }
     };
-    anchors.iter().map(anchor).collect()
+    plan.anchors.iter().zip(&plan.lines).map(anchor).collect()
+}
+
+/// Pieces of the lines of the anchors in tetrahedra, one line after the other.
+fn line_pieces(model: &Model) -> Vec<LinePiece> {
+    let lines = model.puncture.as_ref().map_or(&[][..], |plan| &plan.lines);
+    let of_line = |line: &TetLine| {
+        let ends = line.pieces.iter().skip(1).map(|next| next.start).chain([line.end]).collect::<Vec<_>>();
+        let piece = |(p, end): (&crate::mesh::tet_line::LinePiece, f64)| LinePiece {
+            nodes: p.nodes,
+            weights: p.weights.map(|w| w as f32),
+            slopes: p.slopes.map(|s| s as f32),
+            range: [p.start as f32, end as f32, 0.0, 0.0],
+        };
+        line.pieces.iter().zip(ends).map(piece).collect::<Vec<_>>()
+    };
+    let mut pieces: Vec<LinePiece> = lines.iter().flat_map(of_line).collect();
+    pieces.resize(pieces.len().max(1), LinePiece::zeroed());
+    pieces
 }
 
 fn path_cells(model: &Model) -> Vec<PathCell> {
@@ -115,8 +145,13 @@ fn puncture_params(model: &Model) -> PunctureParams {
             *out = [s.start, c.puncture_force, c.cutting_force, s.transition_length].map(|x| x as f32);
             membranes |= u32::from(s.membrane) << i;
         }
-        let tallest = model.mesh.block().lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-        let mut anchor_reach = 1.001 * tallest / plan.path.direction.z.abs();
+        let mut anchor_reach = match &model.mesh {
+            Mesh::Block(block) => {
+                let tallest = block.lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+                1.001 * tallest / plan.path.direction.z.abs()
+            }
+            Mesh::Tets(mesh) => 1.001 * plan.anchor_reach(mesh),
+        };
         let (mut free_low, mut free_count, mut path_cell_count) = ([0; 4], [0; 4], plan.cells.len());
         if let Some(free) = &plan.free {
             let mesh = model.mesh.block();

@@ -1,4 +1,4 @@
-//! Abaqus input files (`.inp`): nodes, C3D4 elements and sets of a single part.
+//! Abaqus input files (`.inp`): nodes, C3D4 and C3D10 elements and sets of a single part, in one file or in several (`include`).
 //!
 //! Source: Abaqus Keywords Reference, *NODE, *ELEMENT, *ELSET, *NSET. Keywords and labels do not mind upper and lower
 //! case; the spelling first met is kept for names. Only what defines the mesh is read, the model data are stepped over.
@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use glam::DVec3;
 
 use super::raw::{ElementClass, MOST_SETS, RawMesh, RawNode, RawTet, Words};
-use super::source::{Source, excerpt};
+use super::source::{Piece, Source, excerpt};
 use crate::{Error, Result};
 
 const WORDS: Words = Words {
@@ -20,10 +20,10 @@ const WORDS: Words = Words {
 /// Region of elements that are in no set.
 const NO_SET: &str = "region-0";
 
-/// Reads the bytes of an `.inp` file.
-pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
+/// Reads the bytes of an `.inp` file; `pieces`: where they come from, if from several files.
+pub(super) fn read(name: &str, bytes: &[u8], pieces: Vec<Piece>) -> Result<RawMesh> {
     let mut file = AbaqusFile {
-        source: Source::new(name, bytes),
+        source: Source::of_pieces(name, bytes, pieces),
         raw: RawMesh::new(name, WORDS),
         node_index: HashMap::new(),
         elements: Vec::new(),
@@ -393,11 +393,13 @@ impl AbaqusFile<'_> {
                 continue;
             }
             let count = fields.len() - 1;
-            if count != 4 {
+            let wanted = if is_quadratic(&kind) { 10 } else { 4 };
+            if count != wanted {
                 return Err(self
                     .source
-                    .broken(at, format!("element {id} of type {kind} has {count} nodes instead of 4")));
+                    .broken(at, format!("element {id} of type {kind} has {count} nodes instead of {wanted}")));
             }
+            self.raw.ten_node += u64::from(wanted == 10);
             let mut nodes = [0; 4];
             for (node, field) in nodes.iter_mut().zip(&fields[1..]) {
                 *node = self.id(at, field, &format!("a node of element {id}"))?;
@@ -528,16 +530,23 @@ fn missing_node(source: &Source, element: &Element, node: u64) -> Error {
     source.broken(element.at, format!("element {} names node {node}, which is not in the file", element.id))
 }
 
-/// What an element type means; `None` for the four-node tetrahedron in all its formulations (C3D4, C3D4H, ...).
+/// Whether a type is the base or one of its formulations (C3D4, C3D4H, ...), not one with more nodes (C3D40).
+fn is_of(kind: &str, base: &str) -> bool {
+    kind.strip_prefix(base).is_some_and(|s| !s.starts_with(|c: char| c.is_ascii_digit()))
+}
+
+/// Whether a type is the ten-node tetrahedron, whose corners come first.
+fn is_quadratic(kind: &str) -> bool {
+    is_of(kind, "C3D10")
+}
+
+/// What an element type means; `None` for tetrahedra of four and ten nodes in all their formulations.
 fn element_class(kind: &str) -> Option<ElementClass> {
-    let suffix_of = |base: &str| kind.strip_prefix(base).is_some_and(|s| !s.starts_with(|c: char| c.is_ascii_digit()));
-    if suffix_of("C3D4") {
+    if is_of(kind, "C3D4") || is_quadratic(kind) {
         return None;
     }
     let volume = ["C3D", "DC3D", "AC3D", "SC", "CSS", "COH3D", "CIN3D", "EC3D", "Q3D"];
-    Some(if suffix_of("C3D10") {
-        ElementClass::HighOrderTet
-    } else if volume.iter().any(|v| kind.strip_prefix(v).is_some_and(|s| s.starts_with(|c: char| c.is_ascii_digit()))) {
+    Some(if volume.iter().any(|v| kind.strip_prefix(v).is_some_and(|s| s.starts_with(|c: char| c.is_ascii_digit()))) {
         ElementClass::Volume
     } else {
         ElementClass::Lower

@@ -7,11 +7,12 @@
 
 mod abaqus;
 mod gmsh;
+mod include;
 mod raw;
 mod repair;
-mod source;
+pub(crate) mod source;
 mod vtk;
-mod vtu;
+pub(crate) mod vtu;
 
 use std::fmt;
 use std::path::Path;
@@ -107,31 +108,33 @@ pub fn read(path: &Path, unit: LengthUnit) -> Result<Imported> {
 
 /// Reads a mesh file.
 pub fn read_with(path: &Path, options: ImportOptions) -> Result<Imported> {
-    let format = Format::of_name(path)?;
     let unread = |unread| match unread {
-        Unread::System(source) => Error::file(path, source),
+        // A name that no mesh has says more than that there is no such file.
+        Unread::System(source) => Format::of_name(path).err().unwrap_or_else(|| Error::file(path, source)),
         refused => refused.of(path, ""),
     };
     let name = path.display().to_string();
     // A large file that is something else is not read as a whole.
     let head = reading::head(path, reading::most::MESH, HEAD).map_err(unread)?;
-    format.found_in(&head).confirm(&name, &head)?;
-    parse_as(format, &name, &reading::bytes(path, reading::most::MESH).map_err(unread)?, options)
+    let format = Format::of(&name, &head)?;
+    let bytes = reading::bytes(path, reading::most::MESH).map_err(unread)?;
+    if format != Format::Abaqus {
+        return parse(&name, &bytes, options);
+    }
+    let beside = |other: &Path| {
+        reading::bytes(&path.with_file_name(other), reading::most::MESH).map_err(|unread| unread.to_string())
+    };
+    let (text, pieces) = include::expanded(&name, &bytes, &beside, reading::most::MESH)?;
+    repair::repair(abaqus::read(&name, &text, pieces)?, options)
 }
 
-/// Reads a mesh from memory; `name` stands for the file in messages, its extension tells the format.
+/// Reads a mesh from memory; `name` stands for the file in messages, its content tells the format. Files that it includes are refused.
 pub fn parse(name: &str, bytes: &[u8], options: ImportOptions) -> Result<Imported> {
-    parse_as(Format::of_name(Path::new(name))?, name, bytes, options)
-}
-
-fn parse_as(format: Format, name: &str, bytes: &[u8], options: ImportOptions) -> Result<Imported> {
-    let format = format.found_in(bytes);
-    format.confirm(name, bytes)?;
-    let raw = match format {
+    let raw = match Format::of(name, bytes)? {
         Format::Gmsh => gmsh::read(name, bytes)?,
         Format::VtkLegacy => vtk::read(name, bytes)?,
         Format::VtkXml => vtu::read(name, bytes)?,
-        Format::Abaqus => abaqus::read(name, bytes)?,
+        Format::Abaqus => abaqus::read(name, bytes, Vec::new())?,
     };
     repair::repair(raw, options)
 }
@@ -166,6 +169,14 @@ impl Format {
             Format::VtkLegacy => "a VTK legacy file",
             Format::VtkXml => "a VTK XML file",
             Format::Abaqus => "an Abaqus input file",
+        }
+    }
+
+    /// The format of a file that begins so. Content decides, not the extension, which tells what is missing where nothing is recognised.
+    fn of(name: &str, bytes: &[u8]) -> Result<Format> {
+        match Format::ALL.into_iter().find(|format| format.looks_like(bytes)) {
+            Some(format) => Ok(format),
+            None => Err(Format::of_name(Path::new(name))?.not_found(name, bytes)),
         }
     }
 
@@ -204,33 +215,13 @@ impl Format {
         }
     }
 
-    /// The format of the content where the extension promises the other one of VTK's two: many programs write either into `.vtk`.
-    fn found_in(self, bytes: &[u8]) -> Format {
-        let other = match self {
-            Format::VtkLegacy => Format::VtkXml,
-            Format::VtkXml => Format::VtkLegacy,
-            Format::Gmsh | Format::Abaqus => return self,
-        };
-        if other.looks_like(bytes) { other } else { self }
-    }
-
-    /// Refuses a file whose content is not what its extension promises.
-    fn confirm(self, name: &str, bytes: &[u8]) -> Result<()> {
-        if self.looks_like(bytes) {
-            return Ok(());
-        }
-        let promised = format!("{name}: this is not {}, which .{} promises", self.title(), self.extension());
+    /// The refusal of a file that is none of the formats, by what its extension promises.
+    fn not_found(self, name: &str, bytes: &[u8]) -> Error {
         if bytes.trim_ascii().is_empty() {
-            return Err(Error::input(format!("{name}: the file is empty"), "write the mesh again"));
+            return Error::input(format!("{name}: the file is empty"), "write the mesh again");
         }
-        if let Some(other) = Format::ALL.into_iter().find(|f| f.looks_like(bytes)) {
-            return Err(Error::input(
-                format!("{promised}; it looks like {}", other.title()),
-                format!("rename the file to end in .{}", other.extension()),
-            ));
-        }
-        Err(Error::input(
-            promised,
+        Error::input(
+            format!("{name}: this is not {}, which .{} promises", self.title(), self.extension()),
             match self {
                 Format::Gmsh => {
                     "a Gmsh mesh starts with $MeshFormat, or $NOD in version 1; .msh files of other programs must be converted"
@@ -239,7 +230,7 @@ impl Format {
                 Format::VtkXml => "a .vtu file starts with <VTKFile type=\"UnstructuredGrid\">; write the file again",
                 Format::Abaqus => "an Abaqus input file starts with a keyword such as *HEADING or *NODE",
             },
-        ))
+        )
     }
 }
 

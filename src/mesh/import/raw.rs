@@ -20,7 +20,9 @@ pub(super) struct RawMesh {
     /// Indices into `nodes`, in any order, possibly repeated.
     pub node_sets: BTreeMap<String, Vec<u32>>,
     pub notices: Vec<String>,
-    /// Elements other than four-node tetrahedra.
+    /// Ten-node tetrahedra among `tets`, of which the corners are kept.
+    pub ten_node: u64,
+    /// Elements other than tetrahedra that are kept.
     others: BTreeMap<(ElementClass, String), u64>,
     region_index: HashMap<String, u32>,
 }
@@ -52,7 +54,7 @@ pub(super) struct RawTet {
 /// What an element other than a four-node tetrahedron means for the mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum ElementClass {
-    /// A tetrahedron with nodes on its edges.
+    /// A tetrahedron with nodes on its edges and faces, of third order or more.
     HighOrderTet,
     /// A volume that would be missing.
     Volume,
@@ -78,6 +80,7 @@ impl RawMesh {
             regions: Vec::new(),
             node_sets: BTreeMap::new(),
             notices: Vec::new(),
+            ten_node: 0,
             others: BTreeMap::new(),
             region_index: HashMap::new(),
         }
@@ -94,12 +97,12 @@ impl RawMesh {
         region
     }
 
-    /// Counts elements that are not four-node tetrahedra; `kind` is a plural ("hexahedra").
+    /// Counts elements that are not kept; `kind` is a plural ("hexahedra").
     pub fn count_other(&mut self, class: ElementClass, kind: &str, count: u64) {
         *self.others.entry((class, kind.to_string())).or_default() += count;
     }
 
-    /// Refuses a file whose volume is not made of four-node tetrahedra alone.
+    /// Refuses a file whose volume is not made of tetrahedra of first or second order alone.
     pub fn refuse_other_volumes(&mut self) -> Result<()> {
         let list = |class: ElementClass| -> String {
             let kinds: Vec<String> = self
@@ -114,7 +117,7 @@ impl RawMesh {
         let (name, tets) = (&self.name, self.tets.len());
         if !high.is_empty() {
             return Err(Error::input(
-                format!("{name}: the file holds {high}; only tetrahedra with four nodes are computed"),
+                format!("{name}: the file holds {high}; only tetrahedra with four or ten nodes are read"),
                 self.words.first_order,
             ));
         }
@@ -136,6 +139,12 @@ impl RawMesh {
             return Err(Error::input(
                 format!("{name}: the file holds no tetrahedra, {only}"),
                 "fill the body with tetrahedra in the mesh generator and save the volume mesh, not only its surface",
+            ));
+        }
+        if self.ten_node > 0 {
+            self.notices.push(format!(
+                "{} ten-node tetrahedra are taken by their four corners: their edges become straight.",
+                self.ten_node
             ));
         }
         if !lower.is_empty() {

@@ -2,17 +2,31 @@
 
 use std::fmt::Display;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use crate::{Error, Result};
 
 /// Way out of a file that breaks its own format.
-pub(super) const WRITE_AGAIN: &str =
+pub(crate) const WRITE_AGAIN: &str =
     "write the file again with the program that made it; it was cut short, damaged or edited by hand";
+
+/// Where a piece of a text that was put together of several files comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Piece {
+    /// Its first byte in the text.
+    pub start: usize,
+    /// The file in messages.
+    pub name: String,
+    /// Line of that file that begins there.
+    pub line: usize,
+}
 
 /// Bytes of one file and a position in them.
 #[derive(Debug, Clone)]
-pub(super) struct Source<'a> {
+pub(crate) struct Source<'a> {
     name: String,
+    /// Where the text comes from; empty: all of it from the file of this name.
+    pieces: Arc<Vec<Piece>>,
     bytes: &'a [u8],
     at: usize,
     /// Whether messages name bytes instead of lines.
@@ -20,7 +34,7 @@ pub(super) struct Source<'a> {
 }
 
 /// Numbers that stand in a file as text.
-pub(super) trait Number: FromStr {
+pub(crate) trait Number: FromStr {
     const KIND: &'static str;
 }
 
@@ -37,7 +51,12 @@ impl Number for u64 {
 impl<'a> Source<'a> {
     pub fn new(name: &str, bytes: &'a [u8]) -> Self {
         let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        Source { name: name.to_string(), bytes, at, binary: false }
+        Source { name: name.to_string(), pieces: Arc::default(), bytes, at, binary: false }
+    }
+
+    /// A text of several files; messages name theirs.
+    pub fn of_pieces(name: &str, bytes: &'a [u8], pieces: Vec<Piece>) -> Self {
+        Source { pieces: Arc::new(pieces), ..Source::new(name, bytes) }
     }
 
     pub fn at(&self) -> usize {
@@ -62,8 +81,11 @@ impl<'a> Source<'a> {
         if self.binary {
             return Error::input(format!("{}: byte {at}: {message}", self.name), way_out);
         }
-        let line = 1 + self.bytes[..at.min(self.bytes.len())].iter().filter(|b| **b == b'\n').count();
-        Error::input(format!("{}:{line}: {message}", self.name), way_out)
+        let at = at.min(self.bytes.len());
+        let piece = self.pieces.iter().rfind(|piece| piece.start <= at);
+        let (name, start, first) = piece.map_or((&self.name, 0, 1), |piece| (&piece.name, piece.start, piece.line));
+        let line = first + self.bytes[start..at].iter().filter(|b| **b == b'\n').count();
+        Error::input(format!("{name}:{line}: {message}"), way_out)
     }
 
     /// A place where the format is broken.
@@ -202,7 +224,7 @@ impl<'a> Source<'a> {
 }
 
 /// A word of the file that can stand in a message.
-pub(super) fn excerpt(word: &[u8]) -> String {
+pub(crate) fn excerpt(word: &[u8]) -> String {
     const LONGEST: usize = 40;
     let text: String = String::from_utf8_lossy(&word[..word.len().min(LONGEST)])
         .chars()

@@ -11,7 +11,7 @@ use super::source::{Source, WRITE_AGAIN, excerpt};
 use crate::{Error, Result};
 
 pub(super) const WORDS: Words =
-    Words { node: "point", element: "cell", first_order: "write a mesh of first order: cells of type 10, not 24" };
+    Words { node: "point", element: "cell", first_order: "write a mesh of first order: cells of type 10 or 24" };
 
 /// Cell arrays that name regions, the first found in this order is taken.
 const REGION_ARRAYS: [&str; 5] = ["region", "tag", "material", "gmsh:physical", "cellentityids"];
@@ -104,12 +104,14 @@ impl Grid {
                 raw.count_other(class, kind, 1);
                 continue;
             }
-            let Ok(nodes) = <[i64; 4]>::try_from(nodes) else {
-                let message = format!("cell {cell} is a tetrahedron with {} points instead of 4", nodes.len());
+            let wanted = if self.types[cell] == QUADRATIC { 10 } else { 4 };
+            if nodes.len() != wanted {
+                let message = format!("cell {cell} is a tetrahedron with {} points instead of {wanted}", nodes.len());
                 return Err(fail(GridArray::Offsets, cell, message));
-            };
+            }
+            raw.ten_node += u64::from(wanted == 10);
             let mut corners = [0; 4];
-            for (corner, node) in corners.iter_mut().zip(nodes) {
+            for (corner, node) in corners.iter_mut().zip(nodes.iter().copied()) {
                 *corner = match usize::try_from(node) {
                     Ok(node) if node < points => (first_node + node) as u32,
                     _ => {
@@ -139,11 +141,14 @@ impl Grid {
     }
 }
 
-/// What a cell type means; `None` for the four-node tetrahedron.
+/// Type of the ten-node tetrahedron, whose corners come first.
+const QUADRATIC: i64 = 24;
+
+/// What a cell type means; `None` for tetrahedra of four and ten nodes.
 fn cell_class(kind: i64) -> Option<(ElementClass, &'static str)> {
     use ElementClass::{HighOrderTet, Lower, Volume};
     Some(match kind {
-        10 => return None,
+        10 | QUADRATIC => return None,
         0 => (Lower, "empty cells"),
         1 | 2 => (Lower, "points"),
         3 | 4 | 21 | 35 | 68 | 75 => (Lower, "lines"),
@@ -153,7 +158,6 @@ fn cell_class(kind: i64) -> Option<(ElementClass, &'static str)> {
         11 | 12 => (Volume, "hexahedra"),
         13 => (Volume, "prisms"),
         14 => (Volume, "pyramids"),
-        24 => (HighOrderTet, "ten-node tetrahedra (type 24)"),
         71 | 78 => (HighOrderTet, "tetrahedra of higher order"),
         25 | 29 | 33 | 72 | 79 => (Volume, "hexahedra of higher order"),
         26 | 31 | 32 | 73 | 80 => (Volume, "prisms of higher order"),

@@ -1,4 +1,5 @@
-//! VTK XML files of unstructured grids (`.vtu`): text, base64 and appended arrays, plain or compressed with zlib.
+//! VTK XML files of unstructured grids (`.vtu`): text, base64 and appended arrays, plain or compressed with zlib. What is no grid
+//! there, the document and its arrays, serves surfaces (`.vtp`), too.
 //!
 //! Source: "VTK File Formats" of the VTK documentation, "XML File Formats". Binary arrays are preceded by their length
 //! in bytes; compressed ones by the number of blocks, the size of a block, the size of the last one (0: it is full)
@@ -17,6 +18,31 @@ use crate::{Error, Result};
 
 /// Reads the bytes of a `.vtu` file.
 pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
+    let kind = DataSet {
+        name: "UnstructuredGrid",
+        title: "an unstructured grid",
+        way_out: "save the mesh as an unstructured grid of tetrahedra (one .vtu file)",
+    };
+    opened(name, bytes, kind, |file| file.read())
+}
+
+/// What a VTK XML file should hold.
+pub(crate) struct DataSet {
+    /// `type` of the file and tag of its content.
+    pub name: &'static str,
+    /// In a message.
+    pub title: &'static str,
+    /// Where it holds something else.
+    pub way_out: &'static str,
+}
+
+/// What `read` makes of the document and the arrays of a VTK XML file.
+pub(crate) fn opened<T>(
+    name: &str,
+    bytes: &[u8],
+    kind: DataSet,
+    read: impl FnOnce(&VtuFile) -> Result<T>,
+) -> Result<T> {
     let (xml, appended) = split_appended(bytes);
     let text = std::str::from_utf8(xml).map_err(|error| {
         let line = 1 + xml[..error.valid_up_to()].iter().filter(|b| **b == b'\n').count();
@@ -45,8 +71,7 @@ pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
     let document = Document::parse_with_options(text, options).map_err(|error| {
         Error::input(format!("{name}:{}: not well-formed XML: {error}", error.pos().row), WRITE_AGAIN)
     })?;
-    let file = VtuFile::new(name, &document, appended)?;
-    file.read()
+    read(&VtuFile::new(name, &document, appended, kind)?)
 }
 
 /// Most attributes of a tag: arrays have ten, and readers of XML compare each with all others.
@@ -108,7 +133,8 @@ fn split_appended(bytes: &[u8]) -> (&[u8], Option<&[u8]>) {
     }
 }
 
-struct VtuFile<'a> {
+/// A VTK XML document with its appended data.
+pub(crate) struct VtuFile<'a> {
     name: &'a str,
     document: &'a Document<'a>,
     appended: Option<&'a [u8]>,
@@ -119,13 +145,13 @@ struct VtuFile<'a> {
     compressed: bool,
 }
 
-type XmlNode<'a> = Node<'a, 'a>;
+pub(crate) type XmlNode<'a> = Node<'a, 'a>;
 
 /// Result of decoding an array; the problem becomes an error where the array and its line are known.
 type Decoded<T> = std::result::Result<T, String>;
 
 impl<'a> VtuFile<'a> {
-    fn new(name: &'a str, document: &'a Document<'a>, appended: Option<&'a [u8]>) -> Result<Self> {
+    fn new(name: &'a str, document: &'a Document<'a>, appended: Option<&'a [u8]>, wanted: DataSet) -> Result<Self> {
         let root = document.root_element();
         let mut file = VtuFile {
             name,
@@ -137,11 +163,11 @@ impl<'a> VtuFile<'a> {
             compressed: false,
         };
         let kind = root.attribute("type").unwrap_or_default();
-        if root.tag_name().name() != "VTKFile" || kind != "UnstructuredGrid" {
+        if root.tag_name().name() != "VTKFile" || kind != wanted.name {
             return Err(file.fail(
                 root,
-                format!("<{} type=\"{kind}\"> is not an unstructured grid", root.tag_name().name()),
-                "save the mesh as an unstructured grid of tetrahedra (one .vtu file)",
+                format!("<{} type=\"{kind}\"> is not {}", root.tag_name().name(), wanted.title),
+                wanted.way_out,
             ));
         }
         file.big_endian = match root.attribute("byte_order") {
@@ -175,26 +201,30 @@ impl<'a> VtuFile<'a> {
         Ok(file)
     }
 
-    fn fail(&self, node: XmlNode, message: String, way_out: &str) -> Error {
+    pub(crate) fn root(&self) -> XmlNode<'a> {
+        self.document.root_element()
+    }
+
+    pub(crate) fn fail(&self, node: XmlNode, message: String, way_out: &str) -> Error {
         let line = self.document.text_pos_at(node.range().start).row;
         Error::input(format!("{}:{line}: {message}", self.name), way_out)
     }
 
-    fn broken(&self, node: XmlNode, message: String) -> Error {
+    pub(crate) fn broken(&self, node: XmlNode, message: String) -> Error {
         self.fail(node, message, WRITE_AGAIN)
     }
 
-    fn child(&self, node: XmlNode<'a>, tag: &str) -> Result<XmlNode<'a>> {
+    pub(crate) fn child(&self, node: XmlNode<'a>, tag: &str) -> Result<XmlNode<'a>> {
         child(node, tag).ok_or_else(|| self.broken(node, format!("<{}> holds no <{tag}>", node.tag_name().name())))
     }
 
-    fn named_array(&self, node: XmlNode<'a>, name: &str) -> Result<XmlNode<'a>> {
+    pub(crate) fn named_array(&self, node: XmlNode<'a>, name: &str) -> Result<XmlNode<'a>> {
         arrays(node)
             .find(|a| a.attribute("Name").is_some_and(|n| n.eq_ignore_ascii_case(name)))
             .ok_or_else(|| self.broken(node, format!("<{}> holds no array `{name}`", node.tag_name().name())))
     }
 
-    fn count(&self, node: XmlNode, attribute: &str) -> Result<usize> {
+    pub(crate) fn count(&self, node: XmlNode, attribute: &str) -> Result<usize> {
         let text = node.attribute(attribute).unwrap_or_default();
         text.trim().parse().map_err(|_| {
             self.broken(
@@ -296,7 +326,7 @@ impl<'a> VtuFile<'a> {
     }
 
     /// The values of an array, whose number is known from elsewhere (`source` of the number, for the message).
-    fn values(&self, array: XmlNode<'a>, count: Option<usize>, source: &str) -> Result<Vec<Value>> {
+    pub(crate) fn values(&self, array: XmlNode<'a>, count: Option<usize>, source: &str) -> Result<Vec<Value>> {
         let name = array.attribute("Name").unwrap_or("points");
         let type_name = array.attribute("type").unwrap_or_default();
         let Some(kind) = ValueType::of_name(type_name) else {
@@ -402,30 +432,30 @@ impl<'a> VtuFile<'a> {
     }
 }
 
-fn child<'a>(node: XmlNode<'a>, tag: &str) -> Option<XmlNode<'a>> {
+pub(crate) fn child<'a>(node: XmlNode<'a>, tag: &str) -> Option<XmlNode<'a>> {
     node.children().find(|n| n.has_tag_name(tag))
 }
 
-fn arrays<'a>(node: XmlNode<'a>) -> impl Iterator<Item = XmlNode<'a>> {
+pub(crate) fn arrays<'a>(node: XmlNode<'a>) -> impl Iterator<Item = XmlNode<'a>> {
     node.children().filter(|n| n.has_tag_name("DataArray"))
 }
 
 /// A value of an array.
 #[derive(Debug, Clone, Copy)]
-enum Value {
+pub(crate) enum Value {
     Integer(i64),
     Float(f64),
 }
 
 impl Value {
-    fn float(self) -> f64 {
+    pub(crate) fn float(self) -> f64 {
         match self {
             Value::Integer(v) => v as f64,
             Value::Float(v) => v,
         }
     }
 
-    fn integer(self) -> Option<i64> {
+    pub(crate) fn integer(self) -> Option<i64> {
         match self {
             Value::Integer(v) => Some(v),
             Value::Float(_) => None,

@@ -11,12 +11,16 @@
 //! depth, force, time     scale bar
 //! ```
 
+pub mod anatomy;
+mod labelled;
+mod numbers;
 mod tool;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3};
 
 use self::tool::ToolDrawing;
+use super::anatomy::Anatomy;
 use super::slice::{self, EdgeKind, Plane, Slice};
 use super::stroke_font;
 use crate::mesh::Mesh;
@@ -72,14 +76,25 @@ impl Picture {
     /// Composes the picture of one moment.
     pub fn compose(scene: &Scene, mesh: &Mesh, snapshot: &FieldSnapshot) -> Self {
         let plane = Plane::of_scene(scene, mesh, snapshot);
-        let slice = slice::cut(mesh, snapshot, &plane, scene.tissue.cell_size);
-        let layout = Layout::new(scene, mesh, &plane, &slice);
+        // Regions with shapes are drawn as cells see them: with a label map cells hold mixtures.
+        let anatomy = scene.case.as_ref().and_then(|_| Anatomy::of_scene(scene));
+        let slice = match &anatomy {
+            Some(anatomy) => labelled::cut(anatomy, mesh, snapshot, &plane, scene),
+            None => slice::cut(mesh, snapshot, &plane, scene.tissue.cell_size),
+        };
+        let layout = Layout::new(scene, mesh, &plane, &slice, RIGHT_COLUMN);
         let scale = StressScale::new(scene.outputs.stress_scale, &slice);
         let tool = ToolDrawing::new(scene, snapshot, &plane);
 
         let mut canvas = Canvas::default();
         canvas.rectangle(layout.plot, AIR);
-        draw_tissue(&mut canvas, &layout, &slice, &scale, scene.tissue.cell_size);
+        match &anatomy {
+            Some(anatomy) => {
+                let scale = (&scale, scene.tissue.cell_size);
+                labelled::draw_stress(&mut canvas, &layout, &slice, anatomy, scale);
+            }
+            None => draw_tissue(&mut canvas, &layout, &slice, &scale, scene.tissue.cell_size),
+        }
         if let Some(tool) = &tool {
             tool.draw(&mut canvas, &layout);
         }
@@ -92,6 +107,10 @@ impl Picture {
         if path_is_visible(&slice, tool.as_ref()) {
             draw_path_legend(&mut canvas, &layout);
         }
+        Self::of(&layout, canvas)
+    }
+
+    fn of(layout: &Layout, canvas: Canvas) -> Self {
         Self {
             width: layout.size.0,
             height: layout.size.1,
@@ -145,7 +164,7 @@ fn decode_srgb(byte: u8) -> f32 {
 }
 
 /// Linear light to sRGB byte (IEC 61966-2-1).
-pub(super) fn encode_srgb(linear: f32) -> u8 {
+pub(in crate::render) fn encode_srgb(linear: f32) -> u8 {
     let c = linear.clamp(0.0, 1.0);
     let encoded = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
     (255.0 * encoded).round() as u8
@@ -166,6 +185,8 @@ struct Layout {
     /// Picture width over the width of the design.
     unit: f64,
     plot: Rectangle,
+    /// Right end of the scale bar [px].
+    bar_right: f64,
     /// [px/m]
     pixels_per_metre: f64,
     /// Point of the plane in the middle of the plot [m].
@@ -173,7 +194,8 @@ struct Layout {
 }
 
 impl Layout {
-    fn new(scene: &Scene, mesh: &Mesh, plane: &Plane, slice: &Slice) -> Self {
+    /// `column`: what stands beside the plot, in a picture of the width of the design [px].
+    fn new(scene: &Scene, mesh: &Mesh, plane: &Plane, slice: &Slice, column: f64) -> Self {
         let width = match scene.outputs.picture_width {
             0 => DEFAULT_WIDTH,
             width => width.clamp(*WIDTHS.start(), *WIDTHS.end()),
@@ -185,7 +207,7 @@ impl Layout {
         let high = high + DVec2::new(ROOM, HEADROOM) * span.x;
         let view = high - low;
 
-        let plot_width = f64::from(width) - unit * (LEFT_MARGIN + RIGHT_COLUMN);
+        let plot_width = f64::from(width) - unit * (LEFT_MARGIN + column);
         let [least, most] = PLOT_HEIGHTS.map(|h| h * f64::from(width));
         let mut pixels_per_metre = plot_width / view.x;
         if view.y * pixels_per_metre > most {
@@ -201,9 +223,10 @@ impl Layout {
             plot: Rectangle {
                 left: unit * LEFT_MARGIN,
                 top: unit * TITLE_STRIP,
-                right: f64::from(width) - unit * RIGHT_COLUMN,
+                right: f64::from(width) - unit * column,
                 bottom: height - unit * CAPTION_STRIP,
             },
+            bar_right: f64::from(width) - unit * RIGHT_COLUMN,
             pixels_per_metre,
             centre,
         }
@@ -213,6 +236,12 @@ impl Layout {
     fn place(&self, point: DVec2) -> DVec2 {
         let p = (point - self.centre) * self.pixels_per_metre;
         DVec2::new(0.5 * (self.plot.left + self.plot.right) + p.x, 0.5 * (self.plot.top + self.plot.bottom) - p.y)
+    }
+
+    /// Picture [px] to plane [m].
+    fn unplace(&self, at: DVec2) -> DVec2 {
+        let middle = 0.5 * DVec2::new(self.plot.left + self.plot.right, self.plot.top + self.plot.bottom);
+        self.centre + DVec2::new(at.x - middle.x, middle.y - at.y) / self.pixels_per_metre
     }
 }
 
@@ -363,9 +392,7 @@ fn draw_tissue(canvas: &mut Canvas, layout: &Layout, slice: &Slice, scale: &Stre
             canvas.vertex(layout.place(*point), colour, (stress / scale.top).clamp(0.0, 1.0) as f32, weight);
         }
     }
-    // Cell edges fade out where cells are only a few pixels wide.
-    let cell_pixels = cell_size * layout.pixels_per_metre / layout.unit;
-    let alpha = 0.07 * ((cell_pixels - 3.0) / 9.0).clamp(0.0, 1.0) as f32;
+    let alpha = cell_edge_alpha(layout, cell_size);
     for (kind, width, colour) in [
         (EdgeKind::Cells, 1.0, WHITE.linear(alpha)),
         (EdgeKind::Materials, 1.5, WHITE.linear(0.6)),
@@ -375,6 +402,12 @@ fn draw_tissue(canvas: &mut Canvas, layout: &Layout, slice: &Slice, scale: &Stre
             canvas.line(l.points.map(|p| layout.place(p)), width * layout.unit, colour);
         }
     }
+}
+
+/// Cell edges fade out where cells are only a few pixels wide.
+fn cell_edge_alpha(layout: &Layout, cell_size: f64) -> f32 {
+    let cell_pixels = cell_size * layout.pixels_per_metre / layout.unit;
+    0.07 * ((cell_pixels - 3.0) / 9.0).clamp(0.0, 1.0) as f32
 }
 
 /// A cross where a target is now [m], seen from the front, and a circle where the plane cuts the sphere of its radius [m].
@@ -482,7 +515,7 @@ fn draw_scale_bar(canvas: &mut Canvas, layout: &Layout, baseline: f64) -> f64 {
     let power = 10f64.powf(longest.log10().floor());
     let length = [5.0, 2.0, 1.0].map(|factor| factor * power).into_iter().find(|&l| l <= longest).unwrap_or(power);
     let y = baseline - 5.0 * unit;
-    let right = layout.plot.right;
+    let right = layout.bar_right;
     let left = right - length * layout.pixels_per_metre;
     for ends in [
         [DVec2::new(left, y), DVec2::new(right, y)],

@@ -113,6 +113,32 @@ impl Check<'_> {
         }
     }
 
+    /// What does not act in a label map, or before bone, yet.
+    pub(super) fn case_limits(&mut self, effects: &EffectSet, motion: &Motion, in_case: bool, regions: &[Region]) {
+        let is_free = effects.puncture.is_some_and(|p| p.always_free) || motion.is_free();
+        let without = [
+            ("effects", effects.cohesive.is_some(), "the effect cohesive"),
+            ("effects", effects.indentation.is_some(), "the effect indentation"),
+            ("motion", is_free, "a free path"),
+        ];
+        for (at, _, what) in without.into_iter().filter(|(_, there, _)| in_case && *there) {
+            self.problems.report(
+                at,
+                format!("{what} does not act in a label map yet"),
+                "not in the tissue of a patient",
+                "leave it out: a needle on one straight path serves",
+            );
+        }
+        if !in_case && motion.is_free() && regions.iter().any(|region| region.material.rigid) {
+            self.problems.report(
+                "motion",
+                "the motion is free, and a region is rigid: nothing would stop the needle there",
+                "a planned free path beside bone",
+                "plan a straight path, or let a hand lead the needle in the window",
+            );
+        }
+    }
+
     /// The scheme `opening` takes its numbers from the toughness of every material.
     pub(super) fn opening_toughness(
         &mut self,
@@ -126,7 +152,7 @@ impl Check<'_> {
         if !self.problems.is_empty() || effects.puncture.is_none_or(|p| p.scheme != SchemeWord::Opening) {
             return;
         }
-        for (index, material) in all_materials(own, regions) {
+        for (index, material) in all_materials(own, regions).filter(|(_, material)| !material.rigid) {
             let (at, table) = match index {
                 None => ("material".into(), &file.material),
                 Some(i) => (format!("region.{i}.material"), &file.region[i].material),

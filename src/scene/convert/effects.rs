@@ -44,10 +44,11 @@ impl Check<'_> {
         let puncture = self.puncture(&file.puncture.clone().unwrap_or_default());
         let cohesive = self.cohesive(&file.cohesive.clone().unwrap_or_default(), &file.tissue);
         let free = motion.is_free() || puncture.always_free;
+        self.straight_in_a_mesh(file, tool.as_ref(), motion, list.has("puncture") && puncture.always_free);
         if list.has("cohesive") {
             let planned = list.has("puncture") && !free;
             self.check_cohesive(&list.place("cohesive"), tool, motion, &cohesive, [list.has("puncture"), planned]);
-        } else if let Some(Tool::Needle(NeedleShape { bore: Some(_), .. })) = tool {
+        } else if let (Some(Tool::Needle(NeedleShape { bore: Some(_), .. })), None) = (tool, &file.tissue.mesh) {
             self.problems.report(
                 "needle.bore_diameter_mm",
                 "a hollow needle needs the effect `cohesive`: its core separates on the ring of the cutting edge",
@@ -190,7 +191,7 @@ impl Check<'_> {
             );
         }
         if of_mesh {
-            for key in ["puncture", "indentation", "cohesive"] {
+            for key in ["indentation", "cohesive", "flexible_needle"] {
                 if list.has(key) {
                     self.needs_block(&list.place(key), &format!("effect `{key}`"));
                 }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::super::file::{BoundariesTable, FaceEntry, FaceKind, FaceTable};
 use super::super::{Face, FaceCondition, FaceDrive};
 use super::{Check, KPA, MM, Within};
+use crate::mesh::TetMesh;
 use crate::units::four_digits;
 
 impl Check<'_> {
@@ -16,16 +17,24 @@ impl Check<'_> {
             match entries[face as usize] {
                 None => face_of_kind(face, default),
                 Some(FaceEntry::Kind(kind)) => face_of_kind(face, *kind),
-                Some(FaceEntry::Table(table)) => {
-                    if of_mesh && table.traction_kpa.is_some() {
-                        self.needs_block(&format!("boundaries.{}.traction_kpa", face.key()), "a traction on a face");
-                    }
-                    self.face(face, table)
-                }
+                Some(FaceEntry::Table(table)) => self.face(face, table),
             }
         });
         self.one_ramp(&conditions);
         conditions
+    }
+
+    /// A load on a side of the bounding box of a mesh has triangles there that carry it.
+    pub(super) fn loads_on_mesh(&mut self, conditions: &[FaceCondition; 6], mesh: &TetMesh) {
+        let loaded = Face::ALL.into_iter().filter(|face| conditions[*face as usize].traction.is_some());
+        for face in loaded.filter(|face| mesh.surface_on_side(face.axis(), face.is_max()).is_empty()) {
+            self.problems.report(
+                &format!("boundaries.{}.traction_kpa", face.key()),
+                format!("no triangle of the mesh lies on the side {} of its bounding box", face.key()),
+                "nothing to pull at",
+                "load a side where the mesh is flat, e.g. the cut through an arm, or drive nodes with displacement_mm",
+            );
+        }
     }
 
     /// One factor scales the loads of a run: they grow together.

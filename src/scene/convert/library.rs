@@ -1,9 +1,11 @@
 //! A library of tissue materials: the built-in one and those of users, in one format.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use super::super::document::Document;
 use super::super::file::{CuttingTable, LibraryFile, LibraryMaterial, MaterialTable};
+use super::super::presets::folded;
 use super::super::tissue_preset::TissuePreset;
 use super::Check;
 
@@ -29,11 +31,40 @@ pub fn read(path: &Path, source: &str) -> std::result::Result<Vec<TissuePreset>,
         }
         presets.extend(check.library_material(&at, entry));
     }
+    check.aliases(&file.material);
     check.problems.check()?;
     Ok(presets)
 }
 
 impl Check<'_> {
+    /// Every alias leads to one material: it is neither another's name nor another's alias.
+    fn aliases(&mut self, materials: &[LibraryMaterial]) {
+        let mut owners: HashMap<String, usize> = HashMap::new();
+        for (index, entry) in materials.iter().enumerate() {
+            owners.entry(folded(&entry.name)).or_insert(index);
+        }
+        for (index, entry) in materials.iter().enumerate() {
+            for (number, alias) in entry.aliases.iter().enumerate() {
+                let at = format!("material.{index}.aliases.{number}");
+                let word = folded(alias);
+                if word.trim().is_empty() {
+                    self.problems.report(&at, "an alias is empty", "no name", "write a name, or remove it");
+                    continue;
+                }
+                let owner = *owners.entry(word).or_insert(index);
+                if owner != index {
+                    let (this, other) = (&entry.name, &materials[owner].name);
+                    self.problems.report(
+                        &at,
+                        format!("the alias \"{alias}\" of \"{this}\" leads to \"{other}\" as well"),
+                        "two materials",
+                        "write an alias that no other material of this library has as its name or alias",
+                    );
+                }
+            }
+        }
+    }
+
     /// One entry; `None` after a reported problem. Stability is judged where the preset is used.
     fn library_material(&mut self, at: &str, entry: &LibraryMaterial) -> Option<TissuePreset> {
         let table = MaterialTable {
@@ -56,6 +87,7 @@ impl Check<'_> {
         self.cutting_table(&format!("{at}.cutting"), &cutting);
         Some(TissuePreset {
             name: entry.name.clone(),
+            aliases: entry.aliases.clone(),
             summary: entry.summary.clone().unwrap_or_default(),
             source: entry.source.clone(),
             range: entry.range.clone(),

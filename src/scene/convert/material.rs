@@ -83,7 +83,7 @@ impl Check<'_> {
         }
         let range = preset.range.as_ref().map(|range| format!("; valid: {range}")).unwrap_or_default();
         let density = if table.density_kg_m3.is_some() { density } else { preset.density };
-        let mut material = TissueMaterial::new(name, format!("{}{range}", preset.source), law, density);
+        let mut material = TissueMaterial::new(&preset.name, format!("{}{range}", preset.source), law, density);
         material.toughness = table.toughness_j_m2.or(preset.toughness);
         material.tear_stretch = table.tear_stretch.or(preset.tear_stretch);
         if in_range {
@@ -98,8 +98,7 @@ impl Check<'_> {
             if let Some(preset) = presets::tissue(name) {
                 return Some(preset.clone());
             }
-            let names: Vec<&str> = presets::tissues().iter().map(|p| p.name.as_str()).collect();
-            self.unknown_name(&format!("{at}.preset"), "tissue preset", name, &names);
+            self.unknown_preset(&format!("{at}.preset"), "tissue preset", name, presets::tissues());
             return None;
         };
         let path = self.folder.join(library);
@@ -125,15 +124,24 @@ impl Check<'_> {
                 None
             }
             Ok(presets) => {
-                let found = presets.iter().find(|preset| preset.name == name);
+                let found = presets::found(&presets, name);
                 if found.is_none() {
-                    let names: Vec<&str> = presets.iter().map(|p| p.name.as_str()).collect();
                     let what = format!("material in {}", path.display());
-                    self.unknown_name(&format!("{at}.preset"), &what, name, &names);
+                    self.unknown_preset(&format!("{at}.preset"), &what, name, &presets);
                 }
                 found.cloned()
             }
         }
+    }
+
+    /// Lists the names alone; the nearest one may be an alias.
+    fn unknown_preset(&mut self, path: &str, what: &str, name: &str, presets: &[TissuePreset]) {
+        let list = presets.iter().map(|preset| preset.name.as_str()).collect::<Vec<_>>().join(", ");
+        let way_out = match presets::near_name(presets, name) {
+            Some(near) => format!("did you mean \"{near}\"? There are: {list}"),
+            None => format!("use one of: {list}"),
+        };
+        self.problems.report(path, format!("there is no {what} called \"{name}\""), "unknown name", way_out);
     }
 
     /// Density [kg/m^3].

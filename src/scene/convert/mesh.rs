@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::Support;
 use super::super::file::{SceneFile, TissueTable};
+use super::super::{FaceCondition, Support};
 use super::Check;
 use crate::Error;
 use crate::mesh::TetMesh;
@@ -54,25 +54,7 @@ impl Check<'_> {
                 self.notices.push(format!("`tissue.{key}` has no effect on a mesh."));
             }
         }
-        let symbols: Vec<&str> = LengthUnit::ALL.into_iter().map(LengthUnit::symbol).collect();
-        let unit = match table.unit.as_deref() {
-            None => {
-                self.problems.report(
-                    "tissue.mesh",
-                    "a mesh file does not say its unit of length",
-                    "no tissue.unit beside it",
-                    format!("add unit = \"mm\", or one of {}", symbols.join(", ")),
-                );
-                return None;
-            }
-            Some(text) => match text.parse::<LengthUnit>() {
-                Ok(unit) => unit,
-                Err(_) => {
-                    self.unknown_name("tissue.unit", "unit of length", text, &symbols);
-                    return None;
-                }
-            },
-        };
+        let unit = self.unit("mesh", "a mesh file", table)?;
         let options = ImportOptions { unit, accept_size: table.accept_size.unwrap_or(false) };
         match import::read_with(&self.folder.join(name), options) {
             Ok(imported) => {
@@ -92,6 +74,25 @@ impl Check<'_> {
                 None
             }
         }
+    }
+
+    /// The unit of length of a file that does not say it, named under `tissue.<key>`.
+    pub(super) fn unit(&mut self, key: &str, what: &str, table: &TissueTable) -> Option<LengthUnit> {
+        let symbols: Vec<&str> = LengthUnit::ALL.into_iter().map(LengthUnit::symbol).collect();
+        let Some(text) = table.unit.as_deref() else {
+            self.problems.report(
+                &format!("tissue.{key}"),
+                format!("{what} does not say its unit of length"),
+                "no tissue.unit beside it",
+                format!("add unit = \"mm\", or one of {}", symbols.join(", ")),
+            );
+            return None;
+        };
+        let unit = text.parse::<LengthUnit>();
+        if unit.is_err() {
+            self.unknown_name("tissue.unit", "unit of length", text, &symbols);
+        }
+        unit.ok()
     }
 
     /// The held node sets. Without a mesh (or after it could not be read) names cannot be checked.
@@ -132,6 +133,17 @@ impl Check<'_> {
             supports.push(Support { set: table.set.clone(), fixed });
         }
         supports
+    }
+
+    /// Tells of a mesh that nothing holds.
+    pub(super) fn floating_mesh(&mut self, supports: &[Support], faces: &[FaceCondition; 6]) {
+        if supports.is_empty() && faces.iter().all(|face| face.fixed == [false; 3]) {
+            self.notices.push(
+                "Nothing holds the mesh, so it floats; add [[support]] with a node set, or fix a face of the \
+                 bounding box, e.g. boundaries.z_min = \"fixed\"."
+                    .into(),
+            );
+        }
     }
 
     /// Refuses on a mesh what acts on the structured block only.

@@ -3,6 +3,7 @@
 //! A check reports and goes on, so that one call shows all problems; the geometry is looked at only when every single
 //! number is in range.
 
+mod anatomy;
 mod effect_tables;
 mod effects;
 mod faces;
@@ -10,7 +11,9 @@ mod frames;
 pub(super) mod library;
 mod material;
 mod mesh;
+mod mesh_path;
 mod missing;
+mod outputs;
 mod own;
 pub(super) mod parameters;
 mod regions;
@@ -31,6 +34,7 @@ use super::builder::hourglass_quartic;
 use super::document::{Document, Problems, closest};
 use super::file::*;
 use super::*;
+use crate::anatomy::Case;
 use crate::effects::SELF_CONTAINED;
 use crate::effects::own::OwnEffect;
 use crate::effects::parameters::Table;
@@ -98,6 +102,10 @@ struct Check<'a> {
     folder: &'a Path,
     /// Tables of effects that are complete by themselves.
     own_numbers: OwnNumbers,
+    /// Whether the scene names a label map.
+    has_labels: bool,
+    /// Length of the way from the skin to the target in a patient: how deep an insertion goes that says nothing [m].
+    path: Option<f64>,
 }
 
 type Checked<T> = std::result::Result<T, String>;
@@ -110,6 +118,8 @@ impl<'a> Check<'a> {
             notices: Vec::new(),
             folder: path.parent().unwrap_or(Path::new("")),
             own_numbers: Vec::new(),
+            has_labels: false,
+            path: None,
         }
     }
 
@@ -129,13 +139,13 @@ impl<'a> Check<'a> {
 impl Check<'_> {
     fn scene(&mut self, path: &Path, file: &SceneFile, own: &[&'static OwnEffect]) -> Checked<Scene> {
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-        let (tissue, mesh) = self.tissue(&file.tissue);
+        let (tissue, mesh, case) = self.tissue(file);
         let (mut material, preset) = self.material("material", &file.material, tissue.cell_size);
-        let (mut regions, region_presets) = self.regions(file, &tissue, mesh.as_deref());
+        let (mut regions, region_presets) = self.regions(file, &tissue, (mesh.as_deref(), case.as_ref()));
         let supports = self.supports(file, mesh.as_deref());
         let faces = self.faces(&file.boundaries, file.tissue.mesh.is_some());
         let tool = self.tool(file);
-        let motion = self.motion(file, tool.is_some());
+        let motion = self.motion(file, tool.as_ref(), mesh.as_deref());
         let mut effects = self.effects(file, own, &tool, &motion, (&faces, tissue.size), &material);
         effects.own = self.own_effects(file, own);
         self.own_numbers_of_regions(file, &effects, &mut regions);
@@ -154,9 +164,10 @@ impl Check<'_> {
         self.cuttings(file, &tool, &effects, (&mut material, preset), (&mut regions, region_presets));
         let solver = self.solver(&file.solver, tool.is_some(), effects.puncture.is_some(), tissue.cell_size);
         self.opening_limits(&effects, tool.as_ref(), &motion, mesh.is_some());
+        self.case_limits(&effects, &motion, case.is_some(), &regions);
         self.opening_toughness(&effects, tool.as_ref(), &material, &regions, file);
         let outputs = self.outputs(&file.outputs, &motion, tool.is_some(), solver.duration);
-        let targets = self.targets(file);
+        let targets = self.targets(file, case.as_deref());
         let bored = effects.cohesive.is_some() && matches!(&tool, Some(Tool::Needle(n)) if n.bore.is_some());
         let task = file.task.as_ref().map(|table| self.task(table, file, tool.as_ref(), bored, &targets));
         self.problems.check()?;
@@ -166,12 +177,14 @@ impl Check<'_> {
             self.snap_back(file, index, material, tissue.cell_size, &effects);
         }
         self.cohesive_openings(file, &material, tissue.cell_size, &effects);
-        if mesh.is_none() {
+        if let Some(mesh) = &mesh {
+            self.geometry_of_mesh(mesh, tool.as_ref(), &motion, &faces);
+        } else {
             let open_bottom = faces[Face::ZMin as usize].fixed == [false; 3] && effects.cohesive.is_none();
             self.geometry(&tissue, tool.as_ref(), &motion, open_bottom);
         }
         self.overlaps(&regions, &tissue, mesh.as_deref());
-        self.inside(&targets, &tissue);
+        self.targets_inside(&targets, &tissue, mesh.as_deref());
         self.problems.check()?;
         if mesh.is_none() {
             self.memory(&tissue, tool.as_ref(), &motion);
@@ -183,13 +196,7 @@ impl Check<'_> {
         };
         self.cells(&cells, &material, &regions, &tissue, &effects);
         if mesh.is_some() {
-            if supports.is_empty() && faces.iter().all(|face| face.fixed == [false; 3]) {
-                self.notices.push(
-                    "Nothing holds the mesh, so it floats; add [[support]] with a node set, or fix a face of the \
-                     bounding box, e.g. boundaries.z_min = \"fixed\"."
-                        .into(),
-                );
-            }
+            self.floating_mesh(&supports, &faces);
         } else if tool.is_some() && faces.iter().all(|face| face.fixed == [false; 3]) {
             self.notices.push(
                 "No face of the block is fixed, so the tool pushes it away; set e.g. boundaries.z_min = \"fixed\"."
@@ -204,6 +211,7 @@ impl Check<'_> {
             material,
             regions,
             mesh,
+            case,
             supports,
             faces,
             tool,
@@ -312,11 +320,13 @@ impl Check<'_> {
         DVec3::from(value)
     }
 
-    /// The tissue, and the mesh where the scene names one.
-    fn tissue(&mut self, table: &TissueTable) -> (Tissue, Option<Arc<TetMesh>>) {
+    /// The tissue, and the mesh or the label map where the scene names one.
+    fn tissue(&mut self, file: &SceneFile) -> (Tissue, Option<Arc<TetMesh>>, Option<Arc<Case>>) {
+        let table = &file.tissue;
         // Stands in after a reported problem; it never leaves `scene`.
         let mut tissue = Tissue {
             size: DVec3::splat(10.0 * MM),
+            top: 0.0,
             cell_size: MM,
             fine_radius: self.optional(
                 "tissue.fine_radius_mm",
@@ -331,12 +341,17 @@ impl Check<'_> {
         for (index, value) in tissue.axis_offset_cells.into_iter().enumerate() {
             self.number(&format!("tissue.axis_offset_cells.{index}"), value, Within::Between(0.0, 1.0));
         }
+        if table.labels.is_some() || !table.surfaces.is_empty() {
+            self.has_labels = true;
+            let case = self.labelled_tissue(file, &mut tissue);
+            return (tissue, None, case);
+        }
         if let Some(name) = &table.mesh {
             let mesh = self.mesh(name, table);
             if let Some(mesh) = &mesh {
                 (tissue.size, tissue.cell_size) = mesh::extent(mesh);
             }
-            return (tissue, mesh);
+            return (tissue, mesh, None);
         }
         for (key, written) in [("unit", table.unit.is_some()), ("accept_size", table.accept_size.is_some())] {
             if written {
@@ -355,7 +370,7 @@ impl Check<'_> {
                 "incomplete",
                 "write size_mm = [20, 20, 16] and cell_size_mm = 0.6, or mesh = \"part.msh\" and unit = \"mm\"",
             );
-            return (tissue, None);
+            return (tissue, None, None);
         };
         for (index, size) in size_mm.iter().enumerate() {
             self.number(&format!("tissue.size_mm.{index}"), *size, Within::Positive(1000.0));
@@ -371,7 +386,24 @@ impl Check<'_> {
             );
         }
         (tissue.size, tissue.cell_size) = (DVec3::from(size_mm) * MM, cell * MM);
-        (tissue, None)
+        (tissue, None, None)
+    }
+
+    /// The block that lies in a label map.
+    fn labelled_tissue(&mut self, file: &SceneFile, tissue: &mut Tissue) -> Option<Arc<Case>> {
+        let Some(cell) = file.tissue.cell_size_mm else {
+            self.problems.report(
+                "tissue",
+                "the tissue has no `cell_size_mm`",
+                "incomplete",
+                "write cell_size_mm = 0.8, the edge of the cells around the path",
+            );
+            return None;
+        };
+        tissue.cell_size = self.number("tissue.cell_size_mm", cell, Within::Between(1e-3, 100.0)) * MM;
+        let placed = self.case(file, tissue)?;
+        self.path = placed.path;
+        Some(placed.case)
     }
 
     fn unknown_name(&mut self, path: &str, what: &str, name: &str, names: &[&str]) {
@@ -433,59 +465,6 @@ impl Check<'_> {
                 Within::Between(LOWEST_FRAME_RATE, HIGHEST_FRAME_RATE),
             ),
             duration: if has_tool { None } else { duration },
-        }
-    }
-
-    fn outputs(&mut self, table: &OutputsTable, motion: &Motion, has_tool: bool, duration: Option<f64>) -> Outputs {
-        let lists = [
-            ("pictures_at_depth_mm", &table.pictures_at_depth_mm, true),
-            ("fields_at_depth_mm", &table.fields_at_depth_mm, true),
-            ("pictures_at_s", &table.pictures_at_s, false),
-            ("fields_at_s", &table.fields_at_s, false),
-        ];
-        let mut values = [Vec::new(), Vec::new(), Vec::new(), Vec::new()];
-        for (slot, (key, list, by_depth)) in lists.into_iter().enumerate() {
-            let Some(list) = list else { continue };
-            let path = format!("outputs.{key}");
-            let by_time_too = has_tool && motion.is_free();
-            if by_depth != has_tool && (by_depth || !by_time_too) {
-                let (has, other) = if has_tool { ("a tool", "depth_mm") } else { ("no tool", "s") };
-                let stem = key.trim_end_matches("_depth_mm").trim_end_matches("_s");
-                self.problems.report(
-                    &path,
-                    format!("the scene has {has}, so `{key}` means nothing"),
-                    "wrong list for this scene",
-                    format!("write {stem}_{other} instead"),
-                );
-                continue;
-            }
-            let (unit, reach) =
-                if by_depth { (MM, motion.deepest()) } else { (1.0, duration.unwrap_or(f64::INFINITY)) };
-            for (index, value) in list.iter().enumerate() {
-                let value = self.number(&format!("{path}.{index}"), *value, Within::NotNegative(3600.0)) * unit;
-                if value > reach * (1.0 + 1e-9) {
-                    self.notices.push(format!("`{path}` holds {}, which the run never reaches.", value / unit));
-                }
-                // In a scene with a tool times stand beside depths, elsewhere in their place.
-                values[if has_tool { slot } else { slot % 2 }].push(value);
-            }
-        }
-        for list in &mut values {
-            list.sort_by(f64::total_cmp);
-            list.dedup();
-        }
-        let [pictures_at, fields_at, pictures_at_time, fields_at_time] = values;
-        let width = table.picture_width_px.unwrap_or(900);
-        self.number("outputs.picture_width_px", width as f64, Within::Between(64.0, 8192.0));
-        Outputs {
-            pictures_at,
-            fields_at,
-            pictures_at_time,
-            fields_at_time,
-            picture_width: width,
-            stress_scale: table
-                .stress_scale_kpa
-                .map(|value| self.number("outputs.stress_scale_kpa", value, Within::Positive(1e6)) * KPA),
         }
     }
 

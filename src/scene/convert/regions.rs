@@ -1,5 +1,7 @@
 //! Parts of the tissue with a material of their own: shapes, what they cover, and the tip forces of all materials.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::super::file::*;
@@ -8,8 +10,10 @@ use super::super::{Region, RegionShape};
 use super::mesh::list_tags;
 use super::parameters::{all_materials, cutting, damage_limit, preset_cutting, written_cutting};
 use super::{Check, MM, Within};
+use crate::anatomy::Case;
 use crate::effects::puncture::SchemeWord;
 use crate::effects::{EffectSet, TissueMaterial};
+use crate::material::ElasticLaw;
 use crate::mesh::{Mesh, TetMesh, Tissue};
 use crate::needle::Tool;
 use crate::units::four_digits;
@@ -21,7 +25,7 @@ const LARGEST_REGION_COUNT: usize = 15;
 const THINNEST_MEMBRANE: f64 = 0.05e-3;
 
 /// Keys of the shapes.
-const SHAPES: [&str; 5] = ["layer_mm", "box_mm", "sphere_mm", "cylinder_mm", "mesh_tag"];
+const SHAPES: [&str; 6] = ["layer_mm", "box_mm", "sphere_mm", "cylinder_mm", "mesh_tag", "label"];
 
 impl Check<'_> {
     /// The regions and the presets of their materials, one entry per table of the file.
@@ -29,7 +33,7 @@ impl Check<'_> {
         &mut self,
         file: &SceneFile,
         tissue: &Tissue,
-        mesh: Option<&TetMesh>,
+        (mesh, case): (Option<&TetMesh>, Option<&Arc<Case>>),
     ) -> (Vec<Region>, Vec<Option<TissuePreset>>) {
         if file.region.len() > LARGEST_REGION_COUNT {
             self.problems.report(
@@ -53,8 +57,20 @@ impl Check<'_> {
                     "write a name that no other region has",
                 );
             }
-            let shape = self.region_shape(&at, table, file.tissue.mesh.is_some(), mesh);
-            let (material, preset) = self.material(&format!("{at}.material"), &table.material, tissue.cell_size);
+            let shape = self.region_shape(&at, table, file.tissue.mesh.is_some(), (mesh, case));
+            let (material, preset) = match table.rigid {
+                true => (self.rigid(&at, table), None),
+                false if table.material == MaterialTable::default() => {
+                    self.problems.report(
+                        &at,
+                        format!("region `{}` has no material", table.name),
+                        "neither material nor rigid",
+                        "write material = { preset = \"fat\" }, or rigid = true for bone",
+                    );
+                    (self.rigid(&at, table), None)
+                }
+                false => self.material(&format!("{at}.material"), &table.material, tissue.cell_size),
+            };
             self.own_tables(&format!("{at}."), table.own_tables());
             presets.push(preset);
             regions.push(Region { name: table.name.clone(), shape, material });
@@ -62,8 +78,24 @@ impl Check<'_> {
         (regions, presets)
     }
 
+    /// What does not deform.
+    fn rigid(&mut self, at: &str, table: &RegionTable) -> TissueMaterial {
+        if table.material != MaterialTable::default() {
+            self.notices.push(format!("`{at}.material` has no effect: what is rigid does not deform."));
+        }
+        // The law of cortical bone, E 17 GPa, nu 0.3 [Rho1998]; no engine computes with it.
+        const BONE: ElasticLaw = ElasticLaw::mooney_rivlin(2.29e9, 0.98e9, 14.2e9);
+        TissueMaterial { rigid: true, ..TissueMaterial::new("rigid", "does not deform", BONE, 1900.0) }
+    }
+
     /// The one shape of a region, in SI.
-    fn region_shape(&mut self, at: &str, table: &RegionTable, of_mesh: bool, mesh: Option<&TetMesh>) -> RegionShape {
+    fn region_shape(
+        &mut self,
+        at: &str,
+        table: &RegionTable,
+        of_mesh: bool,
+        (mesh, case): (Option<&TetMesh>, Option<&Arc<Case>>),
+    ) -> RegionShape {
         let path = |key: &str| format!("{at}.{key}");
         let written = [
             table.layer_mm.is_some(),
@@ -71,6 +103,7 @@ impl Check<'_> {
             table.sphere_mm.is_some(),
             table.cylinder_mm.is_some(),
             table.mesh_tag.is_some(),
+            table.label.is_some(),
         ];
         let keys: Vec<&str> = SHAPES.into_iter().zip(written).filter_map(|(key, on)| on.then_some(key)).collect();
         if keys.len() != 1 {
@@ -86,7 +119,7 @@ impl Check<'_> {
                 "exactly one shape",
                 "write one of layer_mm = [0, 2], box_mm = {low = [..], high = [..]}, \
                  sphere_mm = {centre = [..], radius = 3}, cylinder_mm = {from = [..], to = [..], radius = 1}, \
-                 mesh_tag = \"skin\"",
+                 mesh_tag = \"skin\", label = 3",
             );
         }
         if let Some([top, bottom]) = table.layer_mm {
@@ -135,6 +168,24 @@ impl Check<'_> {
             }
             return RegionShape::Cylinder { from: from * MM, to: to * MM, radius: radius * MM };
         }
+        if let Some(entries) = &table.label {
+            let Some(case) = case else {
+                // Where the label map could not be read that has been told.
+                if of_mesh || !self.has_labels {
+                    self.problems.report(
+                        &path("label"),
+                        "labels name what lies in a label map",
+                        "no tissue.labels in this scene",
+                        "write a shape, e.g. layer_mm = [0, 2], or give tissue.labels",
+                    );
+                }
+                return RegionShape::MeshTag(String::new());
+            };
+            let mut labels = self.labels_of(&path("label"), entries.list(), &case.map);
+            labels.sort_unstable();
+            labels.dedup();
+            return RegionShape::Labels { labels, case: case.clone() };
+        }
         let tag = table.mesh_tag.clone().unwrap_or_default();
         if table.mesh_tag.is_some() {
             if !of_mesh {
@@ -161,7 +212,7 @@ impl Check<'_> {
     /// Every shape reaches into the tissue.
     pub(super) fn overlaps(&mut self, regions: &[Region], tissue: &Tissue, mesh: Option<&TetMesh>) {
         let half = tissue.size * 0.5;
-        let block = (DVec3::new(-half.x, -half.y, -tissue.size.z), DVec3::new(half.x, half.y, 0.0));
+        let block = (DVec3::new(-half.x, -half.y, -tissue.size.z), DVec3::new(half.x, half.y, tissue.top));
         let (low, high) = mesh.map_or(block, TetMesh::bounds);
         for (index, region) in regions.iter().enumerate() {
             let (from, to) = match bounds(&region.shape) {
@@ -208,7 +259,8 @@ impl Check<'_> {
             largest[material] = largest[material].max(mesh.cell_volume(cell).cbrt());
         }
         for (index, region) in regions.iter().enumerate() {
-            if count[index + 1] == 0 {
+            // What has a label may lie elsewhere in the patient, and what is thin has its part of the cells.
+            if count[index + 1] == 0 && !matches!(region.shape, RegionShape::Labels { .. }) {
                 self.notices.push(format!(
                     "Region `{}` holds the centre of no cell (too thin, or covered by a later region): only its tip \
                      forces act.",
@@ -380,7 +432,7 @@ fn bounds(shape: &RegionShape) -> Option<(DVec3, DVec3)> {
             let reach = (DVec3::ONE - axis * axis).max(DVec3::ZERO).map(f64::sqrt) * *radius;
             (from.min(*to) - reach, from.max(*to) + reach)
         }
-        RegionShape::MeshTag(_) => return None,
+        RegionShape::MeshTag(_) | RegionShape::Labels { .. } => return None,
     })
 }
 
@@ -391,6 +443,6 @@ fn thickness(shape: &RegionShape) -> Option<f64> {
         RegionShape::Box { low, high } => Some((*high - *low).min_element()),
         RegionShape::Sphere { radius, .. } => Some(2.0 * radius),
         RegionShape::Cylinder { from, to, radius } => Some((2.0 * radius).min(from.distance(*to))),
-        RegionShape::MeshTag(_) => None,
+        RegionShape::MeshTag(_) | RegionShape::Labels { .. } => None,
     }
 }

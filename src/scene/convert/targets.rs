@@ -3,8 +3,9 @@
 use glam::DVec3;
 
 use super::super::Target;
-use super::super::file::SceneFile;
+use super::super::file::{SceneFile, TargetTable};
 use super::{Check, MM, Within};
+use crate::anatomy::Case;
 use crate::mesh::Tissue;
 
 /// Most targets of a scene: what is read back after every frame stays small.
@@ -18,7 +19,7 @@ const ROUNDING: f64 = 1e-9;
 
 impl Check<'_> {
     /// The targets in SI; whether they lie inside the tissue is looked at by `inside`.
-    pub(super) fn targets(&mut self, file: &SceneFile) -> Vec<Target> {
+    pub(super) fn targets(&mut self, file: &SceneFile, case: Option<&Case>) -> Vec<Target> {
         if file.target.len() > LARGEST_TARGET_COUNT {
             self.problems.report(
                 &format!("target.{LARGEST_TARGET_COUNT}"),
@@ -26,9 +27,6 @@ impl Check<'_> {
                 "too many",
                 format!("keep at most {LARGEST_TARGET_COUNT} targets"),
             );
-        }
-        if !file.target.is_empty() && file.tissue.mesh.is_some() {
-            self.needs_block("target.0", "a target");
         }
         let mut targets: Vec<Target> = Vec::new();
         for (index, table) in file.target.iter().enumerate() {
@@ -52,17 +50,46 @@ impl Check<'_> {
             }
             targets.push(Target {
                 name,
-                position: self.vector(&at("position_mm"), table.position_mm, 1000.0) * MM,
+                position: self.target_position(index, table, case),
                 radius: self.optional(&at("radius_mm"), table.radius_mm, MM, RADIUS, Within::Positive(1000.0)),
             });
         }
         targets
     }
 
+    /// Where a target lies in the scene [m].
+    fn target_position(&mut self, index: usize, table: &TargetTable, case: Option<&Case>) -> DVec3 {
+        let at = |key: &str| format!("target.{index}.{key}");
+        match (table.position_mm, table.position_ras_mm, case) {
+            (Some(position), None, _) => self.vector(&at("position_mm"), position, 1000.0) * MM,
+            (None, Some(position), Some(case)) => {
+                case.frame.to_scene(self.vector(&at("position_ras_mm"), position, 10_000.0) * MM)
+            }
+            (None, Some(_), None) => {
+                self.problems.report(
+                    &at("position_ras_mm"),
+                    "a place in a patient needs a label map",
+                    "no tissue.labels in this scene",
+                    "write position_mm in the coordinates of the block",
+                );
+                DVec3::ZERO
+            }
+            (position, _, _) => {
+                self.problems.report(
+                    &format!("target.{index}"),
+                    if position.is_some() { "the target has two places" } else { "the target has no place" },
+                    "exactly one of position_mm and position_ras_mm",
+                    "write position_mm = [0, 0, -9]",
+                );
+                DVec3::ZERO
+            }
+        }
+    }
+
     /// Every target lies inside the block.
     pub(super) fn inside(&mut self, targets: &[Target], tissue: &Tissue) {
         let half = tissue.size * 0.5;
-        let (low, high) = (DVec3::new(-half.x, -half.y, -tissue.size.z), DVec3::new(half.x, half.y, 0.0));
+        let (low, high) = (DVec3::new(-half.x, -half.y, -tissue.size.z), DVec3::new(half.x, half.y, tissue.top));
         for (index, target) in targets.iter().enumerate() {
             let x = target.position;
             if x.cmpge(low - ROUNDING).all() && x.cmple(high + ROUNDING).all() {

@@ -21,7 +21,7 @@ const MM3: f64 = units::CUBIC_MILLIMETRE.si;
 fn keys(kind: GoalKind) -> &'static [&'static str] {
     match kind {
         GoalKind::HitTarget => &["target", "tolerance_mm"],
-        GoalKind::Avoid => &["name", "sphere_mm", "cylinder_mm", "clearance_mm"],
+        GoalKind::Avoid => &["name", "sphere_mm", "cylinder_mm", "region", "clearance_mm"],
         GoalKind::StopInLayer => &["name", "region", "depth_mm"],
         GoalKind::Core => &["mass_mg", "volume_mm3"],
     }
@@ -141,7 +141,7 @@ impl Check<'_> {
         }
         match table.kind {
             GoalKind::HitTarget => self.hit_target(&at, table, targets),
-            GoalKind::Avoid => self.avoid(&at, table, index),
+            GoalKind::Avoid => self.avoid(&at, table, file, index),
             GoalKind::StopInLayer => self.stop_in_layer(&at, table, file, index),
             GoalKind::Core => self.core(&at, table, bored, index),
         }
@@ -171,8 +171,23 @@ impl Check<'_> {
         Some(Goal::HitTarget { target: index, tolerance })
     }
 
-    fn avoid(&mut self, at: &dyn Fn(&str) -> String, table: &GoalTable, index: usize) -> Option<Goal> {
+    fn avoid(
+        &mut self,
+        at: &dyn Fn(&str) -> String,
+        table: &GoalTable,
+        file: &SceneFile,
+        index: usize,
+    ) -> Option<Goal> {
         let clearance = self.optional(&at("clearance_mm"), table.clearance_mm, MM, 0.0, Within::NotNegative(1000.0));
+        if let (Some(name), None, None) = (&table.region, table.sphere_mm, table.cylinder_mm) {
+            let Some(region) = file.region.iter().position(|region| region.name == *name) else {
+                let names: Vec<&str> = file.region.iter().map(|region| region.name.as_str()).collect();
+                self.unknown_name(&at("region"), "region", name, &names);
+                return None;
+            };
+            let name = table.name.clone().unwrap_or_else(|| name.clone());
+            return Some(Goal::Avoid { name, obstacle: Obstacle::Region(region), clearance });
+        }
         let obstacle = match (table.sphere_mm, table.cylinder_mm) {
             (Some(SphereShapeTable { centre, radius }), None) => Obstacle::Sphere {
                 centre: self.vector(&at("sphere_mm.centre"), centre, 1000.0) * MM,
@@ -195,13 +210,14 @@ impl Check<'_> {
             (sphere, _) => {
                 let (message, place) = match sphere {
                     Some(_) => ("the obstacle has two shapes", at("cylinder_mm")),
+                    None if table.region.is_some() => ("the obstacle has two shapes", at("region")),
                     None => ("the obstacle has no shape", format!("task.goal.{index}")),
                 };
                 self.problems.report(
                     &place,
                     message,
                     "exactly one shape",
-                    "write sphere_mm = {centre = [..], radius = 1} or cylinder_mm = {from = [..], to = [..], radius = 1}",
+                    "write sphere_mm = {centre = [..], radius = 1}, cylinder_mm = {from = [..], to = [..], radius = 1} or region = \"vessel\"",
                 );
                 return None;
             }

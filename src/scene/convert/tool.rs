@@ -4,7 +4,9 @@ use glam::DVec3;
 
 use super::super::file::*;
 use super::super::needles;
+use super::mesh_path::Entry;
 use super::{Check, MM, Within};
+use crate::mesh::TetMesh;
 use crate::needle::motion::Placement;
 use crate::needle::{BoreShape, Motion, NeedleShape, Phase, TipShape, Tool, Vibration};
 use crate::units::four_digits;
@@ -218,7 +220,8 @@ impl Check<'_> {
         (youngs_modulus, density)
     }
 
-    pub(super) fn motion(&mut self, file: &SceneFile, has_tool: bool) -> Motion {
+    pub(super) fn motion(&mut self, file: &SceneFile, tool: Option<&Tool>, mesh: Option<&TetMesh>) -> Motion {
+        let has_tool = tool.is_some();
         let Some(table) = &file.motion else {
             if has_tool {
                 self.problems.report(
@@ -239,15 +242,29 @@ impl Check<'_> {
             );
             return Motion::default();
         }
+        // Other tools are refused on a mesh by their effect.
+        let is_needle = matches!(tool, Some(Tool::Needle(_)));
+        let Entry { entry, direction } = match file.tissue.mesh.is_some() && is_needle {
+            true => match self.mesh_entry(table, mesh, tool) {
+                Some(entry) => entry,
+                None => return Motion { direction: DVec3::NEG_Z, ..Motion::default() },
+            },
+            false => self.block_entry(table),
+        };
+        let phases = self.phases(&table.phase, entry, direction);
+        let vibration = table.vibration.as_ref().map(|v| self.vibration(v, direction));
+        Motion { entry, direction, phases, vibration }
+    }
+
+    /// Entry point and direction of a motion into a block.
+    fn block_entry(&mut self, table: &MotionTable) -> Entry {
+        self.keys_of_a_mesh(table);
         let entry = table.entry_mm.unwrap_or([0.0, 0.0]);
         for (index, value) in entry.iter().enumerate() {
             self.number(&format!("motion.entry_mm.{index}"), *value, Within::Between(-1000.0, 1000.0));
         }
         let direction = self.direction(table);
-        let entry = DVec3::new(entry[0], entry[1], 0.0) * MM;
-        let phases = self.phases(&table.phase, entry, direction);
-        let vibration = table.vibration.as_ref().map(|v| self.vibration(v, direction));
-        Motion { entry, direction, phases, vibration }
+        Entry { entry: DVec3::new(entry[0], entry[1], 0.0) * MM, direction }
     }
 
     fn vibration(&mut self, table: &VibrationTable, insertion: DVec3) -> Vibration {
@@ -275,7 +292,7 @@ impl Check<'_> {
         }
     }
 
-    fn direction(&mut self, table: &MotionTable) -> DVec3 {
+    pub(super) fn direction(&mut self, table: &MotionTable) -> DVec3 {
         self.stated_direction("motion", table.direction, table.angle_deg, table.azimuth_deg).unwrap_or(DVec3::NEG_Z)
     }
 
@@ -408,7 +425,13 @@ impl Check<'_> {
     /// Speed [m/s] and depth [mm] of an insertion or a withdrawal.
     fn speed_and_depth(&mut self, index: usize, table: &PhaseTable, within: Within) -> Option<(f64, f64)> {
         let speed = self.needed(index, "speed_mm_s", table.speed_mm_s, "speed_mm_s = 2", Within::Positive(1000.0));
-        let depth = self.needed(index, "depth_mm", table.depth_mm, "depth_mm = 12", within);
+        // An insertion into a patient goes to its target.
+        if self.has_labels && self.path.is_none() && table.depth_mm.is_none() {
+            // Why there is no target has been told.
+            return None;
+        }
+        let to_target = self.path.filter(|_| table.kind == PhaseKind::Insert).map(|path| path / MM);
+        let depth = self.needed(index, "depth_mm", table.depth_mm.or(to_target), "depth_mm = 12", within);
         Some((speed? * MM, depth?))
     }
 

@@ -1,7 +1,7 @@
 //! Materials as they are written: in a scene, in its regions and in a library.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 use super::super::words;
 use crate::effects::damage::DamageTable;
@@ -71,7 +71,7 @@ macro_rules! table_of_a_law {
 
 with_law_constants! {
 /// A tissue material: a preset, or the constants of a law with one volumetric key, or E and nu with a share of c10.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(transform = words::known_presets)]
 pub struct MaterialTable {
@@ -127,6 +127,12 @@ pub struct RegionTable {
     pub cylinder_mm: Option<CylinderTable>,
     /// Name of a region of the mesh file.
     pub mesh_tag: Option<String>,
+    /// Label of a label map, its name there, or a list of them.
+    pub label: Option<LabelEntries>,
+    /// Bone and other things that do not deform: the needle stops there. A rigid region needs no material.
+    #[serde(default)]
+    pub rigid: bool,
+    #[serde(default)]
     pub material: MaterialTable,
     pub plasticity: Option<PlasticityTable>,
     pub fibres: Option<FibresTable>,
@@ -140,6 +146,76 @@ pub struct RegionTable {
     pub cutting_energy_j_m2: Option<f64>,
     /// A tough layer with a puncture energy of its own, e.g. skin or a capsule; with `layer_mm` only.
     pub membrane: Option<MembraneTable>,
+}
+
+/// A label by its number or its name.
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema)]
+#[schemars(untagged)]
+pub enum LabelEntry {
+    Number(u64),
+    Name(String),
+}
+
+/// One label or several.
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema)]
+#[schemars(untagged)]
+pub enum LabelEntries {
+    One(LabelEntry),
+    Several(Vec<LabelEntry>),
+}
+
+impl LabelEntries {
+    /// All of them.
+    pub fn list(&self) -> &[LabelEntry] {
+        match self {
+            LabelEntries::One(entry) => std::slice::from_ref(entry),
+            LabelEntries::Several(entries) => entries,
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for LabelEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match LabelEntries::deserialize(deserializer)? {
+            LabelEntries::One(entry) => Ok(entry),
+            LabelEntries::Several(_) => Err(serde::de::Error::custom("a list within a list of labels")),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for LabelEntries {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl<'de> serde::de::Visitor<'de> for Visitor {
+            type Value = LabelEntries;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("a label such as 3 or \"skin\", or a list of labels")
+            }
+
+            fn visit_i64<E: serde::de::Error>(self, number: i64) -> Result<LabelEntries, E> {
+                let number = u64::try_from(number).map_err(|_| E::custom("a label is no negative number"))?;
+                Ok(LabelEntries::One(LabelEntry::Number(number)))
+            }
+
+            fn visit_u64<E>(self, number: u64) -> Result<LabelEntries, E> {
+                Ok(LabelEntries::One(LabelEntry::Number(number)))
+            }
+
+            fn visit_str<E>(self, name: &str) -> Result<LabelEntries, E> {
+                Ok(LabelEntries::One(LabelEntry::Name(name.into())))
+            }
+
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut list: A) -> Result<LabelEntries, A::Error> {
+                let mut entries = Vec::new();
+                while let Some(entry) = list.next_element()? {
+                    entries.push(entry);
+                }
+                Ok(LabelEntries::Several(entries))
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
 }
 
 /// Energy that puncturing a layer takes beyond cutting through it: exactly one key.
@@ -190,6 +266,9 @@ with_law_constants! {
 #[serde(deny_unknown_fields)]
 pub struct LibraryMaterial {
     pub name: String,
+    /// Further names that a scene may call it by; case does not count, and "-", "_" and a blank are the same.
+    #[serde(default)]
+    pub aliases: Vec<String>,
     /// One line: what it is.
     pub summary: Option<String>,
     /// Where the constants come from.

@@ -12,8 +12,8 @@ use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::{Deserialize, Deserializer};
 
 pub use material::{
-    BoxTable, CuttingTable, CylinderTable, LibraryFile, LibraryMaterial, MaterialTable, MembraneTable, RegionTable,
-    SphereShapeTable,
+    BoxTable, CuttingTable, CylinderTable, LabelEntries, LabelEntry, LibraryFile, LibraryMaterial, MaterialTable,
+    MembraneTable, RegionTable, SphereShapeTable,
 };
 pub use task::{GoalKind, GoalTable, TaskTable};
 pub use tool::{
@@ -141,6 +141,16 @@ pub struct TissueTable {
     pub unit: Option<String>,
     /// Accept a mesh smaller than 1 mm or larger than 1 m, which is otherwise taken for a wrong unit.
     pub accept_size: Option<bool>,
+    /// A label map of a patient (.nrrd, .nii, .nii.gz, .mha, .mhd) in which the block lies; relative to the scene file. The block then
+    /// follows the needle from `motion.entry_ras_mm` to `motion.target_ras_mm`; `size_mm` is its width in x and y and its depth below
+    /// the skin; default: 40 mm wide and half as deep again as the path.
+    pub labels: Option<String>,
+    /// Labels that are no tissue, by number or name, e.g. air in the trachea.
+    pub outside: Option<LabelEntries>,
+    /// Closed surfaces (.stl, .obj, .ply, .vtp) instead of a label map, in the same coordinates; each is a label, called like its file or
+    /// like the surface in it, and where two overlap the later one counts. `unit` is that of the files.
+    #[serde(default)]
+    pub surfaces: Vec<String>,
 }
 
 /// A node set of the mesh that is held.
@@ -278,6 +288,13 @@ pub struct OutputsTable {
     pub pictures_at_s: Option<Vec<f64>>,
     /// Times at which a VTU file is written [s]; scenes without a tool or with a free motion.
     pub fields_at_s: Option<Vec<f64>>,
+    /// Depths on the way in at which displacement field, deformed label map, needle and targets are written for 3D Slicer [mm]; scenes
+    /// with `tissue.labels` and a tool.
+    pub volumes_at_depth_mm: Option<Vec<f64>>,
+    /// Times of the same [s]; scenes with `tissue.labels`, without a tool or with a free motion.
+    pub volumes_at_s: Option<Vec<f64>>,
+    /// Every how many voxels of the label map these volumes have one, along each axis, 1 to 16; default 1.
+    pub volume_stride: Option<u32>,
     /// Width of a picture in pixels, 64 to 8192; default 900.
     pub picture_width_px: Option<u32>,
     /// Upper end of the colour bar [kPa]; default: the largest stress in the picture.
@@ -291,7 +308,9 @@ pub struct TargetTable {
     /// Name in the outputs, e.g. "lesion"; default "target 1", "target 2", ...
     pub name: Option<String>,
     /// Where it lies at rest, in the coordinates of the block [mm].
-    pub position_mm: [f64; 3],
+    pub position_mm: Option<[f64; 3]>,
+    /// The same in the patient, RAS [mm]; with `tissue.labels`.
+    pub position_ras_mm: Option<[f64; 3]>,
     /// The tip hits it when it comes no farther away than this [mm]; default 1.
     pub radius_mm: Option<f64>,
 }

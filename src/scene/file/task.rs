@@ -37,7 +37,7 @@ pub struct GoalTable {
     pub cylinder_mm: Option<CylinderTable>,
     /// Least distance between the outside of the needle and that of the obstacle [mm]; for avoid; default 0.
     pub clearance_mm: Option<f64>,
-    /// Name of a [[region]] with `layer_mm` in which the tip stops; for stop_in_layer.
+    /// Name of a [[region]]: with `layer_mm` and in which the tip stops, for stop_in_layer; that the needle stays away from, for avoid.
     pub region: Option<String>,
     /// The same as depths of its top and bottom below z = 0 [mm].
     pub depth_mm: Option<[f64; 2]>,

@@ -85,7 +85,20 @@ pub struct FlatPunchTable {
 pub struct MotionTable {
     /// Entry point on the top face, x and y [mm]; default [0, 0].
     pub entry_mm: Option<[f64; 2]>,
-    /// Direction of the insertion, any length, z < 0; default [0, 0, -1]. Or give `angle_deg`.
+    /// Entry point on the surface of a mesh or near it, in the coordinates of the mesh [mm]; with `tissue.mesh`. The surface itself is
+    /// found along the direction of the insertion, and depths count from there.
+    pub entry_point_mm: Option<[f64; 3]>,
+    /// Point of a mesh that the needle is led to [mm], instead of `direction` and `angle_deg`; with `tissue.mesh`. An insertion without
+    /// `depth_mm` ends there.
+    pub target_point_mm: Option<[f64; 3]>,
+    /// Entry point on the skin of a patient, RAS [mm]; with `tissue.labels`. What lies on the line to the target counts: the skin
+    /// itself is found there.
+    pub entry_ras_mm: Option<[f64; 3]>,
+    /// Point of the patient that the needle is led to, RAS [mm]; with `tissue.labels`.
+    pub target_ras_mm: Option<[f64; 3]>,
+    /// Entry and target as the first two points of a file of 3D Slicer (.mrk.json, .fcsv) instead; relative to the scene file.
+    pub markups: Option<String>,
+    /// Direction of the insertion, any length, z < 0 (into a mesh: any); default [0, 0, -1]. Or give `angle_deg`.
     pub direction: Option<[f64; 3]>,
     /// Angle between the needle and the downward vertical [deg], 0 to 80.
     pub angle_deg: Option<f64>,

@@ -11,6 +11,7 @@ use super::canvas::canvas;
 use super::renewal::shader_files;
 use super::{App, Open};
 use crate::gpu::Gpu;
+use crate::window::anatomy_view::legend;
 use crate::window::camera::Camera;
 use crate::window::devices::Devices;
 use crate::window::foresight::Foresight;
@@ -116,6 +117,7 @@ impl App {
             debriefing: None,
         };
         open.choices.look.probe.on = self.options.ultrasound;
+        open.choices.parts = legend(&model);
         open.cut();
         Ok(open)
     }

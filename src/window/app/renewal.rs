@@ -9,6 +9,7 @@ use crate::Result;
 use crate::gpu::compose::{SOURCES, read_sources};
 use crate::reading;
 use crate::simulation::change::Reach;
+use crate::window::anatomy_view::legend;
 use crate::window::scene_view::SceneView;
 use crate::window::section::RestPlane;
 use crate::window::source::Source;
@@ -35,6 +36,7 @@ impl Open {
         {
             self.view = SceneView::new(&self.gpu, engine, &model, self.config.format)?;
         }
+        self.choices.parts = legend(&model);
         self.scan.close(&mut self.painter);
         self.cut();
         self.alive.writes_to(self.practice.folder());

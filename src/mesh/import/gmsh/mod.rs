@@ -462,7 +462,10 @@ impl GmshFile<'_> {
         for corner in 0..shape.nodes {
             let node = self.records.id("a node of an element")?;
             if shape.kept() {
-                nodes[corner as usize] = self.index_of(at, id, node)?;
+                let index = self.index_of(at, id, node)?;
+                if let Some(kept) = nodes.get_mut(corner as usize).filter(|_| corner < shape.corners) {
+                    *kept = index;
+                }
             }
         }
         self.add_element(at, id, shape, &nodes, &[group.physical], group.entity)
@@ -494,7 +497,10 @@ impl GmshFile<'_> {
                 for corner in 0..shape.nodes {
                     let node = self.records.size("a node of an element")?;
                     if shape.kept() {
-                        nodes[corner as usize] = self.index_of(at, id, node)?;
+                        let index = self.index_of(at, id, node)?;
+                        if let Some(kept) = nodes.get_mut(corner as usize).filter(|_| corner < shape.corners) {
+                            *kept = index;
+                        }
                     }
                 }
                 self.records.end()?;
@@ -542,13 +548,14 @@ impl GmshFile<'_> {
                 if region == next {
                     self.groups.push(group);
                 }
+                self.raw.ten_node += u64::from(shape.nodes == 10);
                 self.raw.tets.push(RawTet { id, nodes: *nodes, region });
             }
             Some(class) => {
                 let in_group = shape.kept() && physicals.iter().any(|p| *p != 0);
                 for physical in physicals.iter().filter(|p| **p != 0 && in_group) {
                     let set = self.lower_groups.entry((shape.dimension, *physical)).or_default();
-                    set.extend(&nodes[..shape.nodes as usize]);
+                    set.extend(&nodes[..shape.corners as usize]);
                 }
                 if !in_group {
                     self.raw.count_other(class, shape.kind, 1);

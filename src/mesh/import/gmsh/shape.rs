@@ -6,8 +6,10 @@ use super::*;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shape {
     pub(super) nodes: u32,
+    /// Nodes that are kept, the first of its list: the corners of a simplex of first or second order; of others none.
+    pub(super) corners: u32,
     pub(super) dimension: i64,
-    /// `None` for the four-node tetrahedron.
+    /// `None` for tetrahedra of four and ten nodes.
     pub(super) class: Option<ElementClass>,
     pub(super) kind: &'static str,
 }
@@ -15,7 +17,7 @@ pub(super) struct Shape {
 impl Shape {
     /// Whether the nodes are needed: tetrahedra, and the simplices that mark node sets.
     pub(super) fn kept(&self) -> bool {
-        self.class.is_none() || self.class == Some(ElementClass::Lower) && self.nodes as i64 == self.dimension + 1
+        self.corners > 0
     }
 
     /// Table of element types of the Gmsh reference manual.
@@ -56,11 +58,15 @@ impl Shape {
             _ => return None,
         };
         let class = match number {
-            4 => None,
-            11 | 29..=31 => Some(ElementClass::HighOrderTet),
+            4 | 11 => None,
+            29..=31 => Some(ElementClass::HighOrderTet),
             _ if dimension == 3 => Some(ElementClass::Volume),
             _ => Some(ElementClass::Lower),
         };
-        Some(Shape { nodes, dimension, class, kind })
+        let corners = match number {
+            1 | 2 | 4 | 8 | 9 | 11 | 15 => dimension as u32 + 1,
+            _ => 0,
+        };
+        Some(Shape { nodes, corners, dimension, class, kind })
     }
 }

@@ -1,0 +1,14 @@
+//! Label maps and surfaces of patients: readers, and what a scene makes of them.
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../anatomy/labels.rs"]
+mod labels;
+#[path = "../anatomy/pictures.rs"]
+mod pictures;
+#[path = "../anatomy/readers.rs"]
+mod readers;
+#[path = "../anatomy/surface_nets.rs"]
+mod surface_nets;
+#[path = "../anatomy/surfaces.rs"]
+mod surfaces;
