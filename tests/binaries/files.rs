@@ -8,3 +8,5 @@ mod docs;
 mod material_command;
 #[path = "../scene_files.rs"]
 mod scene_files;
+#[path = "../words.rs"]
+mod words;
