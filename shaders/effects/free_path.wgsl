@@ -26,7 +26,7 @@ struct FreeTip {
 
 // A cell of the box that the tip may open.
 struct FreeCell {
-    // Lowest corner and edges at rest [m], w unused.
+    // Lowest corner and edges at rest [m]; w: height of the skin over the corners x0 y0 and x1 y0 of the column [m].
     low: vec4<f32>,
     size: vec4<f32>,
     cell: u32,
@@ -37,9 +37,11 @@ struct FreeCell {
     marked_high: u32,
     // Energy that softening took in this frame [J].
     dissipation: f32,
-    _pad0: f32,
-    _pad1: f32,
-    _pad2: f32,
+    // Index of the forces that the tip finds in it, AS_BEFORE: those that it had before.
+    tissue: u32,
+    // Height of the skin over the corners x0 y1 and x1 y1 [m].
+    height_01: f32,
+    height_11: f32,
 }
 
 @group(3) @binding(11) var<storage, read_write> free_tip: FreeTip;
@@ -56,6 +58,9 @@ struct FreeCell {
 #const SLIP_CAP
 #const SOFTENING_RATE
 #const END_FADE
+#const NO_SKIN
+// Also there.
+const AS_BEFORE = 255u;
 
 // Place of an anchor in the tip's plane, along `across` and along T x `across` [m].
 fn anchor_offset(anchor: u32) -> vec2<f32> {

@@ -46,7 +46,7 @@ fn touch_at(index: u32, contact: Contact, from_axis: vec3<f32>, s: f32) -> Touch
     let old = known.x == 1.0;
     // The dimple before the puncture is no opened path.
     let passes = free_tip.coordinate > 0.0 && ahead <= 0.0 && ahead > -ring && radius < ring;
-    let passed = free_tip.inside == 1.0 && s > -PASSED_MARGIN && (old || passes);
+    let passed = free_tip.inside == 1.0 && contact.pushed == 1u && s > -PASSED_MARGIN && (old || passes);
     var rest_radius = known.y;
     for (var once = select(1u, 0u, passed != old); once == 0u; once++) {
         var fresh = Memory();
@@ -58,7 +58,7 @@ fn touch_at(index: u32, contact: Contact, from_axis: vec3<f32>, s: f32) -> Touch
     // The shaft alone: a node just before the tip is not passed yet, and is no obstacle to the cone.
     let reach = WATCHED * puncture.needle_radius;
     let square = dot(from_axis, from_axis) - s * s;
-    let met = free_tip.inside == 1.0 && !passed && s > puncture.tip_length && square < reach * reach;
+    let met = free_tip.inside == 1.0 && contact.pushed == 1u && !passed && s > puncture.tip_length && square < reach * reach;
     let in_ring = passed && s > 0.0 && rest_radius > puncture.softened_radius;
     let weight = select(ring_weight(rest_radius), 1.0, met);
     let beside = (reach - sqrt(max(square, 0.0))) / (reach - puncture.needle_radius);

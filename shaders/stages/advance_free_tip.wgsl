@@ -82,13 +82,60 @@ fn material_place(X: vec3<f32>) -> MaterialPlace {
     return place;
 }
 
+// Number of a cell in the box of free cells; the length of the box outside it.
+fn free_index(cell: vec3<u32>) -> u32 {
+    let low = puncture.free_low.xyz;
+    let count = puncture.free_count.xyz;
+    let part = cell - low;
+    let inside = all(cell >= low) && all(part < count);
+    return select(puncture.path_cell_count, (part.z * count.y + part.y) * count.x + part.x, inside);
+}
+
+#ifdef EMPTY_CELLS
+// Height of the skin over a rest position [m]: far below everything where there is no tissue.
+fn skin_at(X: vec3<f32>) -> f32 {
+    let grid = grid_place(X);
+    let low = puncture.free_low.xyz;
+    // The heights are those of the column, whatever the layer.
+    let index = free_index(vec3<u32>(grid.cell.xy, low.z));
+    let cell = min(index, puncture.path_cell_count - 1u);
+    let near = mix(free_cells[cell].low.w, free_cells[cell].size.w, grid.local.x);
+    let far = mix(free_cells[cell].height_01, free_cells[cell].height_11, grid.local.x);
+    return select(NO_SKIN, mix(near, far, grid.local.y), index < puncture.path_cell_count);
+}
+
+fn has_skin(height: f32) -> bool {
+    return height > 1e-2 * NO_SKIN;
+}
+#else
+// The top face.
+fn skin_at(X: vec3<f32>) -> f32 {
+    return 0.0;
+}
+
+fn has_skin(height: f32) -> bool {
+    return true;
+}
+#endif
+
+// The rest position itself or the nearest one in the tissue: in the block, and not above the skin.
+fn within_tissue(X: vec3<f32>) -> vec3<f32> {
+    let inside = within_block(X);
+#ifdef EMPTY_CELLS
+    let skin = skin_at(inside);
+    return vec3<f32>(inside.xy, select(inside.z, min(inside.z, skin), has_skin(skin)));
+#else
+    return inside;
+#endif
+}
+
 // Where an anchor is with the tip as it stands now; fills the lanes of the workgroup. Returns the cell.
 fn place_anchor(anchor: u32, lane: u32) -> GridPlace {
     let T = free_tip.along.xyz;
     let across = free_tip.across.xyz;
     let X0 = free_tip.place.xyz;
     let offset = anchor_offset(anchor);
-    let X = within_block(X0 + across * offset.x + cross(T, across) * offset.y);
+    let X = within_tissue(X0 + across * offset.x + cross(T, across) * offset.y);
     let place = material_place(X);
     let lever = step_input.tip.xyz - place.position;
     if (lane < ANCHOR_COUNT) {
@@ -105,14 +152,20 @@ fn place_anchor(anchor: u32, lane: u32) -> GridPlace {
 // begins.
 fn look_for_surface() {
     let X = free_tip.place.xyz;
-    let near = within_block(X);
+    let near = within_tissue(X);
     let place = material_place(near);
     let away = step_input.tip.xyz - place.position - (X - near);
     let next = X + pulled_back(place.fx, place.fy, place.fz, away);
-    let on_top = vec3<f32>(next.xy, 0.0);
-    let over = all(within_block(on_top) == on_top);
+    let skin = skin_at(next);
+#ifdef EMPTY_CELLS
+    // Heights of a lattice: see the CPU engine.
+    let on_top = vec3<f32>(next.xy, min(next.z, skin));
+#else
+    let on_top = vec3<f32>(next.xy, skin);
+#endif
+    let over = has_skin(skin) && all(within_block(on_top) == on_top);
     // Nearer than a tenth of a millimetre: far from the solution a step may end anywhere.
-    let enters = over && next.z <= 1e-9 && dot(away, away) < 1e-8;
+    let enters = over && next.z <= skin + 1e-9 && dot(away, away) < 1e-8;
     free_tip.place = vec4<f32>(select(next, on_top, enters), 0.0);
     let t = step_input.direction.xyz;
     let guess = select(vec3<f32>(0.0, 1.0, 0.0), vec3<f32>(1.0, 0.0, 0.0), abs(t.x) < 0.9);
@@ -122,15 +175,6 @@ fn look_for_surface() {
     free_tip.entry = 0.0;
     free_tip.material = 0u;
     free_tip.inside = select(0.0, 1.0, enters);
-}
-
-// Number of a cell in the box of free cells; the length of the box outside it.
-fn free_index(cell: vec3<u32>) -> u32 {
-    let low = puncture.free_low.xyz;
-    let count = puncture.free_count.xyz;
-    let part = cell - low;
-    let inside = all(cell >= low) && all(part < count);
-    return select(puncture.path_cell_count, (part.z * count.y + part.y) * count.x + part.x, inside);
 }
 
 // Moves the tip through the material. The gaps, sways and columns of F are those before.
@@ -168,7 +212,8 @@ fn move_tip() {
     let cell = min(index, puncture.path_cell_count - 1u);
     let word = select(free_cells[cell].marked_low, free_cells[cell].marked_high, bit >= 32u);
     let open = known && ((word >> (bit & 31u)) & 1u) == 1u;
-    let material = select(free_tip.material, free_cells[cell].material, known);
+    let tissue = free_cells[cell].tissue;
+    let material = select(free_tip.material, tissue, known && tissue != AS_BEFORE);
     var entry = select(free_tip.entry, free_tip.coordinate, material != free_tip.material);
     let forces = puncture.segments[material];
     let speed = length(step_input.velocity.xyz);
@@ -191,15 +236,21 @@ fn move_tip() {
     slip.z = select(slip.z, 0.0, at_surface);
     let goes = advance > 0.0 || retreat > 0.0 || any(slip != vec3<f32>(0.0));
     moved = select(0.0, 1.0, goes);
-    let next = X + direction * (advance - retreat) + slip;
+    var next = X + direction * (advance - retreat) + slip;
+    let skin = skin_at(next);
+#ifdef EMPTY_CELLS
+    let before = skin_at(X);
+    next.z += select(0.0, skin - before, has_skin(skin) && has_skin(before) && at_surface && advance == retreat);
+#endif
     let coordinate = max(free_tip.coordinate + advance - retreat, 0.0);
-    let leaves = retreat > 0.0 && next.z > 0.0;
+    // Beside the tissue the needle comes back through it.
+    let leaves = retreat > 0.0 && has_skin(skin) && next.z > skin;
     free_tip.material = material;
     free_tip.advance = select(0.0, advance + length(slip), retreat == 0.0 && coordinate > 0.0);
     free_tip.inside = select(1.0, 0.0, leaves);
     free_tip.coordinate = select(coordinate, 0.0, leaves);
     free_tip.entry = select(entry, 0.0, leaves);
-    free_tip.place = vec4<f32>(select(within_block(next), next, leaves), 0.0);
+    free_tip.place = vec4<f32>(select(within_tissue(next), next, leaves), 0.0);
     // T follows the pulled-back direction of the needle.
     let wanted = pulled_back(fx, fy, fz, t);
     let square = dot(wanted, wanted);

@@ -3,6 +3,7 @@
 //! The label at a point is the one with the largest trilinear weight among the eight voxels around it: the boundary between two labels
 //! is then as smooth as voxels let it be, without the steps of the nearest voxel.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
@@ -139,6 +140,24 @@ impl Case {
     /// Where the line from `entry` in `direction` meets the skin: the distance from `entry` [m], both in the scene.
     pub fn skin_along(&self, entry: DVec3, direction: DVec3) -> Option<f64> {
         self.surface_along(entry, direction, REACH_OF_SKIN)
+    }
+
+    /// Height of the skin of the scene at a place across, looked for from the upper end of `heights` to the lower [m].
+    pub fn skin_over(&self, x: f64, y: f64, heights: RangeInclusive<f64>) -> Option<f64> {
+        let (bottom, top) = (*heights.start(), *heights.end());
+        let is_inside = |z: f64| self.fill_at(DVec3::new(x, y, z)) >= 0.5;
+        let steps = ((top - bottom) / SEARCH_STEP).ceil() as usize;
+        let first = (0..=steps).map(|i| (top - i as f64 * SEARCH_STEP).max(bottom)).find(|z| is_inside(*z))?;
+        let (mut inside, mut outside) = (first, (first + SEARCH_STEP).min(top));
+        for _ in 0..30 {
+            let middle = 0.5 * (inside + outside);
+            if is_inside(middle) {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
+        }
+        Some(inside)
     }
 
     /// The box around all labels in the scene [m]; `None` where there are none.

@@ -9,7 +9,9 @@ use crate::effects::puncture::{
 use crate::material::kinematics::cofactor;
 use crate::mesh::{BlockMesh, trilinear};
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
-use crate::needle::free_path::{FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SOFTENING_RATE, TURNING, anchor_offset};
+use crate::needle::free_path::{
+    AS_BEFORE, FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SOFTENING_RATE, TURNING, anchor_offset,
+};
 use crate::needle::{ToolPose, lateral_axes};
 
 /// A material point in the deformed mesh.
@@ -52,6 +54,15 @@ fn within_block(mesh: &BlockMesh, x: DVec3) -> DVec3 {
     x.clamp(DVec3::new(first(0), first(1), first(2)), DVec3::new(end(0), end(1), end(2)))
 }
 
+/// The rest position itself or the nearest one in the tissue: in the block, and not above the skin.
+fn within_tissue(mesh: &BlockMesh, free: &FreePlan, x: DVec3) -> DVec3 {
+    let x = within_block(mesh, x);
+    match free.skin_at(mesh, x) {
+        Some(skin) if !free.heights.is_empty() => DVec3 { z: x.z.min(skin), ..x },
+        _ => x,
+    }
+}
+
 fn material_place(mesh: &BlockMesh, u: &[DVec3], x: DVec3) -> MaterialPlace {
     let (cell, local, width) = grid_place(mesh, x);
     let nodes = mesh.cell_nodes(mesh.cell_index(cell[0], cell[1], cell[2]));
@@ -65,6 +76,24 @@ fn material_place(mesh: &BlockMesh, u: &[DVec3], x: DVec3) -> MaterialPlace {
     MaterialPlace { nodes, weights, position, gradient }
 }
 
+/// Cells of the box whose middle is no farther from `x` than `reach` and half their diagonal; some more, found axis by axis.
+fn cells_near(mesh: &BlockMesh, free: &FreePlan, x: DVec3, reach: f64) -> Vec<[usize; 3]> {
+    let edge = |a: usize, i: usize| mesh.lines[a][i + 1] - mesh.lines[a][i];
+    let range = |a: usize| free.low[a]..free.low[a] + free.count[a];
+    let longest = [0, 1].map(|a| range(a).map(|i| edge(a, i)).fold(0.0, f64::max));
+    let near = |a: usize, i: usize, size: DVec3| {
+        (0.5 * (mesh.lines[a][i] + mesh.lines[a][i + 1]) - x[a]).abs() <= reach + 0.5 * size.length()
+    };
+    let mut cells = Vec::new();
+    for k in range(2).filter(|k| near(2, *k, DVec3::new(longest[0], longest[1], edge(2, *k)))) {
+        for j in range(1).filter(|j| near(1, *j, DVec3::new(longest[0], edge(1, *j), edge(2, k)))) {
+            let size = |i: usize| DVec3::new(edge(0, i), edge(1, j), edge(2, k));
+            cells.extend(range(0).filter(|i| near(0, *i, size(*i))).map(|i| [i, j, k]));
+        }
+    }
+    cells
+}
+
 /// F^-1 v, and v itself where the material is turned inside out.
 fn pulled_back(f: DMat3, v: DVec3) -> DVec3 {
     let cofactor = cofactor(f);
@@ -72,14 +101,20 @@ fn pulled_back(f: DMat3, v: DVec3) -> DVec3 {
     if j > 0.02 { cofactor.transpose() * v / j } else { v }
 }
 
-fn tip_springs(mesh: &BlockMesh, u: &[DVec3], radius: f64, tip: &FreeTip, pose: &ToolPose) -> TipSprings {
+fn tip_springs(
+    (mesh, free): (&BlockMesh, &FreePlan),
+    u: &[DVec3],
+    radius: f64,
+    tip: &FreeTip,
+    pose: &ToolPose,
+) -> TipSprings {
     let other = tip.along.cross(tip.across);
     let t = pose.direction;
     let mut springs = TipSprings { anchors: Vec::new(), mean_gap: 0.0, sway: DVec3::ZERO, gradient: DMat3::ZERO };
     let part = 1.0 / ANCHOR_COUNT as f64;
     for anchor in 0..ANCHOR_COUNT {
         let (a, b) = anchor_offset(anchor, radius);
-        let x = within_block(mesh, tip.place + tip.across * a + other * b);
+        let x = within_tissue(mesh, free, tip.place + tip.across * a + other * b);
         let at = material_place(mesh, u, x);
         let offset = x - tip.place;
         let gap = (pose.tip - at.position).dot(t) + offset.dot(tip.along);
@@ -92,18 +127,22 @@ fn tip_springs(mesh: &BlockMesh, u: &[DVec3], radius: f64, tip: &FreeTip, pose: 
     springs
 }
 
-/// Outside: one step of Newton's iteration for the point of the block that the tip is at, for the needle moves little from step to
-/// step; through the top face a track begins.
-fn look_for_surface(mesh: &BlockMesh, u: &[DVec3], tip: &mut FreeTip, pose: &ToolPose) {
-    let near = within_block(mesh, tip.place);
+/// Outside: one step of Newton's iteration for the point of the tissue that the tip is at, for the needle moves little from step to
+/// step; through the skin, or the top face, a track begins.
+fn look_for_surface((mesh, free): (&BlockMesh, &FreePlan), u: &[DVec3], tip: &mut FreeTip, pose: &ToolPose) {
+    let near = within_tissue(mesh, free, tip.place);
     let at = material_place(mesh, u, near);
     let away = pose.tip - at.position - (tip.place - near);
     tip.place += pulled_back(at.gradient, away);
-    let over = within_block(mesh, tip.place.with_z(0.0)) == tip.place.with_z(0.0);
+    let Some(skin) = free.skin_at(mesh, tip.place) else { return };
+    let over = within_block(mesh, tip.place.with_z(skin)) == tip.place.with_z(skin);
     // Nearer than a tenth of a millimetre: far from the solution a step may end anywhere.
-    if over && tip.place.z <= 1e-9 && away.length() < 1e-4 {
+    if over && tip.place.z <= skin + 1e-9 && away.length() < 1e-4 {
+        // The heights are those of a lattice: a tip that begins on the true skin may be some hundredths of a millimetre behind them, and
+        // springs that were tight at once would be work of nobody.
+        let height = if mesh.empty.is_empty() { skin } else { tip.place.z.min(skin) };
         *tip = FreeTip {
-            place: tip.place.with_z(0.0),
+            place: tip.place.with_z(height),
             along: pose.direction,
             across: lateral_axes(pose.direction).0,
             inside: true,
@@ -123,12 +162,12 @@ impl CpuEngine {
         let spring = p.tip_stiffness / ANCHOR_COUNT as f64;
         let mut tip = FreeTip { advance: 0.0, ..self.state.tip };
         if !tip.inside {
-            look_for_surface(mesh, u, &mut tip, pose);
+            look_for_surface((mesh, free), u, &mut tip, pose);
         }
-        let before = tip_springs(mesh, u, radius, &tip, pose);
+        let before = tip_springs((mesh, free), u, radius, &tip, pose);
         let capped = if tip.inside { self.move_tip(plan, free, pose, &mut tip, &before) } else { None };
         let after = match capped {
-            Some(_) if tip.inside => tip_springs(mesh, u, radius, &tip, pose),
+            Some(_) if tip.inside => tip_springs((mesh, free), u, radius, &tip, pose),
             _ => TipSprings { anchors: before.anchors.clone(), ..before },
         };
         let on = if tip.inside { 1.0 } else { 0.0 };
@@ -191,7 +230,13 @@ impl CpuEngine {
         if !(advance > 0.0 || retreat > 0.0 || slip != DVec3::ZERO) {
             return None;
         }
+        let before = free.skin_at(mesh, tip.place);
         tip.place += direction * (advance - retreat) + slip;
+        let skin = free.skin_at(mesh, tip.place);
+        // What glides on the skin goes up and down with it.
+        if let (Some(from), Some(to), true) = (before, skin, tip.coordinate == 0.0 && advance == retreat) {
+            tip.place.z += to - from;
+        }
         tip.coordinate = (tip.coordinate + advance - retreat).max(0.0);
         let wanted = pulled_back(f, t);
         if wanted.length() > 1e-3 {
@@ -202,10 +247,11 @@ impl CpuEngine {
         if retreat == 0.0 && tip.coordinate > 0.0 {
             tip.advance = advance + slip.length();
         }
-        if retreat > 0.0 && tip.place.z > 0.0 {
+        // Beside the tissue the needle comes back through it.
+        if retreat > 0.0 && skin.is_some_and(|skin| tip.place.z > skin) {
             *tip = FreeTip { inside: false, advance: 0.0, coordinate: 0.0, entry: 0.0, ..*tip };
         }
-        tip.place = if tip.inside { within_block(mesh, tip.place) } else { tip.place };
+        tip.place = if tip.inside { within_tissue(mesh, free, tip.place) } else { tip.place };
         Some(if advance == cap { threshold } else { f64::INFINITY })
     }
 
@@ -222,7 +268,12 @@ impl CpuEngine {
         let sample: [usize; 3] = std::array::from_fn(|a| ((local[a] * samples) as usize).min(SAMPLES - 1));
         let bit = sample[0] + SAMPLES * (sample[1] + SAMPLES * sample[2]);
         let open = free.index(cell).is_some_and(|i| self.state.cut_samples[i] >> bit & 1 == 1);
-        (self.model.material_index(mesh.cell_index(cell[0], cell[1], cell[2])), open)
+        let tissue = match free.index(cell).map(|index| free.tissues[index]) {
+            Some(AS_BEFORE) => tip.material,
+            Some(tissue) => usize::from(tissue),
+            None => self.model.material_index(mesh.cell_index(cell[0], cell[1], cell[2])),
+        };
+        (tissue, open)
     }
 
     /// Stage `soften_free_path`: factor `residual^(marked/64)`; the energy that a cell loses is dissipated.
@@ -234,8 +285,8 @@ impl CpuEngine {
         let model = self.model.clone();
         let mesh = model.mesh.block();
         let a0 = plan.params.softened_radius;
-        for index in 0..free.cell_count() {
-            let at = free.cell(index);
+        for at in cells_near(mesh, free, tip.place, a0.hypot(MARKED_BEHIND * a0)) {
+            let Some(index) = free.index(at) else { continue };
             let cell = mesh.cell_index(at[0], at[1], at[2]);
             let size = mesh.cell_size(cell);
             let low = DVec3::new(mesh.lines[0][at[0]], mesh.lines[1][at[1]], mesh.lines[2][at[2]]);

@@ -35,7 +35,13 @@ impl CpuEngine {
                 sums.tip = *force;
                 self.added_bound[node] += stiffness;
             }
-            let lever = model.mesh.rest_position(node) + displacement[node] - pose.tip;
+            let rest = model.mesh.rest_position(node);
+            let lever = rest + displacement[node] - pose.tip;
+            let carries = sums.tip != DVec3::ZERO;
+            // Most nodes of a free path, all of them where a hand leads: nothing of theirs would change.
+            if !carries && !memory.passed && !memory.touching && needle.is_far_from(rest, lever) {
+                continue;
+            }
             let at = needle.place(lever, velocity[node]);
             let mut bend_power = sums.tip.dot(at.bend.rate);
             match needle.pressing(&slit, contact, memory, &at) {

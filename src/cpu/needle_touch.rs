@@ -82,6 +82,20 @@ impl Needle<'_> {
         Place { lever, s, bend, velocity }
     }
 
+    /// True where the needle on a free path has nothing to do with a node that the tip has not passed, `lever` from the tip.
+    pub fn is_far_from(&self, rest: DVec3, lever: DVec3) -> bool {
+        let Needle { plan, tip, profile, .. } = self;
+        if plan.free.is_none() || self.line.is_some() {
+            return false;
+        }
+        let s = lever.dot(self.d);
+        let reach = WATCHED * profile.radius;
+        let beside = s <= profile.tip_length || lever.length_squared() - s * s > reach * reach;
+        let (ring, relative) = (plan.params.ring_radius, rest - tip.place);
+        // Within a cylinder of that radius and length behind the tip.
+        beside && (!tip.inside || relative.length_squared() > 2.0 * ring * ring)
+    }
+
     /// What presses on a node; `None` where the needle has nothing to do with it.
     pub fn pressing(
         &self,
@@ -95,6 +109,7 @@ impl Needle<'_> {
             _ => {
                 let touch = match &self.plan.free {
                     None => self.planned_touch(contact, at),
+                    Some(_) if !contact.pushed => None,
                     Some(_) => self.free_touch(self.model.mesh.rest_position(contact.node as usize), memory, at),
                 };
                 touch.map(|touch| self.surface_pressing(contact, &touch, memory, at))

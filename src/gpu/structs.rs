@@ -370,9 +370,9 @@ shared_structs! {
         marked_low: u32,
         marked_high: u32,
         dissipation: f32,
-        _pad0: f32,
-        _pad1: f32,
-        _pad2: f32,
+        tissue: u32,
+        height_01: f32,
+        height_11: f32,
     }
     /// shaders/effects/flexible_needle.wgsl
     struct CentreLine {

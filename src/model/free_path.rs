@@ -1,11 +1,14 @@
 //! What a free path needs instead of a planned one: what the tip may reach, and where it begins.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::{ContactNode, Model, PathSegment, PuncturePlan};
+use crate::anatomy::Case;
 use crate::effects::puncture::Cutting;
 use crate::effects::{TissueMaterial, puncture};
-use crate::needle::free_path::FreeTip;
+use crate::mesh::BlockMesh;
+use crate::needle::free_path::{AS_BEFORE, FreeTip, NO_SKIN};
 use crate::needle::gap::Profile;
 use crate::needle::motion::Placement;
 use crate::needle::{NeedleShape, PlannedPath, lateral_axes};
@@ -19,8 +22,12 @@ pub struct FreePlan {
     /// Box of the cells that the tip may open: first cell and number of cells along each axis.
     pub low: [usize; 3],
     pub count: [usize; 3],
-    /// Tip forces of each material.
+    /// Tip forces of each material of the scene, then of nothing, where cells hold nothing.
     pub cuttings: Vec<Cutting>,
+    /// Which of them the tip finds in a cell of the box; [`AS_BEFORE`]: those that it had before.
+    pub tissues: Vec<u8>,
+    /// Heights of the skin over the node columns of the box, rows of x [m]; [`NO_SKIN`] where there is no tissue. Empty: the top face, 0.
+    pub heights: Vec<f64>,
 }
 
 impl FreePlan {
@@ -33,6 +40,33 @@ impl FreePlan {
         let [nx, ny, _] = self.count;
         let part = [index % nx, index / nx % ny, index / (nx * ny)];
         std::array::from_fn(|a| self.low[a] + part[a])
+    }
+
+    /// Height of the skin at a rest position [m]: `None` where there is no tissue below.
+    pub fn skin_at(&self, mesh: &BlockMesh, x: DVec3) -> Option<f64> {
+        if self.heights.is_empty() {
+            return Some(0.0);
+        }
+        let (mut at, mut part) = ([0; 2], [0.0; 2]);
+        for a in 0..2 {
+            let lines = &mesh.lines[a][self.low[a]..=self.low[a] + self.count[a]];
+            if x[a] < lines[0] || x[a] > lines[lines.len() - 1] {
+                return None;
+            }
+            at[a] = lines.partition_point(|l| *l <= x[a]).clamp(1, lines.len() - 1) - 1;
+            part[a] = (x[a] - lines[at[a]]) / (lines[at[a] + 1] - lines[at[a]]);
+        }
+        let [h00, h10, h01, h11] = self.corner_heights(at);
+        let (near, far) = (h00 + (h10 - h00) * part[0], h01 + (h11 - h01) * part[0]);
+        let height = near + (far - near) * part[1];
+        (height > 1e-2 * NO_SKIN).then_some(height)
+    }
+
+    /// Heights at the four corners of a column of cells of the box: x first [m].
+    pub fn corner_heights(&self, [i, j]: [usize; 2]) -> [f64; 4] {
+        let row = self.count[0] + 1;
+        let at = |i: usize, j: usize| self.heights.get(j * row + i).copied().unwrap_or(0.0);
+        [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)]
     }
 
     /// Number of a cell in the box; `None` outside it.
@@ -59,9 +93,15 @@ impl Model {
             |x: DVec3, reach: f64| params.anywhere || axes.iter().any(|(a, b)| distance_to_segment(x, *a, *b) < reach);
         let h = self.scene.tissue.cell_size;
         let reach = params.ring_radius.max(needle.radius + 1.5 * h) + FREE_PATH_ROOM;
-        self.contact_nodes = (0..mesh.node_count())
+        let volumes = self.node_volumes();
+        // What stands still is not pushed aside, but it carries the tip.
+        let stands = |node: usize| self.composition.held.get(node).is_some_and(|held| *held);
+        let contact_nodes = (0..mesh.node_count())
             .filter(|&node| near(mesh.rest_position(node), reach))
-            .map(|node| ContactNode { pushed: true, ..ContactNode::carrier(node, 0.0, 0.0, mesh.node_volume(node)) })
+            .map(|node| {
+                let carrier = ContactNode::carrier(node, 0.0, 0.0, volumes[node]);
+                ContactNode { pushed: !stands(node), ..carrier }
+            })
             .collect();
         let opened = (0..mesh.cell_count()).filter(|&cell| {
             let size = mesh.cell_size(cell);
@@ -77,6 +117,10 @@ impl Model {
             }
         }
         let count = std::array::from_fn(|a| high[a].saturating_sub(low[a]));
+        let heights = match self.scene.case.as_deref() {
+            Some(case) if !self.composition.empty.is_empty() => heights(case, mesh, low, count),
+            _ => Vec::new(),
+        };
         let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
         let cutting = |m: &TissueMaterial| {
             let cutting = m.cutting.unwrap_or(own);
@@ -85,10 +129,22 @@ impl Model {
         };
         let cuttings = std::iter::once(&self.scene.material).chain(self.scene.regions.iter().map(|r| &r.material));
         let path = PlannedPath::into_block(motion.entry, motion.direction);
+        let mut free = FreePlan { low, count, cuttings: cuttings.map(cutting).collect(), tissues: Vec::new(), heights };
+        let composition = &self.composition;
+        let tissue = |cell: usize| match (composition.rigid.get(cell), composition.empty.get(cell)) {
+            (Some(true), _) => AS_BEFORE,
+            // Held all around by what is rigid, it is no less tissue.
+            (_, Some(true)) if composition.fill(cell) == 0.0 && self.scene.case.is_some() => free.cuttings.len() as u8,
+            _ => composition.main.get(cell).copied().unwrap_or(0),
+        };
+        let of_box = (0..free.cell_count()).map(|index| free.cell(index)).map(|[i, j, k]| mesh.cell_index(i, j, k));
+        free.tissues = of_box.map(tissue).collect();
+        free.cuttings.push(Cutting { puncture_force: 0.0, cutting_force: 0.0 });
+        self.contact_nodes = contact_nodes;
         self.puncture = Some(PuncturePlan {
             opening: None,
             contact: None,
-            free: Some(FreePlan { low, count, cuttings: cuttings.map(cutting).collect() }),
+            free: Some(free),
             segments: vec![PathSegment {
                 start: 0.0,
                 cutting: cutting(&self.scene.material),
@@ -108,6 +164,13 @@ impl Model {
             needle,
             path,
         });
+        self.weigh_cut_carriers();
+    }
+
+    /// Height of the skin at a rest position [m], where the path is free: `None` where there is no tissue below.
+    pub fn skin_at(&self, x: DVec3) -> Option<f64> {
+        let free = self.puncture.as_ref().and_then(|plan| plan.free.as_ref())?;
+        free.skin_at(self.mesh.as_block()?, x)
     }
 
     /// The tip before the run, where the path is free.
@@ -123,6 +186,14 @@ impl Model {
             None => FreeTip::default(),
         }
     }
+}
+
+/// Heights of the skin over the node columns of a box of cells [m].
+fn heights(case: &Case, mesh: &BlockMesh, low: [usize; 3], count: [usize; 3]) -> Vec<f64> {
+    let [x, y, z] = [0, 1, 2].map(|a| &mesh.lines[a][low[a]..=low[a] + count[a]]);
+    let range = z[0]..=z[z.len() - 1];
+    let columns: Vec<(f64, f64)> = y.iter().flat_map(|y| x.iter().map(move |x| (*x, *y))).collect();
+    columns.into_par_iter().map(|(x, y)| case.skin_over(x, y, range.clone()).unwrap_or(NO_SKIN)).collect()
 }
 
 fn distance_to_segment(x: DVec3, a: DVec3, b: DVec3) -> f64 {

@@ -252,7 +252,7 @@ impl Model {
 
     /// Nodes that carry the tip in cells that the skin cuts weigh at least a quarter of what they would in whole cells: the springs of
     /// the tip are those of a whole cell, and beside a sliver of tissue they would ask for steps ten times shorter.
-    fn weigh_cut_carriers(&mut self) {
+    pub(super) fn weigh_cut_carriers(&mut self) {
         const LEAST_PART: f64 = 0.25;
         if self.composition.fill.is_empty() {
             return;

@@ -69,8 +69,18 @@ pub const SOFTENING_RATE: f64 = 1.5;
 /// Length over which the overlap fades at the front end of what a node touches, in tip lengths.
 pub const END_FADE: f64 = 0.25;
 
+/// Height of a skin that is not there [m]: far below every scene, so that a mean with others is, too.
+pub const NO_SKIN: f64 = -1.0e3;
+
+/// Regions of a scene with a free path: with the tissue's own material and nothing they fill the table of tip forces on the device.
+pub const MOST_REGIONS: usize = 14;
+
+/// Instead of the number of a tissue, for what does not deform: the tip finds the forces that it had before, and stops at the true
+/// surface, which lies within a cell.
+pub const AS_BEFORE: u8 = u8::MAX;
+
 /// What the shaders have of this file.
-pub const SHADER_CONSTANTS: [(&str, f64); 10] = [
+pub const SHADER_CONSTANTS: [(&str, f64); 11] = [
     ("SAMPLES", SAMPLES as f64),
     ("SLACK", SLACK),
     ("TURNING", TURNING),
@@ -81,6 +91,7 @@ pub const SHADER_CONSTANTS: [(&str, f64); 10] = [
     ("SLIP_CAP", SLIP_CAP),
     ("SOFTENING_RATE", SOFTENING_RATE),
     ("END_FADE", END_FADE),
+    ("NO_SKIN", NO_SKIN),
 ];
 
 /// The overlap of a node at `s` behind the tip, faded over `length` [m] behind `end` [m]; `d` is the gradient of s.

@@ -113,6 +113,17 @@ impl Kinematics {
         self.end = until;
     }
 
+    /// Keeps the first `legs` of those that were led; `motion`: the one that the hand began with.
+    pub fn keep(&mut self, legs: usize, motion: &Motion) {
+        let Some((end, _)) = self.legs.get(legs) else { return };
+        self.end = *end;
+        self.legs.truncate(legs);
+        self.at_end = match self.legs.last() {
+            Some((_, leg)) => Placement { velocity: DVec3::ZERO, turning: DVec3::ZERO, ..leg.at(leg.duration) },
+            None => motion.begin(),
+        };
+    }
+
     pub fn is_led(&self) -> bool {
         self.led
     }

@@ -61,10 +61,18 @@ struct Voxels<'a> {
 }
 
 impl<'a> Anatomy<'a> {
-    /// Parts of a scene with a label map, or with regions that have shapes; none where cells of a mesh tell their region.
+    /// Parts of a scene with a label map, or with regions that have shapes; none where all is one tissue, and where cells of a mesh tell
+    /// their region.
     pub fn of_scene(scene: &'a Scene) -> Option<Self> {
-        let tagged = scene.regions.iter().any(|region| matches!(region.shape, RegionShape::MeshTag(_)));
-        if tagged || (scene.case.is_none() && scene.regions.is_empty()) {
+        if scene.case.is_none() && scene.regions.is_empty() {
+            return None;
+        }
+        Self::of_any(scene)
+    }
+
+    /// The same where all is one tissue, too.
+    pub fn of_any(scene: &'a Scene) -> Option<Self> {
+        if scene.regions.iter().any(|region| matches!(region.shape, RegionShape::MeshTag(_))) {
             return None;
         }
         let mut parts = vec![Part { name: String::new(), colour: [0; 3], rigid: false, material: 0 }];
@@ -93,7 +101,8 @@ impl<'a> Anatomy<'a> {
         }
         if scene.case.is_none() {
             of_region.push(Some(parts.len()));
-            let named = !scene.material.name.is_empty();
+            // `across-fibre` says little to who looks at it.
+            let named = colours::of_kind(&scene.material.name).is_some();
             let name = if named { scene.material.name.clone() } else { "tissue".into() };
             parts.push(Part { name, colour: [0; 3], rigid: false, material: 0 });
         }

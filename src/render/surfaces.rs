@@ -1,13 +1,15 @@
-//! Smooth surfaces of the parts of a scene with labels, fixed in its cells: what is drawn in three dimensions.
+//! Smooth surfaces of the parts of a scene, fixed in its cells: what is drawn in three dimensions.
 //!
 //! ```text
 //! label map -> piece of it around the block -> surfaces (surface nets) -> scene -> clipped to the block -> corners in cells
 //! ```
+//! Without a label map the parts are sampled on a lattice first.
 //! What fills the room between the other parts, fat and muscle, gets no surface of its own: it is seen where the block ends and on a cut.
 
 use std::collections::BTreeMap;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::anatomy::{Anatomy, NOTHING, Part};
 use super::contour::{self, Pieces, Place};
@@ -58,11 +60,16 @@ pub struct Triangle {
     pub layer: Layer,
 }
 
-/// Surfaces of the parts of a scene with labels, as far as they lie in the block.
+/// Surfaces of the parts of a scene, as far as they lie in the block.
 pub fn surfaces(scene: &Scene, block: &BlockMesh, anatomy: &Anatomy) -> Vec<Triangle> {
-    let Some(case) = &scene.case else { return Vec::new() };
     let (low, high) = bounds(block);
-    let near = piece_around(case, low, high);
+    let case = scene.case.as_deref();
+    if case.is_none() && scene.regions.is_empty() {
+        return Vec::new();
+    }
+    let near = case.map_or_else(|| sampled(anatomy, low, high), |case| piece_around(case, low, high));
+    // Sampled labels are numbers of parts.
+    let part_of = |label: u16| if case.is_some() { anatomy.part_of_label(label) } else { usize::from(label) };
     let skin = near.labels.iter().map(|label| u16::from(*label != 0)).collect();
     let skin = LabelMap { labels: skin, names: BTreeMap::new(), ..near.clone() };
     let inverse = near.steps.inverse();
@@ -72,7 +79,8 @@ pub fn surfaces(scene: &Scene, block: &BlockMesh, anatomy: &Anatomy) -> Vec<Tria
         let edge = (EDGE / near.spacing().min_element()).round().max(1.0) as usize * coarser;
         let mut add = |map: &LabelMap, label: u16, cell: usize, colour: Rgb, layer: Layer| {
             for surface in surface_nets::surfaces(map, &[label], cell) {
-                let places: Vec<DVec3> = surface.points.iter().map(|x| case.frame.to_scene(*x)).collect();
+                let to_scene = |x: &DVec3| case.map_or(*x, |case| case.frame.to_scene(*x));
+                let places: Vec<DVec3> = surface.points.iter().map(to_scene).collect();
                 let normals = normals(&places, &surface.triangles);
                 let corner = |n: u32| Corner { place: places[n as usize], normal: normals[n as usize] };
                 // Where the volume ends, surfaces are closed, and there is none.
@@ -90,7 +98,7 @@ pub fn surfaces(scene: &Scene, block: &BlockMesh, anatomy: &Anatomy) -> Vec<Tria
             }
         };
         for (label, (count, _)) in near.volumes() {
-            let part = &anatomy.parts()[anatomy.part_of_label(label)];
+            let part = &anatomy.parts()[part_of(label)];
             if !is_of(part, &FILLERS) {
                 let layer = if is_of(part, &ORGANS) { Layer::Organ } else { Layer::Solid };
                 let cell = if count < SMALL { coarser } else { edge };
@@ -100,12 +108,34 @@ pub fn surfaces(scene: &Scene, block: &BlockMesh, anatomy: &Anatomy) -> Vec<Tria
         let of_skin = (1..anatomy.parts().len())
             .find(|n| colours::of_kind(&anatomy.parts()[*n].name) == colours::of_kind("skin"));
         let colour = of_skin.map_or(colours::of_kind("skin").unwrap_or([228, 172, 140]), |n| anatomy.parts()[n].colour);
-        add(&skin, 1, edge, colour, Layer::Skin);
+        // Without a label map the skin is the top face.
+        if case.is_some() {
+            add(&skin, 1, edge, colour, Layer::Skin);
+        }
         if found.len() <= MOST_TRIANGLES || coarser >= 8 {
             return found;
         }
         coarser *= 2;
     }
+}
+
+/// Parts of a block at points of a lattice, as a label map in the axes of the scene.
+fn sampled(anatomy: &Anatomy, low: DVec3, high: DVec3) -> LabelMap {
+    /// Distance of the points [m], and how many they may be.
+    const SAMPLE: f64 = 0.35e-3;
+    const MOST: f64 = 2.0e6;
+    let volume = (high - low).element_product();
+    let step = SAMPLE.max((volume / MOST).cbrt());
+    let size = ((high - low) / step).ceil().to_array().map(|n| n.max(1.0) as usize);
+    let origin = low + DVec3::splat(0.5 * step);
+    let steps = glam::DMat3::from_diagonal(DVec3::splat(step));
+    let mut map = LabelMap { size, steps, origin, labels: Vec::new(), names: BTreeMap::new() };
+    let [nx, ny, nz] = size;
+    map.labels = (0..nx * ny * nz)
+        .into_par_iter()
+        .map(|n| anatomy.part_at(map.position(n % nx, n / nx % ny, n / (nx * ny))) as u16)
+        .collect();
+    map
 }
 
 fn is_of(part: &Part, kinds: &[&str]) -> bool {
@@ -285,7 +315,8 @@ pub fn face(
 }
 
 /// What is seen where the block ends and not the tissue.
-pub fn border(block: &BlockMesh, anatomy: &Anatomy) -> Vec<Triangle> {
+/// Without a label map (`is_whole`) the top face is the skin.
+pub fn border(block: &BlockMesh, anatomy: &Anatomy, is_whole: bool) -> Vec<Triangle> {
     let mut out = Vec::new();
     // Just inside: on the face itself rounding decides.
     let (low, high) = bounds(block);
@@ -294,6 +325,7 @@ pub fn border(block: &BlockMesh, anatomy: &Anatomy) -> Vec<Triangle> {
     for axis in 0..3 {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         for (at, sign) in [(low[axis], -1.0), (high[axis], 1.0)] {
+            let layer = if is_whole && axis == 2 && sign > 0.0 { Layer::Skin } else { Layer::Organ };
             for i in block.lines[u].windows(2).filter(|w| w[1] > w[0]) {
                 for j in block.lines[v].windows(2).filter(|w| w[1] > w[0]) {
                     let corner = |a: f64, b: f64| {
@@ -306,8 +338,8 @@ pub fn border(block: &BlockMesh, anatomy: &Anatomy) -> Vec<Triangle> {
                         quad.reverse();
                     }
                     let normal = DVec3::AXES[axis] * sign;
-                    flat([quad[0], quad[1], quad[2]], normal, (Layer::Organ, false), anatomy, &mut out);
-                    flat([quad[0], quad[2], quad[3]], normal, (Layer::Organ, false), anatomy, &mut out);
+                    flat([quad[0], quad[1], quad[2]], normal, (layer, false), anatomy, &mut out);
+                    flat([quad[0], quad[2], quad[3]], normal, (layer, false), anatomy, &mut out);
                 }
             }
         }

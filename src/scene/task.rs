@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::units::{self, Unit};
+
 /// A task with its goals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
@@ -32,6 +34,38 @@ pub enum Goal {
     CoreMass { least: f64 },
     /// The same as a volume at rest [m^3].
     CoreVolume { least: f64 },
+    /// A figure of the score is no larger than this [SI].
+    Figure { figure: &'static TaskFigure, most: f64 },
+}
+
+/// A figure of the score that a goal may bound from above.
+#[derive(Debug, PartialEq)]
+pub struct TaskFigure {
+    /// Its key in the score.
+    pub key: &'static str,
+    /// Unit in which the bound is written.
+    pub unit: Unit,
+    /// True where a run that does not hold it has none of it: no bone met, no layer overshot.
+    pub none_is_zero: bool,
+}
+
+/// Figures that a goal may bound: what a trainer calls a mistake.
+pub static TASK_FIGURES: [TaskFigure; 11] = [
+    figure("passes", units::ONE, true),
+    figure("redirections", units::ONE, true),
+    figure("entry_error", units::MILLIMETRE, false),
+    figure("entry_angle_error", units::DEGREE, false),
+    figure("overshoot", units::MILLIMETRE, true),
+    figure("peak_axial_force", units::NEWTON, true),
+    figure("peak_lateral_force", units::NEWTON, true),
+    figure("peak_bone_force", units::NEWTON, true),
+    figure("path_in_tissue", units::MILLIMETRE, true),
+    figure("swept_area", units::SQUARE_MILLIMETRE, true),
+    figure("injury_energy", units::MILLIJOULE, true),
+];
+
+const fn figure(key: &'static str, unit: Unit, none_is_zero: bool) -> TaskFigure {
+    TaskFigure { key, unit, none_is_zero }
 }
 
 /// What a needle has to stay away from: a fixed place in the coordinates of the scene [m], which the tissue does not take

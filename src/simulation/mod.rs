@@ -1,7 +1,8 @@
 //! One run in memory: model, engine, time step and the order of frames. Commands and tests use it alike.
 //!
 //! [`start`] prepares it, [`change`] puts another scene in its place, [`checkpoint`] keeps it and goes on from it, [`flexible_needle`] bends
-//! its needle; `stretch` and `trouble` stop it, [`investigation`] and [`trial`] find out why. [`fields`] is what it shows.
+//! its needle; `stretch` and `trouble` stop it, [`investigation`] and [`trial`] find out why. [`fields`] is what it shows,
+//! [`reach`] what of a hand's wish the tissue can follow.
 
 #![warn(missing_docs)]
 
@@ -15,6 +16,8 @@ pub mod fields;
 pub mod flexible_needle;
 #[allow(missing_docs)]
 pub mod investigation;
+#[allow(missing_docs)]
+pub mod reach;
 #[allow(missing_docs)]
 mod run_engine;
 #[allow(missing_docs)]
@@ -120,6 +123,19 @@ impl Simulation {
         if let Some(kinematics) = self.kinematics.as_mut().filter(|k| k.is_led()) {
             kinematics.lead(&self.model.before_bone(&kinematics.last(), pose), until);
             self.led_frames += 1;
+        }
+    }
+
+    /// Forgets what a hand has led beyond the frames that are collected, after [`Simulation::resume`]: the poses behind them can be led again,
+    /// or others.
+    pub fn forget_the_lead(&mut self) {
+        // The beam of a needle that bends looks one frame ahead.
+        let frames = self.collected + u64::from(self.needle.is_some());
+        if let Some(kinematics) = self.kinematics.as_mut().filter(|k| k.is_led())
+            && frames < self.led_frames
+        {
+            kinematics.keep(frames as usize, &self.model.scene.motion);
+            self.led_frames = frames;
         }
     }
 

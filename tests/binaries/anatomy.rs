@@ -2,6 +2,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../anatomy/free_path.rs"]
+mod free_path;
 #[path = "../anatomy/labels.rs"]
 mod labels;
 #[path = "../anatomy/pictures.rs"]

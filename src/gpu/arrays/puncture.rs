@@ -229,9 +229,14 @@ fn free_cells(model: &Model, samples: &[u64]) -> Vec<FreeCell> {
             let [i, j, k] = free.cell(index);
             let cell = mesh.cell_index(i, j, k);
             let marked = samples.get(index).copied().unwrap_or(0);
+            let heights = free.corner_heights([i - free.low[0], j - free.low[1]]).map(|h| h as f32);
+            let with = |v: DVec3, w: f32| [v.x as f32, v.y as f32, v.z as f32, w];
             FreeCell {
-                low: vec4(DVec3::new(mesh.lines[0][i], mesh.lines[1][j], mesh.lines[2][k])),
-                size: vec4(mesh.cell_size(cell)),
+                low: with(DVec3::new(mesh.lines[0][i], mesh.lines[1][j], mesh.lines[2][k]), heights[0]),
+                size: with(mesh.cell_size(cell), heights[1]),
+                height_01: heights[2],
+                height_11: heights[3],
+                tissue: u32::from(free.tissues[index]),
                 cell: cell as u32,
                 material: model.material_index(cell) as u32,
                 marked_low: marked as u32,

@@ -9,6 +9,7 @@ use crate::effects::parameters::Table;
 use crate::effects::puncture::{PathWord, SchemeWord};
 use crate::effects::{self, EffectSet, TissueMaterial};
 use crate::needle::beam::Section;
+use crate::needle::free_path::MOST_REGIONS;
 use crate::needle::{Motion, Tool};
 use crate::units::four_digits;
 
@@ -115,21 +116,28 @@ impl Check<'_> {
 
     /// What does not act in a label map, or before bone, yet.
     pub(super) fn case_limits(&mut self, effects: &EffectSet, motion: &Motion, in_case: bool, regions: &[Region]) {
-        let is_free = effects.puncture.is_some_and(|p| p.always_free) || motion.is_free();
         let without = [
             ("effects", effects.cohesive.is_some(), "the effect cohesive"),
             ("effects", effects.indentation.is_some(), "the effect indentation"),
-            ("motion", is_free, "a free path"),
         ];
         for (at, _, what) in without.into_iter().filter(|(_, there, _)| in_case && *there) {
             self.problems.report(
                 at,
                 format!("{what} does not act in a label map yet"),
                 "not in the tissue of a patient",
-                "leave it out: a needle on one straight path serves",
+                "leave it out: a needle on a straight or a free path serves",
             );
         }
-        if !in_case && motion.is_free() && regions.iter().any(|region| region.material.rigid) {
+        let is_free = effects.puncture.is_some_and(|p| p.always_free) || motion.is_free();
+        if is_free && effects.puncture.is_some() && regions.len() > MOST_REGIONS {
+            self.problems.report(
+                "region",
+                format!("{} regions, and the path of the needle is free", regions.len()),
+                format!("a free path knows the tip forces of {MOST_REGIONS} regions"),
+                "join regions: label = [\"fat\", 6]; or drop puncture.path = \"free\"",
+            );
+        }
+        if motion.is_free() && regions.iter().any(|region| region.material.rigid) {
             self.problems.report(
                 "motion",
                 "the motion is free, and a region is rigid: nothing would stop the needle there",

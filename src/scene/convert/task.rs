@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::file::{CylinderTable, GoalKind, GoalTable, SceneFile, SphereShapeTable, TaskTable};
-use super::super::{Goal, Obstacle, Target, Task};
+use super::super::{Goal, Obstacle, TASK_FIGURES, Target, Task};
 use super::{Check, MM, Within};
 use crate::needle::Tool;
 use crate::units;
@@ -24,6 +24,7 @@ fn keys(kind: GoalKind) -> &'static [&'static str] {
         GoalKind::Avoid => &["name", "sphere_mm", "cylinder_mm", "region", "clearance_mm"],
         GoalKind::StopInLayer => &["name", "region", "depth_mm"],
         GoalKind::Core => &["mass_mg", "volume_mm3"],
+        GoalKind::Figure => &["figure", "most"],
     }
 }
 
@@ -40,6 +41,8 @@ fn written(table: &GoalTable) -> Vec<&'static str> {
         ("depth_mm", table.depth_mm.is_some()),
         ("mass_mg", table.mass_mg.is_some()),
         ("volume_mm3", table.volume_mm3.is_some()),
+        ("figure", table.figure.is_some()),
+        ("most", table.most.is_some()),
     ]
     .into_iter()
     .filter_map(|(key, on)| on.then_some(key))
@@ -86,7 +89,7 @@ impl Check<'_> {
                 "task",
                 "the task has no goal",
                 "nothing to reach",
-                "add [[task.goal]] with kind = \"hit_target\", \"avoid\", \"stop_in_layer\" or \"core\"",
+                "add [[task.goal]] with kind = \"hit_target\", \"avoid\", \"stop_in_layer\", \"core\" or \"figure\"",
             ),
             n if n > LARGEST_GOAL_COUNT => self.problems.report(
                 &format!("task.goal.{LARGEST_GOAL_COUNT}"),
@@ -144,6 +147,7 @@ impl Check<'_> {
             GoalKind::Avoid => self.avoid(&at, table, file, index),
             GoalKind::StopInLayer => self.stop_in_layer(&at, table, file, index),
             GoalKind::Core => self.core(&at, table, bored, index),
+            GoalKind::Figure => self.figure(&at, table, index),
         }
     }
 
@@ -292,6 +296,25 @@ impl Check<'_> {
         };
         let name = table.name.clone().unwrap_or(default_name);
         Some(Goal::StopInLayer { name, from: band[0] * MM, to: band[1] * MM })
+    }
+
+    fn figure(&mut self, at: &dyn Fn(&str) -> String, table: &GoalTable, index: usize) -> Option<Goal> {
+        let names: Vec<&str> = TASK_FIGURES.iter().map(|figure| figure.key).collect();
+        let (Some(key), Some(most)) = (&table.figure, table.most) else {
+            self.problems.report(
+                &format!("task.goal.{index}"),
+                "the goal does not say which figure may be how large",
+                "figure and most",
+                format!("write figure = \"passes\" and most = 1; figures: {}", names.join(", ")),
+            );
+            return None;
+        };
+        let Some(figure) = TASK_FIGURES.iter().find(|figure| figure.key == key) else {
+            self.unknown_name(&at("figure"), "figure", key, &names);
+            return None;
+        };
+        let most = self.number(&at("most"), most, Within::NotNegative(1e6));
+        Some(Goal::Figure { figure, most: figure.unit.read(most) })
     }
 
     fn core(&mut self, at: &dyn Fn(&str) -> String, table: &GoalTable, bored: bool, index: usize) -> Option<Goal> {

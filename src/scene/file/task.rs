@@ -45,6 +45,10 @@ pub struct GoalTable {
     pub mass_mg: Option<f64>,
     /// The same as a volume at rest [mm^3].
     pub volume_mm3: Option<f64>,
+    /// Key of a figure of the score, e.g. "passes", "overshoot", "entry_angle_error"; for figure.
+    pub figure: Option<String>,
+    /// What it may be at most, in the unit of the score; for figure.
+    pub most: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -54,4 +58,5 @@ pub enum GoalKind {
     Avoid,
     StopInLayer,
     Core,
+    Figure,
 }
