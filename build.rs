@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
-    let built_in = files(&["scenes", "assets/cases", "assets/curves", "assets/meshes"])?;
+    let built_in = files(&["scenes", "assets/cases", "assets/curves", "assets/meshes", "assets/thumbnails"])?;
     list(
         "built_in.rs",
         "/// Relative path and bytes of every built-in file, sorted.\npub const BUILT_IN: &[(&str, &[u8])]",

@@ -2,8 +2,8 @@
 # Brings what a Debian or Ubuntu machine with Rust lacks to build Stylet and to run it on a GPU adapter:
 # a linker, the Vulkan loader, and a software Vulkan driver where no driver is there at all.
 # Arguments name further programs that are wanted, each in the Debian package of its name in small letters:
-# `scripts/setup.sh parallel`. The word `window` stands for the libraries that a window needs, `gamepad` for what a
-# gamepad needs to be built in.
+# `scripts/setup.sh parallel`. The word `window` stands for the libraries that a window needs, `gamepad` and `sound` for
+# what a gamepad and tones need to be built in.
 # Installs nothing when all is there; says what it installs; without apt or the right to use it, it says what is missing
 # and goes on (Stylet then runs on its CPU engine).
 set -euo pipefail
@@ -26,6 +26,10 @@ for program in "$@"; do
     elif [ "$program" = gamepad ]; then
         if [ "$(uname -s)" = Linux ]; then
             pkg-config --exists libudev 2>/dev/null || missing+=(libudev-dev pkg-config)
+        fi
+    elif [ "$program" = sound ]; then
+        if [ "$(uname -s)" = Linux ]; then
+            pkg-config --exists alsa 2>/dev/null || missing+=(libasound2-dev pkg-config)
         fi
     elif ! command -v "$program" >/dev/null; then
         missing+=("${program,,}")

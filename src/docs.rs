@@ -20,6 +20,9 @@ use crate::output::target::TARGETS;
 use crate::predictions::rows::triple;
 use crate::predictions::{self, Row, Totals};
 use crate::scene::file::SceneFile;
+use crate::training::skill::{HABITS, Habit};
+use crate::training::skill_evidence::{self, FigureEvidence, Finding, TaskEvidence};
+use crate::training::skill_page::auc_in_words;
 use crate::units::{four_digits, three_digits};
 use crate::verdict::{BOUNDS, Bound};
 use crate::{Error, Result};
@@ -55,6 +58,9 @@ pub fn parts(root: &Path) -> Result<Vec<Part>> {
         Part::new("laws.md", "laws", law_table()),
         Part::new("predictions.md", "result", prediction_totals()),
         Part::new("predictions.md", "table", prediction_table()),
+        Part::new("skills.md", "habits", habit_table()),
+        Part::new("skills.md", "tasks", skill_tasks()),
+        Part::new("skills.md", "figures", skill_figures()),
     ];
     for (file, rows) in run_tables() {
         parts.push(Part::new("files.md", file, meanings(rows)));
@@ -131,6 +137,61 @@ fn prediction_table() -> String {
     let heads =
         ["experiment", "quantity", "predicted: low, best, high", "measured", "best / measured", "measured lies"];
     table(heads, rows.iter().map(row))
+}
+
+fn habit_table() -> String {
+    let row = |habit: &&Habit| {
+        let [novice, intermediate, expert] = habit.of.map(|value| format!("{value}"));
+        let what = if habit.unit.is_empty() { habit.text.into() } else { format!("{} [{}]", habit.text, habit.unit) };
+        [what, novice, intermediate, expert, habit.source.into()]
+    };
+    table(["habit", "novice", "intermediate", "expert", "source"], HABITS.iter().map(row))
+}
+
+/// How the attempts of every task ended, and its key figures.
+fn skill_tasks() -> String {
+    let row = |task: &TaskEvidence| {
+        let three = |counts: &[u64; 3]| counts.map(|n| n.to_string()).join(", ");
+        [
+            code(&task.scene),
+            if task.overrides.is_empty() { "-".into() } else { code(&task.overrides.join(" ")) },
+            three(&task.attempts),
+            three(&task.passed),
+            three(&task.stopped),
+            three(&task.refused),
+            task.key_figures.iter().map(|key| code(key)).collect::<Vec<_>>().join(", "),
+        ]
+    };
+    let heads =
+        ["task", "changed", "attempts", "passed", "stopped by the guard", "refused by the verdict", "key figures"];
+    table(heads, skill_evidence::built_in().task.iter().map(row))
+}
+
+/// The figures of every task, the best first.
+fn skill_figures() -> String {
+    let one = |task: &TaskEvidence| {
+        let mut figures: Vec<&FigureEvidence> = task.figure.iter().collect();
+        figures.sort_by(|a, b| b.novice_expert.value.total_cmp(&a.novice_expert.value));
+        let row = |f: &FigureEvidence| {
+            let [novice, intermediate, expert] = f.medians.map(three_digits);
+            let auc = auc_in_words(&f.novice_expert);
+            let others =
+                [&f.novice_intermediate, &f.intermediate_expert].map(|auc| format!("{:.2}", auc.value)).join(", ");
+            let unit = if f.unit.is_empty() { "-" } else { &f.unit };
+            let finding = Finding::of(&f.novice_expert).words();
+            [code(&f.key), unit.into(), format!("{novice}, {intermediate}, {expert}"), auc, finding.into(), others]
+        };
+        let heads = [
+            "figure",
+            "unit",
+            "median: novice, intermediate, expert",
+            "AUC novice and expert (95 %)",
+            "tells apart",
+            "AUC of neighbours",
+        ];
+        format!("### {}\n\n{}", task.task, table(heads, figures.into_iter().map(row)))
+    };
+    skill_evidence::built_in().task.iter().map(one).collect::<Vec<_>>().join("\n")
 }
 
 fn head(effect: &Effect) -> String {

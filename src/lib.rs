@@ -57,6 +57,7 @@ pub mod whole_file;
 #[cfg(feature = "window")]
 pub mod window;
 pub mod within;
+pub mod words;
 
 // What a program that embeds the library needs first.
 pub use effects::TissueMaterial;

@@ -7,6 +7,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use stylet::commands::advise::{self, AdviseArgs};
 use stylet::commands::bench::{self, BenchArgs};
 use stylet::commands::check::{self, CheckArgs};
+use stylet::commands::class::{self, ClassArgs};
 use stylet::commands::compare_adapters::{self, CompareArgs};
 use stylet::commands::fit_args::{self, FitArgs};
 use stylet::commands::import::{self, ImportArgs};
@@ -53,6 +54,8 @@ enum Command {
     Fit(FitArgs),
     /// Put the numbers of a publication beside ours, or published needle forces beside the theory, as one HTML page
     Report(ReportArgs),
+    /// What all trainees of a history folder did: a table, CSV, xAPI statements, pages to print
+    Class(ClassArgs),
     /// Run the hard cases of scenes/hard: which survive, which are caught, which are refused
     Stability(StabilityArgs),
     /// Run a scene over mesh size, mass scaling, step, engine and effects: what accuracy costs, as one HTML page
@@ -77,6 +80,13 @@ enum Command {
 
 /// Does what was asked for; the exit code.
 fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
+    // Who calls the program without a word wants to see it, where it can be seen.
+    if std::env::args_os().len() == 1
+        && let Some(text) = start_screen(start)?
+    {
+        println!("{text}");
+        return Ok(view::window_ended());
+    }
     let text = match cli.command.unwrap_or(Command::Run(cli.run)) {
         Command::Run(args) => return run::execute(&args, start),
         Command::View(args) => return view::execute(&args, |args| open_window(args, start)),
@@ -89,6 +99,7 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
         Command::Bench(args) => return bench::execute(&args),
         Command::Fit(args) => return fit_args::execute(args),
         Command::Report(args) => return report::execute(&args),
+        Command::Class(args) => return class::execute(&args),
         Command::Study(args) => return study::execute(&args),
         Command::Advise(args) => return advise::execute(&args),
         Command::Prepare(args) => return prepare::execute(&args),
@@ -114,6 +125,23 @@ fn dispatch(cli: Cli, start: Instant) -> Result<u8> {
 #[cfg(feature = "window")]
 fn open_window(args: &ViewArgs, start: Instant) -> Result<String> {
     stylet::window::view(args, start)?.text()
+}
+
+/// Opens the window at its start screen where there is a display, and returns how it went; `None` where there is none.
+#[cfg(feature = "window")]
+fn start_screen(start: Instant) -> Result<Option<String>> {
+    // Elsewhere every desktop has a display.
+    let named = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    if cfg!(all(unix, not(target_os = "macos"))) && !named("DISPLAY") && !named("WAYLAND_DISPLAY") {
+        return Ok(None);
+    }
+    ending::watch();
+    stylet::window::view_where_possible(&ViewArgs::start_screen(), start)?.map(|outcome| outcome.text()).transpose()
+}
+
+#[cfg(not(feature = "window"))]
+fn start_screen(_: Instant) -> Result<Option<String>> {
+    Ok(None)
 }
 
 #[cfg(not(feature = "window"))]

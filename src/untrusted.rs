@@ -14,7 +14,7 @@ use crate::output::report::Columns;
 use crate::scene::{Scene, presets};
 use crate::session::Session;
 use crate::study::store;
-use crate::training::history;
+use crate::training::{history, notes, trainees};
 
 /// One kind of input.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +66,8 @@ pub const READERS: &[Reader] = &[
     Reader { name: "study_plan", read: study_plan, memory: (FEW, 128) },
     Reader { name: "study_run", read: study_run, memory: (FEW, 128) },
     Reader { name: "attempt", read: attempt, memory: (FEW, 128) },
+    Reader { name: "notes", read: notes_of_an_attempt, memory: (FEW, 128) },
+    Reader { name: "trainee", read: trainee, memory: (FEW, 256) },
     Reader { name: "session", read: session, memory: (FEW, 128) },
     // Each tells its format from the content: a file for one of them may be NRRD, which alone may be compressed with bzip2.
     Reader { name: "nrrd", read: nrrd, memory: (FEW + BZIP2, VOLUME) },
@@ -213,6 +215,14 @@ fn study_run(bytes: &[u8]) -> Result<()> {
     run.cpu_ns_per_cell_step();
     run.curve();
     Ok(())
+}
+
+fn notes_of_an_attempt(bytes: &[u8]) -> Result<()> {
+    notes::parse(&place("attempt.notes"), bytes).map(drop)
+}
+
+fn trainee(bytes: &[u8]) -> Result<()> {
+    trainees::parse(&place("trainee.toml"), text(bytes)?).map(drop)
 }
 
 fn attempt(bytes: &[u8]) -> Result<()> {

@@ -17,6 +17,8 @@ fn scene(overrides: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/training/hit_target.toml");
     let coarse = [
         "damage.failure_displacement_mm=0.6",
+        // Some of the effects that are switched need a planned path.
+        "puncture.path=\"auto\"",
         "tissue.cell_size_mm=1.0",
         "tissue.size_mm=[14, 14, 12]",
         "target.0.position_mm=[0, 0, -6]",

@@ -389,6 +389,12 @@ fn seeds(reader: &Reader, checkpoint: &(Vec<u8>, Vec<u8>)) -> Vec<Vec<u8>> {
             let (_, path) = stylet::training::History::new(folder.path()).add("a trainee", &score).unwrap();
             vec![std::fs::read(path).unwrap()]
         }
+        "notes" => {
+            let note = |time: f64, text: &str| stylet::training::notes::Note { time, author: "a teacher".into(), text: text.into() };
+            let notes = [note(0.5, "hold still"), note(3.25, "too \"fast\"")];
+            vec![serde_json::to_vec_pretty(&serde_json::json!({ "version": 1, "notes": notes })).unwrap()]
+        }
+        "trainee" => vec![b"version = 1\nname = \"Ada \\\"the first\\\"\"\nhidden = true\n".to_vec()],
         "session" => {
             let scene = Scene::load(&repository().join("scenes/muscle_biopsy.toml"), &[]).unwrap();
             let mut session = stylet::session::Session::new(&scene, &["solver.safety=0.4".into()], &Default::default());

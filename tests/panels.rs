@@ -15,6 +15,7 @@ use stylet::window::source::Source;
 use stylet::window::tuning::{Taken, Tuning};
 
 use crate::common;
+use crate::layout::english;
 
 struct Panel {
     scene: Scene,
@@ -50,8 +51,9 @@ fn harness(panel: Panel) -> Harness<'static, Panel> {
 
 #[test]
 fn every_effect_has_a_switch_and_every_number_a_slider() {
+    let _english = english();
     const EVERYTHING: &str = r#"effects=["mass_scaling", "gravity", "plasticity", "fibres", "viscoelastic", "damage", "puncture", "adhesion", "friction", "flexible_needle"]"#;
-    let panel = panel(&[EVERYTHING, "damage.failure_displacement_mm=0.6"]);
+    let panel = panel(&[EVERYTHING, "damage.failure_displacement_mm=0.6", "puncture.path=\"auto\""]);
     let scene = panel.scene.clone();
     let harness = harness(panel);
     let mut sliders = 0;
@@ -73,6 +75,7 @@ fn every_effect_has_a_switch_and_every_number_a_slider() {
 
 #[test]
 fn a_switch_asks_for_its_effect_and_a_slider_for_its_number() {
+    let _english = english();
     let mut harness = harness(panel(&[]));
     harness.get_by_label("gravity").click();
     harness.run_steps(3);
@@ -91,6 +94,7 @@ fn a_switch_asks_for_its_effect_and_a_slider_for_its_number() {
 /// From the click to the force of a tissue that has it.
 #[test]
 fn what_was_clicked_runs_in_the_next_frame() {
+    let _english = english();
     let Some(gpu) = common::gpu() else { return };
     let coarse = ["tissue.cell_size_mm=1.2", "tissue.size_mm=[14, 14, 12]"];
     let mut harness = harness(panel(&coarse));
@@ -133,6 +137,7 @@ fn what_was_clicked_runs_in_the_next_frame() {
 
 #[test]
 fn a_scene_is_saved_as_it_runs_and_never_over_another() {
+    let _english = english();
     let folder = tempfile::tempdir().unwrap();
     let mut panel = panel(&["friction.coefficient=0.5"]);
     panel.name = folder.path().join("mine.toml").display().to_string();
@@ -148,6 +153,7 @@ fn a_scene_is_saved_as_it_runs_and_never_over_another() {
 
 #[test]
 fn the_price_of_a_finer_mesh_is_told_before_it_is_paid() {
+    let _english = english();
     let panel = panel(&[]);
     let timing = Timing { simulated: 1.0 / 60.0, physics: 0.010, ..Default::default() };
     let mut harness = Harness::builder().with_size([400.0, 600.0]).build_ui_state(

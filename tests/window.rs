@@ -80,6 +80,8 @@ impl Display {
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .env("DISPLAY", &self.name)
             .env_remove("WAYLAND_DISPLAY")
+            .env("STYLET_SETTINGS", self.path("settings.toml"))
+            .env("LANG", "C")
             .arg("view")
             .arg(scene)
             .args(["--set", change])
@@ -362,6 +364,7 @@ fn a_task_is_done_from_briefing_to_debriefing() {
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .env("DISPLAY", &display.name)
         .env_remove("WAYLAND_DISPLAY")
+        .env("STYLET_SETTINGS", display.path("settings.toml"))
         .arg("view")
         .arg(scene("training/hit_target.toml"))
         .args(["--set", "tissue.cell_size_mm=1.2", "--set", "target.0.position_mm=[0, 0, -4.6]"])
@@ -409,9 +412,8 @@ fn a_task_is_done_from_briefing_to_debriefing() {
     assert!(push_to(4.75e-3), "stuck at {} m", depth(&out));
     display.xdotool(&["keyup", "Down"]);
     std::thread::sleep(Duration::from_millis(500));
-    // "Finish" is the last button of the first row; where it lies depends on the fonts, not on the machine.
     let scored = until(30, || {
-        display.xdotool(&["mousemove", "207", "57", "click", "1"]);
+        display.xdotool(&["key", "F6"]);
         std::thread::sleep(Duration::from_millis(700));
         out.join("score.json").is_file()
     });
@@ -429,6 +431,104 @@ fn a_task_is_done_from_briefing_to_debriefing() {
     assert!(std::fs::read_dir(&history).unwrap().count() > 0, "the history of the trainee");
 }
 
+/// What a person does who has never seen the program, by keys alone: a trainee, the first task that is passed, a second one.
+#[test]
+fn the_first_ten_minutes_from_the_start_screen_to_a_second_task() {
+    let Some(display) = Display::open() else { return };
+    let (out, history, settings) = (display.path("attempt"), display.path("history"), display.path("settings.toml"));
+    std::fs::write(&settings, "version = 1\nlanguage = \"en\"\n").unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .current_dir(display.place.path())
+        .env("DISPLAY", &display.name)
+        .env_remove("WAYLAND_DISPLAY")
+        .args(["view", "--settings", "settings.toml", "--out", "attempt"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    display.wait(&mut child);
+    let titled = |title: &str| {
+        let name = format!("^{title}");
+        until(90, || display.xdotool(&["search", "--name", &name]).status.success())
+    };
+    // The second stop of the Tab key is the button that makes a trainee: before it is the list of them.
+    let kept = || std::fs::read_to_string(&settings).unwrap_or_default();
+    let made = until(60, || {
+        display.focus();
+        display.xdotool(&["key", "--delay", "250", "Escape", "Tab", "Tab", "Return"]);
+        std::thread::sleep(Duration::from_millis(500));
+        display.xdotool(&["type", "--delay", "60", "Ada 1"]);
+        std::thread::sleep(Duration::from_millis(300));
+        display.xdotool(&["key", "Return"]);
+        until(3, || kept().contains("Ada 1"))
+    });
+    assert!(made, "no trainee: {}", kept());
+    // Help is opened and closed on the way.
+    display.xdotool(&["key", "Escape", "F1"]);
+    std::thread::sleep(Duration::from_millis(400));
+    display.xdotool(&["key", "Escape"]);
+    std::thread::sleep(Duration::from_millis(300));
+    display.xdotool(&["key", "2"]);
+    assert!(titled("Stylet - Training: hit a lesion"), "the task does not open");
+    // The first key begins the run: nobody presses Play.
+    let lead_to = |out: &Path, wanted: f64| {
+        let mut last = (0.0, Instant::now() - Duration::from_secs(10));
+        let there = until(150, || {
+            let now = depth(out);
+            if now > last.0 {
+                last = (now, Instant::now());
+            } else if last.1.elapsed() > Duration::from_secs(4) {
+                display.focus();
+                display.xdotool(&["keyup", "Down"]);
+                display.xdotool(&["keydown", "Down"]);
+                last.1 = Instant::now();
+            }
+            now > wanted
+        });
+        display.xdotool(&["keyup", "Down"]);
+        assert!(there, "stuck at {} m", depth(out));
+    };
+    let finish = |out: &Path| {
+        assert!(
+            until(40, || {
+                display.xdotool(&["key", "F6"]);
+                std::thread::sleep(Duration::from_millis(700));
+                out.join("score.json").is_file()
+            }),
+            "no scores in {}",
+            out.display()
+        );
+    };
+    lead_to(&out, 9.3e-3);
+    std::thread::sleep(Duration::from_millis(500));
+    finish(&out);
+    let back = until(30, || {
+        display.xdotool(&["key", "F8"]);
+        until(3, || display.xdotool(&["search", "--name", "^Stylet$"]).status.success())
+    });
+    assert!(back, "no way back to the start screen");
+    std::thread::sleep(Duration::from_millis(500));
+    display.xdotool(&["key", "1"]);
+    assert!(titled("Stylet - Training: a core biopsy"), "the second task does not open");
+    let second = display.path("attempt_2");
+    lead_to(&second, 1e-3);
+    finish(&second);
+    display.xdotool(&["key", "ctrl+q"]);
+    let ended = until(20, || child.try_wait().unwrap().is_some());
+    if !ended {
+        let _ = child.kill();
+    }
+    let output = child.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(ended && output.status.success(), "{told}");
+    assert!(told.contains("Passed"), "{told}");
+    let attempts = stylet::training::history::History::new(&history).attempts("Ada 1").unwrap().attempts;
+    let passed: Vec<(String, Option<bool>)> = attempts.iter().map(|a| (a.task.clone(), a.score.passed())).collect();
+    assert_eq!(passed.len(), 2, "{passed:?}");
+    assert!(passed.iter().any(|(_, passed)| *passed == Some(true)), "{passed:?}");
+    assert!(kept().contains("hit_target.toml") && kept().contains("core_biopsy.toml"), "recent files: {}", kept());
+}
+
 /// A scene that is edited while its window is open: broken text is told and changes nothing, good text begins anew.
 #[test]
 fn an_edited_scene_is_read_anew() {
@@ -442,6 +542,7 @@ fn an_edited_scene_is_read_anew() {
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .env("DISPLAY", &display.name)
         .env_remove("WAYLAND_DISPLAY")
+        .env("STYLET_SETTINGS", display.path("settings.toml"))
         .args(["view", file.to_str().unwrap(), "--script", "--out", out.to_str().unwrap()])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -479,6 +580,7 @@ fn a_lost_display_takes_nothing_with_it() {
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .env("DISPLAY", &display.name)
         .env_remove("WAYLAND_DISPLAY")
+        .env("STYLET_SETTINGS", display.path("settings.toml"))
         .args(["view", "scenes/training/hit_target.toml", "--set", "tissue.cell_size_mm=1.2", "--out"])
         .arg(&out)
         .stdout(Stdio::null())

@@ -9,6 +9,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use clap::Args;
 use serde::{Deserialize, Serialize};
 
+use super::report_skills::{self, SKILLS};
 use super::run::{self, RunArgs};
 use super::{ended_between_runs, report_predictions, until_ended};
 use crate::error::{Error, Result};
@@ -18,20 +19,22 @@ use crate::output::report::lv2022::{CASES, Case, Report, SCENES};
 use crate::reading;
 use crate::scene::Scene;
 use crate::simulation::EngineChoice;
+use crate::units::calendar;
 use crate::whole_file;
 
 /// The report that runs nothing.
 pub const PREDICTIONS: &str = "predictions";
 
 /// Names of the reports.
-pub const NAMES: [&str; 2] = ["lv2022", PREDICTIONS];
+pub const NAMES: [&str; 3] = ["lv2022", PREDICTIONS, SKILLS];
 
 /// Written beside the folders of the runs: what has been computed from which scene.
 const LEDGER: &str = "report.json";
 
 #[derive(Debug, Clone, Default, Args)]
 pub struct ReportArgs {
-    /// Which report: lv2022 (runs of the paper's cases) or predictions (published needle forces beside the theory)
+    /// Which report: lv2022 (runs of the paper's cases), predictions (published needle forces beside the theory) or skills (synthetic
+    /// trainees at a task)
     pub name: String,
     /// Folder of the runs and of the page [default: out/report_<NAME>, with --quick out/report_<NAME>_quick]
     #[arg(long)]
@@ -51,6 +54,21 @@ pub struct ReportArgs {
     /// File of experiments for predictions [default: the built-in assets/predictions.toml]
     #[arg(long, value_name = "FILE")]
     pub data: Option<PathBuf>,
+    /// Scene with a task for skills [default: scenes/training/avoid_vessel.toml]
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Attempts of all three levels for skills [default: 200]
+    #[arg(long, value_name = "N")]
+    pub attempts: Option<u64>,
+    /// Seed of the trainees for skills
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Attempts at once for skills [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<usize>,
+    /// Folder of evidence.toml and key_figures.toml, which skills brings up to date
+    #[arg(long, value_name = "FOLDER")]
+    pub evidence: Option<PathBuf>,
     /// Compute everything again, and replace what the folder holds
     #[arg(long)]
     pub force: bool,
@@ -123,6 +141,21 @@ pub fn report(args: &ReportArgs, interrupted: &AtomicBool) -> Result<ReportOutco
         return Err(Error::input(
             format!("there is no report `{}`", args.name),
             format!("write one of: {}", NAMES.join(", ")),
+        ));
+    }
+    if args.name == SKILLS {
+        return report_skills::report(args, interrupted);
+    }
+    let of_skills = [
+        ("--scene", args.scene.is_some()),
+        ("--attempts", args.attempts.is_some()),
+        ("--jobs", args.jobs.is_some()),
+        ("--evidence", args.evidence.is_some()),
+    ];
+    if let Some((option, _)) = of_skills.iter().find(|(_, given)| *given) {
+        return Err(Error::input(
+            format!("{option} is of no use for the report {}", args.name),
+            format!("leave it out, or write stylet report {SKILLS}"),
         ));
     }
     if args.name == PREDICTIONS {
@@ -318,17 +351,8 @@ pub(super) fn now() -> u64 {
 
 /// `2022-03-01 14:05 UTC` from seconds since 1970.
 pub(crate) fn moment(seconds: u64) -> String {
-    let (days, rest) = (seconds / 86_400, seconds % 86_400);
-    // Years that begin on 1 March end with the leap day; 719468 days lie between 0000-03-01 and 1970-01-01.
-    let days = days + 719_468;
-    let (era, day_of_era) = (days / 146_097, days % 146_097);
-    let year = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year + year / 4 - year / 100);
-    let month_from_march = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
-    let year = year + 400 * era + u64::from(month <= 2);
-    format!("{year}-{month:02}-{day:02} {:02}:{:02} UTC", rest / 3600, rest / 60 % 60)
+    let [year, month, day, hour, minute, _] = calendar(seconds);
+    format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
 }
 
 #[cfg(test)]

@@ -5,14 +5,19 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{SceneArgs, ended};
+use super::{DEFAULT_SCENE, ended};
 use crate::ending;
 use crate::error::{Error, Result};
+use crate::training::history;
 
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct ViewArgs {
-    #[command(flatten)]
-    pub scene: SceneArgs,
+    /// Scene file [default: the start screen, with tasks and trainees]
+    #[arg(id = "scene", value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Override a key of the scene, e.g. --set tissue.cell_size_mm=0.8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
     /// The motion of the scene leads the needle, from the start on
     #[arg(long)]
     pub script: bool,
@@ -32,7 +37,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "NAME")]
     pub trainee: Option<String>,
     /// Folder of the trainees' attempts
-    #[arg(long, value_name = "FOLDER", default_value = "history")]
+    #[arg(long, value_name = "FOLDER", default_value = history::FOLDER)]
     pub history: PathBuf,
     /// Take the shaders from this folder, and again whenever they change
     #[arg(long, value_name = "FOLDER")]
@@ -55,6 +60,12 @@ pub struct ViewArgs {
     /// Write the last picture to this PNG file
     #[arg(long, value_name = "FILE")]
     pub screenshot: Option<PathBuf>,
+    /// Write the view of the last picture, without the panels, to this PNG file
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// File of the settings of the window [default: STYLET_SETTINGS, else in the user's folder for settings]
+    #[arg(long, value_name = "FILE")]
+    pub settings: Option<PathBuf>,
     #[command(flatten)]
     pub link: LinkArgs,
     /// Write the forces that a haptic device would get, 1000 a second, to this CSV file
@@ -79,6 +90,22 @@ pub struct LinkArgs {
 }
 
 impl ViewArgs {
+    /// The window as it is opened without any word.
+    pub fn start_screen() -> Self {
+        ViewArgs { pace: 1.0, history: history::FOLDER.into(), ..ViewArgs::default() }
+    }
+
+    /// The scene that is asked for; `None`: the start screen. Who changes or watches one without naming it means the first.
+    pub fn scene_file(&self) -> Option<PathBuf> {
+        let first = || (self.script || !self.overrides.is_empty()).then(|| DEFAULT_SCENE.into());
+        self.scene.clone().or_else(first)
+    }
+
+    /// Whether the call names what is shown first.
+    pub fn names_a_scene(&self) -> bool {
+        self.session.is_some() || self.scene_file().is_some()
+    }
+
     /// Width and height of the window in points, where they were given.
     pub fn size(&self) -> Option<[u32; 2]> {
         self.size.as_ref().and_then(|size| Some([*size.first()?, *size.get(1)?]))
@@ -93,7 +120,12 @@ impl ViewArgs {
 pub fn execute(args: &ViewArgs, open: impl FnOnce(&ViewArgs) -> Result<String>) -> Result<u8> {
     ending::watch();
     println!("{}", open(args)?);
-    Ok(ended("the window is closed, what it has recorded is kept"))
+    Ok(window_ended())
+}
+
+/// Exit code of a window that was closed; where a user or a scheduler has closed it, that is said.
+pub fn window_ended() -> u8 {
+    ended("the window is closed, what it has recorded is kept")
 }
 
 /// The refusal of a program that was built without its window.

@@ -77,8 +77,13 @@ pub fn escape(text: &str) -> String {
 
 /// The whole page around its body, which is markup.
 pub fn document(title: &str, body: &str) -> String {
+    document_in("en", title, body)
+}
+
+/// The same in a language, by its code as in BCP 47.
+pub fn document_in(language: &str, title: &str, body: &str) -> String {
     format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" \
+        "<!DOCTYPE html>\n<html lang=\"{language}\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" \
          content=\"width=device-width, initial-scale=1\"/>\n<title>{}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          {body}</body>\n</html>\n",
         escape(title)

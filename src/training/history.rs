@@ -118,6 +118,15 @@ impl History {
         Ok((attempt, path))
     }
 
+    /// The folders in it, one per trainee, by name.
+    ///
+    /// # Errors
+    /// `Error::File` where it cannot be listed.
+    pub fn folders(&self) -> Result<Vec<PathBuf>> {
+        let all = names(&self.root)?.into_iter().map(|name| self.root.join(name));
+        Ok(all.filter(|folder| folder.is_dir()).collect())
+    }
+
     /// All attempts of a trainee; none where there is no folder yet.
     ///
     /// # Errors

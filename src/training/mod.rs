@@ -2,15 +2,37 @@
 //!
 //! Reading order, which is also the line that an attempt takes: [`kinematic`] (how the needle moved) and [`physical`] (what the
 //! tissue felt) -> [`task`] (goals met or not) -> [`score`] (rows, goals, trust; CSV, TSV, JSON, text) -> [`history`] (attempts
-//! of a trainee as files). [`texts`] holds every word that a trainee reads. Pure functions; no window, no engine.
+//! of a trainee as files), [`trainees`] (who they are). Beside it, from frame to frame: [`events`] (what happens, [`clearance`] from what is to be avoided) and [`guide`]
+//! (which step is due, hints). When it is over: [`debrief`] (verdict, why, when), with the [`key_figures`] of the task. [`texts`] holds the
+//! labels of tables, which are English; what a trainee reads in the window comes from [`crate::words`]. Pure functions; no window, no engine.
 
+pub mod body;
+pub mod class;
+pub mod clearance;
+pub mod debrief;
+pub mod events;
+pub mod guide;
 pub mod history;
+pub mod key_figures;
 pub mod kinematic;
+pub mod notes;
+pub mod own_task;
 pub mod physical;
+pub mod report;
 pub mod score;
+pub mod skill;
+pub mod skill_evidence;
+pub mod skill_page;
+pub mod skill_run;
+pub mod statistics;
 pub mod task;
 pub mod texts;
+pub mod trainees;
+pub mod xapi;
 
+pub use debrief::Debrief;
+pub use events::{Event, Watcher};
+pub use guide::Guide;
 pub use history::{Attempt, History};
 pub use kinematic::{KinematicFigures, Sample};
 pub use physical::{PhysicalFigures, Trust};

@@ -25,7 +25,7 @@ use super::texts;
 use crate::observables::{CoreSample, EnergyAccount, FrameRecord};
 use crate::output::{Summary, TargetFigures};
 use crate::scene::Scene;
-use crate::verdict::Doubt;
+use crate::verdict::{Doubt, Quantity};
 
 /// Time over which a force rate is taken [s]: several frames, shorter than a reaction of the hand.
 pub const RATE_WINDOW: f64 = 0.1;
@@ -79,7 +79,8 @@ impl Trust {
         if records.iter().any(|r| r.health.not_finite || !r.force.axial.is_finite()) {
             trust.reasons.push(texts::NOT_A_NUMBER.into());
         }
-        trust.reasons.extend(records.last().into_iter().flat_map(|r| r.verdict.doubts.iter().map(Doubt::sentence)));
+        let doubts = records.last().into_iter().flat_map(|r| &r.verdict.doubts);
+        trust.reasons.extend(doubts.filter(|doubt| !is_a_touch(records, doubt)).map(Doubt::sentence));
         for (value, bound, name) in [
             (trust.kinetic_to_internal, LARGEST_KINETIC, texts::KINETIC_TO_INTERNAL),
             (trust.hourglass_to_internal, LARGEST_HOURGLASS, texts::HOURGLASS_TO_INTERNAL),
@@ -98,6 +99,15 @@ impl Trust {
     pub fn is_good(&self) -> bool {
         self.reasons.is_empty()
     }
+}
+
+/// True for an energy that was missing while next to no work had been done, and is small against that of the whole attempt: a hand that
+/// trembles touches the skin for a few steps before it goes in, and the work of a touch is known to half a step only. Figures come from
+/// the whole attempt.
+fn is_a_touch(records: &[FrameRecord], doubt: &Doubt) -> bool {
+    let whole = records.last().map_or(0.0, |r| r.energy.external_max);
+    let small = |r: &FrameRecord| (r.energy.external - r.energy.accounted()).abs() <= doubt.bound * whole;
+    doubt.quantity == Quantity::EnergyImbalance && records.iter().all(small)
 }
 
 /// A layer that gave way before the tip.
@@ -181,13 +191,24 @@ fn axis_at(scene: &Scene, samples: &[Sample], time: f64) -> (DVec3, DVec3, f64) 
     let index = samples.partition_point(|s| s.time <= time).max(1) - 1;
     let (tip, direction) =
         samples.get(index).map_or((scene.motion.entry, scene.motion.direction), |s| (s.tip, s.direction));
+    axis_of(tip, direction)
+}
+
+/// The same of a needle whose tip is at `tip` [m].
+pub fn axis_of(tip: DVec3, direction: DVec3) -> (DVec3, DVec3, f64) {
     // A needle that lies flat meets no top face.
     let depth = if direction.z.abs() > 1e-6 { tip.z / direction.z } else { 0.0 };
     (tip - direction * depth, direction, depth)
 }
 
+/// Where the end of the cut is: what the tip has cut to, on the way out where the tip is [m].
+pub fn cut_end((surface, direction, depth): (DVec3, DVec3, f64), record: &FrameRecord) -> DVec3 {
+    // The surface itself belongs to what lies under it.
+    surface + direction * record.tip_coordinate.min(depth).max(0.5 * LAYER_STEP)
+}
+
 /// Name of what lies at a rest position.
-fn layer_at(scene: &Scene, x: DVec3) -> &str {
+pub fn layer_at(scene: &Scene, x: DVec3) -> &str {
     let region = scene.regions.iter().rfind(|r| r.shape.contains(x));
     region.map_or(texts::OWN_MATERIAL, |r| r.name.as_str())
 }
@@ -212,11 +233,9 @@ impl PhysicalFigures {
         figures.largest_damage = scene.effects.damage.is_some().then(|| largest(|r| r.health.largest_damage));
         let mut before = EnergyAccount::default();
         for record in records {
-            let (surface, direction, depth) = axis_at(scene, samples, record.time);
-            // The surface itself belongs to what lies under it.
-            let within = record.tip_coordinate.min(depth).max(0.5 * LAYER_STEP);
-            let place = surface + direction * within;
-            figures.deepest_cut = figures.deepest_cut.max(record.tip_coordinate * -direction.z);
+            let axis = axis_at(scene, samples, record.time);
+            let place = cut_end(axis, record);
+            figures.deepest_cut = figures.deepest_cut.max(record.tip_coordinate * -axis.1.z);
             let name = layer_at(scene, place);
             let index = figures.layers.iter().position(|l| l.layer == name).unwrap_or_else(|| {
                 figures.layers.push(LayerFigures { layer: name.into(), ..Default::default() });
@@ -261,22 +280,59 @@ fn largest_force_rate(records: &[FrameRecord]) -> Option<f64> {
     largest
 }
 
-/// The layers that gave way, in order.
-fn punctures(scene: &Scene, samples: &[Sample], records: &[FrameRecord]) -> Vec<Puncture> {
-    let Some(puncture) = &scene.effects.puncture else { return Vec::new() };
-    let mut found = Vec::new();
-    // The layer that the tip is entering, with its top; what it has given way before is known up to `cut`.
-    let mut entering: Option<(&str, f64)> = None;
-    let (mut present, mut cut) = ("", 0.0);
-    for (index, record) in records.iter().enumerate() {
+/// The way of a tip through the layers of its path, as far as it has cut.
+#[derive(Debug, Clone, Default)]
+pub struct Track {
+    /// The layer that the tip is entering, with its top [m].
+    entering: Option<(String, f64)>,
+    /// The layer of the end of the way; none before the first.
+    present: Option<String>,
+    /// How far the tip has cut, along its path [m].
+    cut: f64,
+}
+
+impl Track {
+    /// Goes on to the frame of `record`. `gave_way` is told the layer that gave way and its top [m].
+    pub fn advance(
+        &mut self,
+        scene: &Scene,
+        (surface, direction): (DVec3, DVec3),
+        record: &FrameRecord,
+        mut gave_way: impl FnMut(&str, f64),
+    ) {
+        let Some(puncture) = &scene.effects.puncture else { return };
         let a = record.tip_coordinate;
         if a <= 0.0 {
             // Outside, or not through the surface yet: a track that begins anew.
-            (entering, present, cut) = (None, "", 0.0);
-            continue;
+            *self = Track::default();
+            return;
         }
+        while self.cut < a {
+            let next = (self.cut + LAYER_STEP).min(a);
+            let name = layer_at(scene, surface + direction * (0.5 * (self.cut + next)));
+            if self.present.as_deref() != Some(name) {
+                if let Some((layer, top)) = &self.entering {
+                    gave_way(layer, *top);
+                }
+                (self.entering, self.present) = (Some((name.into(), self.cut)), Some(name.into()));
+            }
+            if let Some((layer, top)) = &self.entering
+                && next >= top + puncture.transition_length * (1.0 - 1e-9)
+            {
+                gave_way(layer, *top);
+                self.entering = None;
+            }
+            self.cut = next;
+        }
+    }
+}
+
+/// The layers that gave way, in order.
+fn punctures(scene: &Scene, samples: &[Sample], records: &[FrameRecord]) -> Vec<Puncture> {
+    let (mut found, mut track) = (Vec::new(), Track::default());
+    for (index, record) in records.iter().enumerate() {
         let (surface, direction, _) = axis_at(scene, samples, record.time);
-        let mut gave_way = |layer: &str, top: f64| {
+        track.advance(scene, (surface, direction), record, |layer, top| {
             let stop = standstill(records, index);
             found.push(Puncture {
                 layer: layer.into(),
@@ -285,24 +341,7 @@ fn punctures(scene: &Scene, samples: &[Sample], records: &[FrameRecord]) -> Vec<
                 overshoot: stop.depth - record.depth,
                 beyond: stop.tip_coordinate - top,
             });
-        };
-        while cut < a {
-            let next = (cut + LAYER_STEP).min(a);
-            let name = layer_at(scene, surface + direction * (0.5 * (cut + next)));
-            if name != present {
-                if let Some((layer, top)) = entering {
-                    gave_way(layer, top);
-                }
-                (entering, present) = (Some((name, cut)), name);
-            }
-            if let Some((layer, top)) = entering
-                && next >= top + puncture.transition_length * (1.0 - 1e-9)
-            {
-                gave_way(layer, top);
-                entering = None;
-            }
-            cut = next;
-        }
+        });
     }
     found
 }

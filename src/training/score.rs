@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::kinematic::{Block, KinematicFigures, Plan, Sample};
+use super::body::SceneBody;
+use super::kinematic::{KinematicFigures, Plan, Sample};
 use super::physical::{PhysicalFigures, Trust};
 use super::task::{self, GoalResult};
 use super::texts::{self, Better};
@@ -137,7 +138,7 @@ impl Score {
         if samples.is_empty() {
             return Err(Error::input(texts::NO_SAMPLES, texts::NO_SAMPLES_WAY_OUT));
         }
-        let body = Block::of(&scene.tissue);
+        let body = SceneBody::of(scene);
         let kinematic = KinematicFigures::of(samples, &body, Some(&Plan::of(&scene.motion)))?;
         let physical = PhysicalFigures::of(scene, samples, records);
         let trust = Trust::of(records);
@@ -148,7 +149,7 @@ impl Score {
             }
         }
         let goals = match &scene.task {
-            Some(task) => task::judge(task, scene, samples, &kinematic, &physical),
+            Some(task) => task::judge(task, scene, samples, &kinematic, &physical, &rows),
             None => Vec::new(),
         };
         let mut score = Score {

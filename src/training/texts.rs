@@ -141,6 +141,10 @@ pub fn stop_in_layer(name: &str) -> String {
     format!("stop in {name}")
 }
 
+pub fn figure_bound(label: &str) -> String {
+    format!("keep in bounds: {label}")
+}
+
 pub const CORE: &str = "bring out enough of a core";
 pub const TIME_LIMIT: &str = "keep the time limit";
 
@@ -174,6 +178,16 @@ pub const NO_TRAINEE: &str = "the name of the trainee is empty";
 pub const NO_TRAINEE_WAY_OUT: &str = "write a name of one letter or more";
 pub const NO_TASK_WAY_OUT: &str = "score a scene with a [task], or give the attempt a task of your own";
 pub const BROKEN_WAY_OUT: &str = "the file was left as it is; move it away, or restore it from a copy";
+
+pub const LONG_TRAINEE_WAY_OUT: &str = "write a shorter name";
+
+pub fn no_trainee_file(path: &str, reason: &str) -> String {
+    format!("{path} does not tell the name of a trainee: {reason}")
+}
+
+pub fn long_trainee(most: usize) -> String {
+    format!("the name of the trainee has more than {most} characters")
+}
 
 pub fn no_attempt(path: &str, reason: &str) -> String {
     format!("{path} is no attempt of this program: {reason}")

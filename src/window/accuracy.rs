@@ -1,7 +1,7 @@
 //! Accuracy against time: mesh and mass scaling with what they are predicted to cost, and the error where a study has measured it.
 
 use super::practice::Timing;
-use super::texts;
+use super::slider::named;
 use super::tuning::Tuning;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::mesh::Mesh;
@@ -13,6 +13,7 @@ use crate::study::plan::UnitCost;
 use crate::study::runner::predicted_factor;
 use crate::study::store::{Store, default_folder};
 use crate::study::{MeshSize, Settings};
+use crate::words::say;
 
 /// What the sliders stand at, and what is known of it.
 pub struct Accuracy {
@@ -41,10 +42,10 @@ impl Accuracy {
         let block = scene.mesh.is_none();
         ui.add_enabled_ui(block, |ui| {
             let slider = egui::Slider::new(&mut self.edge_mm, 0.3..=2.0).step_by(0.05).suffix(" mm");
-            ui.add(slider.text(texts::EDGE));
+            named(ui, slider, say("edge"));
         });
         let slider = egui::Slider::new(&mut self.mass_scaling, 1.0..=1e5).logarithmic(true).max_decimals(0);
-        ui.add_enabled(scene.effects.mass_scaling.is_some(), slider.text(texts::MASS_SCALING));
+        ui.add_enabled_ui(scene.effects.mass_scaling.is_some(), |ui| named(ui, slider, say("mass-scaling")));
         if self.size.as_ref().is_none_or(|(edge, _)| *edge != self.edge_mm) {
             self.size = Some((self.edge_mm, self.measured_size(scene)));
         }
@@ -52,8 +53,8 @@ impl Accuracy {
         match size {
             Ok(size) => {
                 let factor = self.predicted(*size, scene, timing, now);
-                let factor = factor.map_or(texts::AFTER_THE_FIRST_FRAME.into(), |factor| format!("{factor:.2}"));
-                ui.label(format!("{} {}, {} {factor}", size.cells, texts::CELLS, texts::PREDICTED));
+                let factor = factor.map_or(say("after-the-first-frame").into(), |factor| format!("{factor:.2}"));
+                ui.label(format!("{} {}, {} {factor}", size.cells, say("cells"), say("predicted")));
             }
             Err(reason) => {
                 ui.colored_label(ui.visuals().error_fg_color, reason);
@@ -63,7 +64,7 @@ impl Accuracy {
         let same_mesh = (self.edge_mm - base).abs() < 1e-9;
         let factor = scene.effects.mass_scaling.map(|m| m.factor);
         let same = same_mesh && factor.is_none_or(|f| (f / self.mass_scaling - 1.0).abs() < 1e-3);
-        let text = if same_mesh { texts::APPLY } else { texts::APPLY_ANEW };
+        let text = if same_mesh { say("apply") } else { say("apply-anew") };
         if ui.add_enabled(!same && size.is_ok() && !tuning.is_busy(), egui::Button::new(text)).clicked() {
             let mut wishes = Vec::new();
             if !same_mesh {
@@ -119,13 +120,13 @@ impl Accuracy {
         {
             Some(c) => format!(
                 "{} {:.1} % {} {} mm, S {:.0}",
-                texts::ERROR,
+                say("error"),
                 100.0 * c.error,
-                texts::MEASURED_AT,
+                say("measured-at"),
                 c.settings.cell_size_mm,
                 c.settings.mass_scaling
             ),
-            None => format!("{} stylet study {}", texts::NO_STUDY, scene.path.display()),
+            None => format!("{} stylet study {}", say("no-study"), scene.path.display()),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Parts of a patient in natural colours: smooth surfaces and a coloured cut that move with the tissue, drawn from the solver's own buffer.
+//! Parts of the tissue in natural colours: smooth surfaces and a coloured cut that move with the tissue, drawn from the solver's own buffer.
 //!
 //! A corner lies in a cell and goes with the displacements of its eight nodes, which the device adds up. The triangles change only when
 //! the plane is moved.
@@ -54,10 +54,12 @@ pub struct AnatomyView {
     ends: [u32; 3],
     /// Nodes from row to row, and from layer to layer.
     strides: [f32; 2],
+    /// Names of parts and where they are written, at rest [m].
+    anchors: Vec<(String, DVec3)>,
 }
 
 impl AnatomyView {
-    /// For a scene with labels; none without. `module`: the shader of the tissue with [`SHADER`] behind it.
+    /// For a block; none for a mesh, and where faces may part. `module`: the shader of the tissue with [`SHADER`] behind it.
     pub fn new(
         gpu: &Gpu,
         model: &Model,
@@ -66,13 +68,15 @@ impl AnatomyView {
         (view, displacement): (&wgpu::Buffer, &Bound<'_>),
     ) -> Option<Self> {
         let Mesh::Block(block) = &model.mesh else { return None };
-        model.scene.case.as_ref()?;
-        let anatomy = Anatomy::of_scene(&model.scene)?;
+        if !model.separation.pairs.is_empty() {
+            return None;
+        }
+        let anatomy = Anatomy::of_any(&model.scene)?;
         let pipelines = STAGES.map(|stage| pipeline(&gpu.device, module, stage, format));
         let bindings = bindings(gpu, &pipelines, view, displacement);
         let nodes = block.nodes();
         let mut whole = surfaces::surfaces(&model.scene, block, &anatomy);
-        whole.extend(surfaces::border(block, &anatomy));
+        whole.extend(surfaces::border(block, &anatomy, model.scene.case.is_none()));
         Some(AnatomyView {
             pipelines,
             bindings,
@@ -81,12 +85,18 @@ impl AnatomyView {
             triangles: filled(gpu, &[] as &[u32], wgpu::BufferUsages::INDEX).0,
             ends: [0; 3],
             strides: [nodes[0] as f32, (nodes[0] * nodes[1]) as f32],
+            anchors: Vec::new(),
         })
     }
 
     /// Draws from another engine of the same mesh.
     pub fn take_buffers(&mut self, gpu: &Gpu, view: &wgpu::Buffer, displacement: &Bound<'_>) {
         self.bindings = bindings(gpu, &self.pipelines, view, displacement);
+    }
+
+    /// Names of the parts that are seen, and where they are written, at rest [m].
+    pub fn anchors(&self) -> &[(String, DVec3)] {
+        &self.anchors
     }
 
     /// Nodes from row to row, and from layer to layer.
@@ -97,7 +107,7 @@ impl AnatomyView {
     /// Takes away what lies beyond a plane, and colours what lies in it.
     pub fn cut(&mut self, gpu: &Gpu, model: &Model, plane: Option<RestPlane>) {
         let Mesh::Block(block) = &model.mesh else { return };
-        let Some(anatomy) = Anatomy::of_scene(&model.scene) else { return };
+        let Some(anatomy) = Anatomy::of_any(&model.scene) else { return };
         let embedding = Embedding::new(block, &anatomy);
         let mut drawn = match plane {
             Some(plane) => surfaces::cut(&self.whole, plane.normal, plane.offset),
@@ -106,6 +116,7 @@ impl AnatomyView {
         if let Some(plane) = plane {
             surfaces::face(block, (plane.normal, plane.offset), false, &anatomy, &mut drawn);
         }
+        self.anchors = anchors(&drawn, plane, &anatomy);
         drawn.sort_by_key(|triangle| triangle.layer);
         let end = |layer: Layer| 3 * drawn.partition_point(|t| t.layer <= layer) as u32;
         self.ends = [end(Layer::Solid), end(Layer::Organ), end(Layer::Skin)];
@@ -132,7 +143,10 @@ impl AnatomyView {
 
 /// Parts that lie in the block, for the legend.
 pub fn legend(model: &Model) -> Vec<Entry> {
-    let (Some(anatomy), Mesh::Block(block)) = (Anatomy::of_scene(&model.scene), &model.mesh) else { return Vec::new() };
+    let (Some(anatomy), Mesh::Block(block)) = (Anatomy::of_any(&model.scene), &model.mesh) else { return Vec::new() };
+    if !model.separation.pairs.is_empty() {
+        return Vec::new();
+    }
     let mut seen = vec![false; anatomy.parts().len()];
     for cell in 0..block.cell_count() {
         let nodes = block.cell_nodes(cell);
@@ -144,6 +158,33 @@ pub fn legend(model: &Model) -> Vec<Entry> {
     }
     let parts = anatomy.parts().iter().zip(seen).skip(1).filter(|(_, seen)| *seen);
     parts.map(|(part, _)| (part.name.clone(), part.colour)).collect()
+}
+
+/// Where the names of parts are written: in the cut, where they are in it, else on their surface, at the triangle next to their middle.
+fn anchors(drawn: &[Triangle], plane: Option<RestPlane>, anatomy: &Anatomy) -> Vec<(String, DVec3)> {
+    let middle = |t: &Triangle| t.corners.iter().map(|c| c.place).sum::<DVec3>() / 3.0;
+    let area = |t: &Triangle| {
+        let [a, b, c] = t.corners.map(|c| c.place);
+        0.5 * (b - a).cross(c - a).length()
+    };
+    let in_cut =
+        |t: &Triangle| plane.is_some_and(|p| t.corners.iter().all(|c| (p.normal.dot(c.place) - p.offset).abs() < 1e-7));
+    // What is seen through, skin above all, is named in the cut only.
+    let named = |t: &&Triangle| t.layer == Layer::Solid || in_cut(t);
+    let mut by_colour: HashMap<Rgb, [Vec<&Triangle>; 2]> = HashMap::new();
+    for triangle in drawn.iter().filter(named) {
+        by_colour.entry(triangle.colour).or_default()[usize::from(in_cut(triangle))].push(triangle);
+    }
+    let parts = anatomy.parts().iter().skip(1).filter_map(|part| {
+        let [surface, cut] = by_colour.get(&part.colour)?;
+        let of = if cut.is_empty() { surface } else { cut };
+        let whole: f64 = of.iter().map(|t| area(t)).sum();
+        let centre = of.iter().map(|t| middle(t) * area(t)).sum::<DVec3>() / whole.max(1e-30);
+        let nearest = of.iter().min_by(|a, b| middle(a).distance(centre).total_cmp(&middle(b).distance(centre)))?;
+        // A sliver needs no name.
+        (whole > 4e-6).then(|| (part.name.clone(), middle(nearest)))
+    });
+    parts.collect()
 }
 
 /// Corners in their cells, every one once, and which of them the triangles have.

@@ -1,10 +1,8 @@
-//! How things are shown: colours of the scale, tissue that is seen through, targets, the ultrasound slice, size of the texts.
+//! How things are shown: colours of the scale, tissue that is seen through, targets, the ultrasound slice.
 
 use super::probe::Probe;
-use super::texts;
-
-/// Smallest and largest size of the texts, against that of the desktop.
-const ZOOM: std::ops::RangeInclusive<f32> = 0.6..=2.5;
+use super::slider::named;
+use crate::words::say;
 
 /// Perceptually uniform colours from dark to bright, whose order the colour-blind see too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,11 +50,11 @@ pub struct Look {
     pub targets: bool,
     /// Parts in natural colours where the scene has labels, else a field.
     pub natural: bool,
+    /// Their names in the view.
+    pub names: bool,
     /// How much of the skin is drawn over them, 0..1.
     pub skin: f32,
     pub probe: Probe,
-    /// Size of the texts while its slider is held.
-    zoom: Option<f32>,
 }
 
 impl Default for Look {
@@ -68,49 +66,44 @@ impl Default for Look {
             veil: 0.25,
             targets: true,
             natural: true,
+            names: true,
             skin: 0.4,
             probe: Probe::default(),
-            zoom: None,
         }
     }
 }
 
-/// The choices on the left. `targets`: the scene has some; `natural`: parts are shown in natural colours, no field.
-pub fn controls(ui: &mut egui::Ui, look: &mut Look, targets: bool, natural: bool) {
-    if !natural {
-        egui::ComboBox::from_label(texts::COLOURS).selected_text(look.map.name()).show_ui(ui, |ui| {
-            for map in ColourMap::ALL {
-                ui.selectable_value(&mut look.map, map, map.name());
-            }
-        });
-        ui.add(egui::Slider::new(&mut look.opacity, 0.0..=1.0).text(texts::OPACITY));
-    }
+/// What else is shown. `targets`: the scene has some.
+pub fn controls(ui: &mut egui::Ui, look: &mut Look, targets: bool) {
     if targets {
-        ui.checkbox(&mut look.targets, texts::TARGETS);
+        ui.checkbox(&mut look.targets, say("targets"));
     }
-    ui.checkbox(&mut look.probe.on, texts::ULTRASOUND);
-    // A slider that changes its own size under the mouse runs away: it counts when it is let go.
-    let mut zoom = look.zoom.unwrap_or(ui.ctx().zoom_factor());
-    let slider = ui.add(egui::Slider::new(&mut zoom, ZOOM).step_by(0.05).text(texts::ZOOM));
-    look.zoom = slider.dragged().then_some(zoom);
-    if (slider.changed() && !slider.dragged()) || slider.drag_stopped() {
-        ui.ctx().set_zoom_factor(zoom);
-    }
+    ui.checkbox(&mut look.probe.on, say("ultrasound"));
 }
 
-/// Whether parts are shown in natural colours, with their names, or a field; `parts`: names and colours, empty without labels. True where
-/// parts are shown.
-pub fn parts(ui: &mut egui::Ui, look: &mut Look, parts: &[(String, [u8; 3])]) -> bool {
+/// Colours of a field, and how much of the surface that has them is drawn.
+pub fn colours(ui: &mut egui::Ui, look: &mut Look) {
+    egui::ComboBox::from_label(say("colours")).width(80.0).selected_text(look.map.name()).show_ui(ui, |ui| {
+        for map in ColourMap::ALL {
+            ui.selectable_value(&mut look.map, map, map.name());
+        }
+    });
+    named(ui, egui::Slider::new(&mut look.opacity, 0.0..=1.0), say("opacity"));
+}
+
+/// Whether parts are shown in natural colours, with their names, or a field; `parts`: names and colours, empty without labels.
+pub fn parts(ui: &mut egui::Ui, look: &mut Look, parts: &[(String, [u8; 3])]) {
     if parts.is_empty() {
-        return false;
+        return;
     }
-    ui.horizontal(|ui| {
-        for (natural, name) in [(true, texts::NATURAL), (false, texts::FIELD_COLOURS)] {
+    ui.horizontal_wrapped(|ui| {
+        for (natural, name) in [(true, say("natural")), (false, say("field-colours"))] {
             ui.radio_value(&mut look.natural, natural, name);
         }
     });
     if look.natural {
-        ui.add(egui::Slider::new(&mut look.skin, 0.0..=1.0).text(texts::SKIN_SHOWN));
+        named(ui, egui::Slider::new(&mut look.skin, 0.0..=1.0), say("skin-shown"));
+        ui.checkbox(&mut look.names, say("part-names"));
         ui.vertical(|ui| {
             ui.spacing_mut().item_spacing.y = 1.0;
             for (name, [r, g, b]) in parts {
@@ -123,20 +116,19 @@ pub fn parts(ui: &mut egui::Ui, look: &mut Look, parts: &[(String, [u8; 3])]) ->
             }
         });
     }
-    look.natural
 }
 
 /// Which layers are seen through; `names` by number of the material. True where that has changed.
 pub fn layers<'a>(ui: &mut egui::Ui, look: &mut Look, names: impl Iterator<Item = &'a str>) -> bool {
     let before = look.through;
-    egui::CollapsingHeader::new(texts::LAYERS).show(ui, |ui| {
+    egui::CollapsingHeader::new(say("layers")).show(ui, |ui| {
         for (number, name) in names.enumerate() {
             let mut through = look.through >> number & 1 == 1;
             if ui.checkbox(&mut through, name).changed() {
                 look.through ^= 1 << number;
             }
         }
-        ui.add(egui::Slider::new(&mut look.veil, 0.0..=1.0).text(texts::VEIL));
+        named(ui, egui::Slider::new(&mut look.veil, 0.0..=1.0), say("veil"));
     });
     look.through != before
 }
@@ -154,7 +146,7 @@ mod tests {
             *changed |= layers(ui, look, ["all the rest", "skin", "fat"].into_iter());
         };
         let mut harness = Harness::new_ui_state(draw, (Look::default(), false));
-        harness.get_by_label(texts::LAYERS).click();
+        harness.get_by_label(say("layers")).click();
         harness.run_steps(12);
         for (name, through) in [("fat", 0b100), ("all the rest", 0b101), ("fat", 0b001)] {
             harness.state_mut().1 = false;

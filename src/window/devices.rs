@@ -11,13 +11,14 @@ use super::link_device::Link;
 #[cfg(feature = "link")]
 use super::practice::Leader;
 use super::practice::{Practice, State};
-use super::texts;
+use super::theme::Tint;
 #[cfg(not(feature = "link"))]
 use crate::Error;
 use crate::Result;
 use crate::commands::view::ViewArgs;
 use crate::haptic::{ForceLoop, ForceTable, LoopTiming};
 use crate::needle::motion::HandPose;
+use crate::words::say;
 
 /// Devices that come and go.
 #[derive(Default)]
@@ -33,14 +34,14 @@ pub struct Devices {
 }
 
 impl Devices {
-    /// Opens what the options ask for, and the gamepads where they are built in.
+    /// Opens what the options ask for, and the gamepads where they are built in, whose speed [`Devices::tend`] gives.
     ///
     /// # Errors
     /// Those of the link's port and of the file of forces. Without gamepads one goes on with keys and mouse.
-    pub fn open(options: &ViewArgs, speed: f64) -> Result<Self> {
+    pub fn open(options: &ViewArgs) -> Result<Self> {
         let mut devices = Devices::default();
         devices.open_link(options)?;
-        devices.open_pads(speed);
+        devices.open_pads();
         if let Some(path) = &options.haptic_log {
             devices.forces = Some(ForceLoop::start(Box::new(ForceTable::create(path)?))?);
         }
@@ -69,15 +70,15 @@ impl Devices {
     }
 
     #[cfg(feature = "gamepad")]
-    fn open_pads(&mut self, speed: f64) {
+    fn open_pads(&mut self) {
         match super::pads::Pads::open() {
-            Ok(pads) => self.pad = Some(Gamepad::new(Box::new(pads), speed)),
+            Ok(pads) => self.pad = Some(Gamepad::new(Box::new(pads), 0.0)),
             Err(error) => eprintln!("note: {error}"),
         }
     }
 
     #[cfg(not(feature = "gamepad"))]
-    fn open_pads(&mut self, _speed: f64) {}
+    fn open_pads(&mut self) {}
 
     /// Once per picture: what has happened to the devices, and what they are to know.
     pub fn tend(&mut self, practice: &mut Practice, desk: &Desk) {
@@ -119,6 +120,15 @@ impl Devices {
     #[cfg(not(feature = "link"))]
     fn publish(&mut self, _practice: &Practice) {}
 
+    /// True while mouse, keyboard, a pad or a client of the link asks something of the needle.
+    pub fn asks(&self, desk: &Desk) -> bool {
+        #[cfg(feature = "link")]
+        let linked = self.link.as_ref().is_some_and(|link| link.wanted.leads());
+        #[cfg(not(feature = "link"))]
+        let linked = false;
+        linked || desk.asks() || self.pad.as_ref().is_some_and(Gamepad::asks)
+    }
+
     /// Everything that leads the needle by hand, as one device.
     pub fn with<'a>(&'a mut self, desk: &'a mut Desk) -> Together<'a> {
         Together { desk, devices: self }
@@ -127,20 +137,20 @@ impl Devices {
     /// Notices and the state of the link, for the panel on the left.
     pub fn show(&mut self, ui: &mut egui::Ui, practice: &Practice) {
         if let Some(notice) = &self.notice {
-            let gone = ui.colored_label(egui::Color32::from_rgb(240, 228, 66), notice).clicked();
-            if gone || ui.small_button(texts::CLOSE_NOTICE).clicked() {
+            let gone = ui.colored_label(Tint::Caution.of(ui), notice).clicked();
+            if gone || ui.small_button(say("close-notice")).clicked() {
                 self.notice = None;
             }
         }
         #[cfg(feature = "link")]
         if let Some(link) = &self.link {
             let refused = link.wanted.refused;
-            ui.small(format!("{} {}, {} {}", texts::LINK_AT, link.address(), link.clients(), texts::LINK_CLIENTS));
+            ui.small(format!("{} {}, {} {}", say("link-at"), link.address(), link.clients(), say("link-clients")));
             if link.wanted.leads() && practice.leader == Leader::Hand {
-                ui.small(texts::LINK_LEADS);
+                ui.small(say("link-leads"));
             }
             if refused > 0 {
-                ui.small(format!("{}: {refused}", texts::LINK_REFUSED));
+                ui.small(format!("{}: {refused}", say("link-refused")));
             }
         }
         #[cfg(not(feature = "link"))]
@@ -165,12 +175,12 @@ impl Devices {
 fn heed(notice: PadNotice, practice: &mut Practice) -> Option<String> {
     let running = practice.state == State::Running;
     match notice {
-        PadNotice::Here(name) => Some(format!("{name}: {}", texts::PAD_HERE)),
+        PadNotice::Here(name) => Some(format!("{name}: {}", say("pad-here"))),
         PadNotice::Gone => {
             if running {
                 practice.state = State::Paused;
             }
-            Some(texts::PAD_GONE.to_string())
+            Some(say("pad-gone").to_string())
         }
         PadNotice::Pause => {
             practice.state = match practice.state {

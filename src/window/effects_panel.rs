@@ -1,11 +1,11 @@
 //! Effects with a switch each, and a slider for every number of those that are on.
 
-use super::texts;
 use super::tuning::{Pace, Tuning};
 use crate::effects::parameter::{COUNT, Parameter};
 use crate::effects::{EFFECTS, Effect, switched};
 use crate::scene::Scene;
 use crate::simulation::change::Reach;
+use crate::words::say;
 
 /// Width of a slider, in points.
 const SLIDER: f32 = 96.0;
@@ -25,7 +25,7 @@ pub fn effects(ui: &mut egui::Ui, scene: &Scene, tuning: &mut Tuning) {
                 wishes.push(switched(&on, effect.key, is));
             }
             if was && !effect.parameters.is_empty() {
-                egui::CollapsingHeader::new(texts::NUMBERS).id_salt(effect.key).show(ui, |ui| {
+                egui::CollapsingHeader::new(say("numbers")).id_salt(effect.key).show(ui, |ui| {
                     for parameter in effect.parameters {
                         sliders(ui, scene, parameter, &mut wishes);
                     }
@@ -40,9 +40,9 @@ pub fn effects(ui: &mut egui::Ui, scene: &Scene, tuning: &mut Tuning) {
         ui.colored_label(ui.visuals().error_fg_color, refusal);
     }
     ui.small(match (tuning.is_busy(), tuning.paces.last()) {
-        (true, _) => texts::CHANGING.into(),
+        (true, _) => say("changing").into(),
         (false, Some(pace)) => paced(*pace),
-        (false, None) => texts::UNCHANGED.to_string(),
+        (false, None) => say("unchanged").to_string(),
     });
 }
 
@@ -51,17 +51,17 @@ pub fn saving(ui: &mut egui::Ui, tuning: &mut Tuning, name: &mut String) {
     if name.is_empty() {
         *name = tuning.source.path.with_extension("tuned.toml").display().to_string();
     }
-    ui.add(egui::TextEdit::singleline(name).hint_text(texts::SAVE_SCENE).desired_width(f32::INFINITY));
+    ui.add(egui::TextEdit::singleline(name).hint_text(say("save-scene")).desired_width(f32::INFINITY));
     ui.horizontal(|ui| {
-        if ui.button(texts::SAVE_SCENE).clicked() {
+        if ui.button(say("save-scene")).clicked() {
             tuning.save(std::path::Path::new(name.as_str()));
         }
-        if ui.add_enabled(tuning.is_changed() && !tuning.is_busy(), egui::Button::new(texts::AS_IN_FILE)).clicked() {
+        if ui.add_enabled(tuning.is_changed() && !tuning.is_busy(), egui::Button::new(say("as-in-file"))).clicked() {
             tuning.go_back();
         }
     });
     if let Some(saved) = &tuning.saved {
-        ui.small(format!("{} {}", texts::SAVED, saved.display()));
+        ui.small(format!("{} {}", say("saved"), saved.display()));
     }
 }
 
@@ -91,14 +91,14 @@ fn told(effect: &Effect) -> String {
 
 fn paced(pace: Pace) -> String {
     let what = match pace.reach {
-        Reach::Constants => texts::CHANGED_NUMBERS,
-        Reach::Kernels => texts::CHANGED_EFFECTS,
-        Reach::Start => texts::CHANGED_START,
+        Reach::Constants => say("changed-numbers"),
+        Reach::Kernels => say("changed-effects"),
+        Reach::Start => say("changed-start"),
     };
     format!(
         "{what} {:.0} ms ({} {:.0} ms)",
         1e3 * pace.whole.as_secs_f64(),
-        texts::HALTED,
+        say("halted"),
         1e3 * pace.halted.as_secs_f64()
     )
 }

@@ -129,6 +129,11 @@ impl<P: PadPort> Gamepad<P> {
         notices
     }
 
+    /// True while a stick is pushed.
+    pub fn asks(&self) -> bool {
+        self.left != DVec2::ZERO || self.right != DVec2::ZERO
+    }
+
     fn moved(&mut self, before: DVec2, after: DVec2) -> DVec2 {
         let after = beyond_dead_zone(after);
         if after != before {

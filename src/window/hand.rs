@@ -14,6 +14,11 @@ pub trait InputDevice {
     /// Where the needle shall be `duration` [s] after it was at `now`. Called once per simulated frame.
     fn pose(&mut self, now: &HandPose, duration: f64) -> HandPose;
 
+    /// True where a pose says where the tip is, whatever the skin; false where it says how far behind the skin, at its point of entry.
+    fn places_the_tip(&self) -> bool {
+        false
+    }
+
     /// When the oldest input came that no pose has had yet; forgets it.
     fn fresh_input(&mut self) -> Option<Instant> {
         None
@@ -40,7 +45,7 @@ const TILT_SPEED: f64 = 0.35;
 
 /// Mouse and keyboard: keys advance at a steady speed, the wheel and a drag set a depth that is gone to at that speed at most. In the
 /// same way the needle is tilted about its point of entry, and the point of entry is moved outside the tissue; on a planned path both
-/// come to nothing ([`super::reach`]).
+/// come to nothing ([`crate::simulation::reach`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Desk {
     /// Speed of a key that is held [m/s].
@@ -111,6 +116,12 @@ impl Desk {
     pub fn ask_shift(&mut self, way: DVec3) {
         self.asked_shift += way.with_z(0.0);
         self.touched();
+    }
+
+    /// True while something is asked of the needle.
+    pub fn asks(&self) -> bool {
+        let drags = self.asked_tilt != DVec3::ZERO || self.asked_shift != DVec3::ZERO;
+        self.asked != 0.0 || drags || self.held.contains(&true)
     }
 
     fn touched(&mut self) {

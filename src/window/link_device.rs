@@ -8,6 +8,7 @@ use crate::commands::view::LinkArgs;
 use crate::error::Result;
 use crate::link::{LinkOptions, LinkServer, LinkState, Pose, RunState, WantedPose, basis_along};
 use crate::needle::motion::HandPose;
+use crate::words::say;
 
 /// Cosine of the flattest direction that has a point of entry: 0.6 degrees above the surface.
 const FLATTEST: f64 = 0.01;
@@ -69,6 +70,10 @@ impl InputDevice for Wanted {
         "OpenIGTLink"
     }
 
+    fn places_the_tip(&self) -> bool {
+        true
+    }
+
     fn pose(&mut self, now: &HandPose, _duration: f64) -> HandPose {
         self.pose.unwrap_or(*now)
     }
@@ -85,7 +90,7 @@ pub fn link_state(practice: &Practice) -> Option<LinkState> {
     let (run, text) = match &practice.state {
         State::Running => (RunState::Running, String::new()),
         State::Paused => (RunState::Paused, String::new()),
-        State::Ended => (RunState::Stopped, super::texts::ENDED.to_string()),
+        State::Ended => (RunState::Stopped, say("ended").to_string()),
         State::Stopped(reason) => (RunState::Stopped, reason.clone()),
     };
     Some(LinkState {

@@ -1,20 +1,27 @@
 //! The panels around the view: what is shown, who leads, forces, energies, health and times.
 
+use egui::Key;
 use egui_plot::{AxisHints, Corner, FilledArea, GridInput, GridMark, Legend, Line, Plot, PlotPoints};
 
 use super::accuracy::Accuracy;
 use super::anatomy_view::Entry;
 use super::appearance::{self, ColourMap, Look};
 use super::camera::{Camera, Preset};
+use super::debriefing::Answer;
 use super::hand::Desk;
 use super::practice::{Leader, Practice, State};
+use super::preferences;
 use super::scene_view::Scale;
-use super::texts;
+use super::screens::Next;
+use super::settings::{Fold, Settings};
+use super::slider::named;
+use super::theme::{self, Tint};
 use crate::haptic::LoopTiming;
 use crate::observables::field::{Field, Range, VON_MISES};
 use crate::observables::{ForceParts, FrameRecord};
 use crate::output::curve::frames_on_the_way_in;
-use crate::training::score::Score;
+use crate::scene::Scene;
+use crate::words::{say, say_of, say_with};
 
 /// What the user has chosen.
 pub struct Choices {
@@ -55,7 +62,7 @@ impl Choices {
 }
 
 /// What the panels ask the window to do.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Wishes {
     pub restart: Option<Leader>,
     pub step: bool,
@@ -66,6 +73,10 @@ pub struct Wishes {
     pub recut: bool,
     /// The attempt is over: what is it worth?
     pub debrief: bool,
+    /// What was clicked in the debriefing.
+    pub answer: Option<Answer>,
+    /// To another screen, or to another attempt.
+    pub next: Option<Next>,
 }
 
 /// A curve that lies behind the live one: depth [mm], force [N].
@@ -75,7 +86,42 @@ pub struct ReferenceCurve {
     pub points: Vec<[f64; 2]>,
 }
 
-/// Buttons and sliders on the left.
+/// Widest and narrowest panels on the left and on the right, and their part of the window.
+const LEFT: (f32, f32, f32) = (200.0, 285.0, 0.23);
+const RIGHT: (f32, f32, f32) = (215.0, 345.0, 0.27);
+
+/// Widths of both panels in a window that is so wide [points]. They keep them whatever they show.
+pub fn widths(window: f32) -> [f32; 2] {
+    [LEFT, RIGHT].map(|(least, most, part)| (part * window).clamp(least, most).round())
+}
+
+/// The bar above the view: the way back, the scene, what is folded, what is chosen for good.
+pub fn bar(ui: &mut egui::Ui, title: &str, settings: &mut Settings, wishes: &mut Wishes, help: &mut bool) {
+    let key = |key| ui.input(|input| input.key_pressed(key));
+    let (left, right, leave) = (key(Key::F2), key(Key::F3), key(Key::F8));
+    ui.horizontal(|ui| {
+        if ui.button(say("bar-start")).on_hover_text("F8").clicked() || leave {
+            wishes.next = Some(Next::Start);
+        }
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            *help |= ui.button(say("help-button")).clicked();
+            preferences::menu(ui, settings);
+            for (part, name, hint, pressed) in
+                [(Fold::Right, "bar-readings", "F3", right), (Fold::Left, "bar-controls", "F2", left)]
+            {
+                let shown = !settings.is_folded(part);
+                if ui.selectable_label(shown, say(name)).on_hover_text(hint).clicked() || pressed {
+                    settings.fold(part, shown);
+                }
+            }
+            ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                ui.add(egui::Label::new(egui::RichText::new(title).strong()).truncate());
+            });
+        });
+    });
+}
+
+/// What stands on the left: the task and the run first, then the needle and the view, behind a fold what an engineer needs.
 pub fn controls(
     ui: &mut egui::Ui,
     practice: &mut Practice,
@@ -84,98 +130,137 @@ pub fn controls(
     desk: &mut Desk,
 ) -> Wishes {
     let mut wishes = Wishes::default();
-    ui.heading(&practice.scene().title);
-    run_buttons(ui, practice, &mut wishes);
-    if let Some(reason) = &practice.unwritten {
-        ui.colored_label(ui.visuals().error_fg_color, format!("{} {reason}", texts::UNWRITTEN));
-        wishes.write_again = ui.button(texts::WRITE_AGAIN).clicked();
-    }
+    ui.spacing_mut().slider_width = (0.34 * ui.available_width()).clamp(60.0, 110.0);
     if let Some(task) = &practice.scene().task {
         ui.group(|ui| {
-            ui.strong(&task.name);
+            ui.set_width(ui.available_width());
+            ui.strong(task_name(practice.scene(), &task.name));
             ui.label(&task.briefing);
         });
     }
-    ui.horizontal(|ui| {
-        for (leader, name) in [(Leader::Hand, texts::HAND), (Leader::Script, texts::SCRIPT)] {
-            if ui.radio(practice.leader == leader, name).clicked() && practice.leader != leader {
-                wishes.restart = Some(leader);
-            }
-        }
-    });
-    ui.add(egui::Slider::new(&mut choices.pace, super::PACES).logarithmic(true).text(texts::PACE));
-    if practice.may_go_back() {
-        let last = practice.records.last().map_or(0.0, |r| r.time);
-        let mut time = last;
-        let slider = ui.add(egui::Slider::new(&mut time, 0.0..=last).text(texts::MOMENT));
-        if slider.changed() && time < last {
-            wishes.go_back = Some(time);
-        }
+    run_buttons(ui, practice, &mut wishes);
+    if let Some(reason) = &practice.unwritten {
+        ui.colored_label(ui.visuals().error_fg_color, format!("{} {reason}", say("unwritten")));
+        wishes.write_again = ui.button(say("write-again")).clicked();
     }
     if practice.leader == Leader::Hand {
         hand(ui, practice, desk);
     }
-    tuning(ui, practice, choices);
     ui.separator();
-    let natural = appearance::parts(ui, &mut choices.look, &choices.parts);
-    if !natural {
-        field(ui, practice, choices);
-    }
-    appearance::controls(ui, &mut choices.look, !practice.scene().targets.is_empty(), natural);
-    let regions = &practice.scene().regions;
-    if !regions.is_empty() && !natural {
-        let names = std::iter::once(texts::REMAINDER).chain(regions.iter().map(|region| region.name.as_str()));
-        wishes.recut |= appearance::layers(ui, &mut choices.look, names);
-    }
-    ui.separator();
-    wishes.recut |= cut(ui, choices);
-    ui.horizontal(|ui| {
-        for (preset, name) in Preset::ALL {
-            if ui.small_button(name).clicked() {
-                camera.preset(preset);
-            }
-        }
-    });
+    wishes.recut |= view(ui, practice, choices, camera);
+    // Who practises a task is not asked about meshes.
+    let engineer = practice.scene().task.is_none();
+    let fold = egui::CollapsingHeader::new(say("engineer")).id_salt(("engineer", engineer)).default_open(engineer);
+    fold.show(ui, |ui| engineering(ui, practice, choices, &mut wishes));
     wishes
 }
 
-/// Run, pause, step, begin anew and finish.
+/// Name of a task in the language of the window.
+fn task_name<'a>(scene: &'a Scene, name: &'a str) -> &'a str {
+    let stem = scene.path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default().replace('_', "-");
+    say_of(&format!("task-{stem}")).unwrap_or(name)
+}
+
+/// Run, pause, begin anew and finish.
 fn run_buttons(ui: &mut egui::Ui, practice: &mut Practice, wishes: &mut Wishes) {
-    ui.horizontal(|ui| {
+    let key = |key| ui.input(|input| input.key_pressed(key));
+    let (again, finish) = (key(Key::F5), key(Key::F6));
+    ui.horizontal_wrapped(|ui| {
         let running = practice.state == State::Running;
         let may_run = matches!(practice.state, State::Running | State::Paused);
-        let label = if running { texts::PAUSE } else { texts::PLAY };
-        if ui.add_enabled(may_run, egui::Button::new(label)).clicked() {
+        let label = if running { say("pause") } else { say("play") };
+        if ui.add_enabled(may_run, egui::Button::new(label)).on_hover_text(say("key-space")).clicked() {
             practice.state = if running { State::Paused } else { State::Running };
         }
-        wishes.step = ui.add_enabled(practice.state == State::Paused, egui::Button::new(texts::STEP)).clicked();
-        if ui.button(texts::RESTART).clicked() {
+        if ui.button(say("restart")).on_hover_text("F5").clicked() || again {
             wishes.restart = Some(practice.leader);
         }
-        let done = egui::Button::new(texts::FINISH);
-        wishes.debrief = ui.add_enabled(!practice.records.is_empty(), done).clicked();
+        let begun = !practice.records.is_empty();
+        let done = ui.add_enabled(begun, egui::Button::new(say("finish"))).on_hover_text("F6");
+        wishes.debrief = done.clicked() || (begun && finish);
     });
+    if practice.tuning.is_busy() {
+        ui.label(say("changing"));
+    } else if practice.waits_for_a_hand() {
+        ui.strong(say("begin"));
+    }
 }
 
 /// What a hand needs to know and to choose.
 fn hand(ui: &mut egui::Ui, practice: &Practice, desk: &mut Desk) {
     let mut speed = desk.speed * 1e3;
     let largest = (practice.speed_limit * 1e3).min(50.0);
-    if ui.add(egui::Slider::new(&mut speed, 0.5..=largest).text(texts::HAND_SPEED)).changed() {
+    if named(ui, egui::Slider::new(&mut speed, 0.5..=largest), say("hand-speed")).changed() {
         desk.speed = speed * 1e-3;
     }
-    ui.small(texts::KEYS);
-    ui.small(if practice.path_is_free() { texts::FREE_PATH } else { texts::PLANNED_PATH });
+    ui.small(say("keys-lead"));
+    if !practice.path_is_free() {
+        ui.small(say("planned-path"));
+    }
+    ui.small(say("keys-more"));
+}
+
+/// From where and how the tissue is seen; true where the cut has changed.
+fn view(ui: &mut egui::Ui, practice: &Practice, choices: &mut Choices, camera: &mut Camera) -> bool {
+    ui.horizontal_wrapped(|ui| {
+        for (preset, name) in Preset::ALL {
+            if ui.small_button(said("seen-from", name)).clicked() {
+                camera.preset(preset);
+            }
+        }
+    });
+    appearance::parts(ui, &mut choices.look, &choices.parts);
+    appearance::controls(ui, &mut choices.look, !practice.scene().targets.is_empty());
+    cut(ui, choices)
+}
+
+/// Who leads and how fast, effects and accuracy, fields and layers.
+fn engineering(ui: &mut egui::Ui, practice: &mut Practice, choices: &mut Choices, wishes: &mut Wishes) {
+    ui.horizontal_wrapped(|ui| {
+        for (leader, name) in [(Leader::Hand, say("hand")), (Leader::Script, say("script"))] {
+            if ui.radio(practice.leader == leader, name).clicked() && practice.leader != leader {
+                wishes.restart = Some(leader);
+            }
+        }
+        wishes.step = ui.add_enabled(practice.state == State::Paused, egui::Button::new(say("step"))).clicked();
+    });
+    named(ui, egui::Slider::new(&mut choices.pace, super::PACES).logarithmic(true), say("pace"));
+    if practice.may_go_back() {
+        let last = practice.records.last().map_or(0.0, |r| r.time);
+        let mut time = last;
+        let slider = named(ui, egui::Slider::new(&mut time, 0.0..=last).max_decimals(2), say("moment"));
+        if slider.changed() && time < last {
+            wishes.go_back = Some(time);
+        }
+    }
+    tuning(ui, practice, choices);
+    ui.separator();
+    if choices.parts.is_empty() || !choices.look.natural {
+        field(ui, practice, choices);
+        appearance::colours(ui, &mut choices.look);
+        let regions = &practice.scene().regions;
+        if !regions.is_empty() {
+            let names = std::iter::once(say("remainder")).chain(regions.iter().map(|region| region.name.as_str()));
+            wishes.recut |= appearance::layers(ui, &mut choices.look, names);
+        }
+    }
+}
+
+/// The text `<kind>-<name>` of something that has an English name; that name where no language has one.
+fn said(kind: &str, name: &'static str) -> &'static str {
+    let key: String =
+        name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
+    say_of(&format!("{kind}-{}", key.replace("--", "-"))).unwrap_or(name)
 }
 
 /// Effects with their sliders, and accuracy against cost.
 fn tuning(ui: &mut egui::Ui, practice: &mut Practice, choices: &mut Choices) {
-    egui::CollapsingHeader::new(texts::EFFECTS).show(ui, |ui| {
+    egui::CollapsingHeader::new(say("effects")).show(ui, |ui| {
         let (scene, tuning) = practice.tunable();
         super::effects_panel::effects(ui, scene, tuning);
         super::effects_panel::saving(ui, tuning, &mut choices.save_as);
     });
-    egui::CollapsingHeader::new(texts::ACCURACY).show(ui, |ui| {
+    egui::CollapsingHeader::new(say("accuracy")).show(ui, |ui| {
         let now = (practice.simulation.model.mesh.cell_count() as u64, practice.simulation.steps_per_frame());
         let timing = practice.timing;
         let (scene, tuning) = practice.tunable();
@@ -185,25 +270,28 @@ fn tuning(ui: &mut egui::Ui, practice: &mut Practice, choices: &mut Choices) {
 
 /// Which field is drawn, and its scale.
 fn field(ui: &mut egui::Ui, practice: &Practice, choices: &mut Choices) {
-    egui::ComboBox::from_label(texts::FIELD).selected_text(choices.scale.field.label).show_ui(ui, |ui| {
+    let name = ui.label(say("field")).id;
+    let list = egui::ComboBox::from_id_salt("field").width(0.9 * ui.available_width()).wrap();
+    let list = list.selected_text(said("field", choices.scale.field.label)).show_ui(ui, |ui| {
         for field in Field::drawn_of(practice.scene()) {
-            if ui.selectable_label(choices.scale.field == field, field.label).clicked() {
+            if ui.selectable_label(choices.scale.field == field, said("field", field.label)).clicked() {
                 choices.scale = default_scale(field);
             }
         }
     });
+    list.response.labelled_by(name);
     let unit = choices.scale.field.unit;
-    ui.checkbox(&mut choices.automatic, texts::AUTOMATIC);
+    ui.checkbox(&mut choices.automatic, say("automatic"));
     ui.add_enabled_ui(!choices.automatic, |ui| {
         let (mut low, mut high) = (unit.show(choices.scale.low), unit.show(choices.scale.high));
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.add(egui::DragValue::new(&mut low).speed(0.1).suffix(format!(" {}", unit.word())));
             ui.add(egui::DragValue::new(&mut high).speed(0.1).suffix(format!(" {}", unit.word())));
         });
         (choices.scale.low, choices.scale.high) = (unit.read(low), unit.read(high.max(low + 1e-6)));
     });
     if matches!(choices.scale.field.range, Range::Positive(_)) {
-        ui.checkbox(&mut choices.scale.logarithmic, texts::LOGARITHMIC);
+        ui.checkbox(&mut choices.scale.logarithmic, say("logarithmic"));
     }
     colour_bar(ui, &choices.scale, choices.look.map);
 }
@@ -211,10 +299,10 @@ fn field(ui: &mut egui::Ui, practice: &Practice, choices: &mut Choices) {
 /// Where the tissue is cut open; true where that changed.
 fn cut(ui: &mut egui::Ui, choices: &mut Choices) -> bool {
     let mut recut = false;
-    ui.label(texts::CUT);
+    let name = ui.label(say("cut")).id;
     ui.horizontal(|ui| {
         let mut axis = choices.cut.map(|(axis, _)| axis);
-        for (value, name) in [(None, texts::NO_CUT), (Some(0), "x"), (Some(1), "y"), (Some(2), "z")] {
+        for (value, name) in [(None, say("no-cut")), (Some(0), "x"), (Some(1), "y"), (Some(2), "z")] {
             if ui.radio(axis == value, name).clicked() {
                 axis = value;
                 choices.cut = value.map(|axis| (axis, 0.5));
@@ -223,7 +311,7 @@ fn cut(ui: &mut egui::Ui, choices: &mut Choices) -> bool {
         }
     });
     if let Some((_, at)) = &mut choices.cut {
-        recut |= ui.add(egui::Slider::new(at, 0.0..=1.0).show_value(false)).changed();
+        recut |= ui.add(egui::Slider::new(at, 0.0..=1.0).show_value(false)).labelled_by(name).changed();
     }
     recut
 }
@@ -248,13 +336,16 @@ fn colour_bar(ui: &mut egui::Ui, scale: &Scale, map: ColourMap) {
     }
     let unit = scale.field.unit;
     let middle = if scale.logarithmic { (scale.low * scale.high).sqrt() } else { 0.5 * (scale.low + scale.high) };
-    ui.columns(3, |columns| {
-        columns[0].label(format!("{:.2}", unit.show(scale.low)));
-        columns[1].vertical_centered(|ui| ui.label(format!("{:.2}", unit.show(middle))));
-        columns[2].with_layout(egui::Layout::right_to_left(egui::Align::TOP), |ui| {
-            ui.label(format!("{:.2} {}", unit.show(scale.high), unit.word()))
-        });
-    });
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    let colour = ui.visuals().text_color();
+    let (line, _) = ui.allocate_exact_size(egui::vec2(rect.width(), 1.2 * font.size), egui::Sense::hover());
+    for (at, align, text) in [
+        (line.left_top(), egui::Align2::LEFT_TOP, format!("{:.2}", unit.show(scale.low))),
+        (line.center_top(), egui::Align2::CENTER_TOP, format!("{:.2}", unit.show(middle))),
+        (line.right_top(), egui::Align2::RIGHT_TOP, format!("{:.2} {}", unit.show(scale.high), unit.word())),
+    ] {
+        ui.painter().text(at, align, text, font.clone(), colour);
+    }
 }
 
 /// Lines of the depth axis: 1, 2 or 5 times a power of ten apart, with room for a number at each.
@@ -272,7 +363,7 @@ fn depth_label(mark: GridMark) -> String {
     format!("{:.decimals$}", mark.value)
 }
 
-/// Force against depth, numbers and lights on the right.
+/// Force against depth on the right, behind a fold the numbers and lights of an engineer.
 pub fn readings(
     ui: &mut egui::Ui,
     practice: &Practice,
@@ -281,34 +372,42 @@ pub fn readings(
     haptic: Option<LoopTiming>,
 ) {
     let Some(record) = practice.records.last() else {
-        ui.label(texts::NOTHING_YET);
+        ui.label(say("nothing-yet"));
         return;
     };
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let error = record.force_error.map_or(String::new(), |e| format!(" \u{b1} {e:.3}"));
         ui.heading(format!("{:.3}{error} N", record.force.axial));
-        ui.label(format!("{} {:.2} mm", texts::AT_DEPTH, record.depth * 1e3));
+        ui.label(format!("{} {:.2} mm", say("at-depth"), record.depth * 1e3));
     });
-    ui.checkbox(&mut choices.show_parts, texts::PARTS);
-    ui.checkbox(&mut choices.error_bar, texts::ERROR_BAR);
-    if let Some(why) = &practice.no_band {
-        ui.label(why);
-    }
-    force_plot(ui, practice, choices.show_parts, reference);
-    numbers(ui, practice, record, haptic);
-    lights(ui, record);
-    if let Some(why) = record.verdict.sentence() {
-        ui.colored_label(egui::Color32::from_rgb(230, 159, 0), format!("{}: {why}", texts::DOUBTFUL));
-    }
     match &practice.state {
         State::Stopped(reason) => {
-            ui.colored_label(egui::Color32::from_rgb(230, 159, 0), format!("{}\n{reason}", texts::STOPPED));
+            ui.colored_label(Tint::Caution.of(ui), format!("{}\n{reason}", say("stopped")));
         }
         State::Ended => {
-            ui.label(texts::ENDED);
+            ui.label(say("ended"));
         }
         State::Running | State::Paused => {}
     }
+    if let Some(why) = record.verdict.sentence() {
+        // A trainee is not asked about the balance of energies.
+        match practice.scene().task {
+            Some(_) => ui.colored_label(Tint::Caution.of(ui), say("doubtful-task")).on_hover_text(why),
+            None => ui.colored_label(Tint::Caution.of(ui), format!("{}: {why}", say("doubtful"))),
+        };
+    }
+    force_plot(ui, practice, choices.show_parts, reference);
+    ui.checkbox(&mut choices.show_parts, say("parts"));
+    ui.checkbox(&mut choices.error_bar, say("error-bar"));
+    if let Some(why) = &practice.no_band {
+        ui.label(why);
+    }
+    let engineer = practice.scene().task.is_none();
+    let fold = egui::CollapsingHeader::new(say("figures")).id_salt(("figures", engineer)).default_open(engineer);
+    fold.show(ui, |ui| {
+        numbers(ui, practice, record, haptic);
+        lights(ui, record);
+    });
 }
 
 /// Force against depth, before the curves that it is compared with.
@@ -318,36 +417,39 @@ fn force_plot(ui: &mut egui::Ui, practice: &Practice, show_parts: bool, referenc
         let every = practice.records.len().div_ceil(1500).max(1);
         practice.records.iter().step_by(every).map(|r| [r.depth * 1e3, of(&r.force)]).collect()
     };
+    let colours: Vec<egui::Color32> = ForceParts::PARTS.iter().map(|part| theme::line(ui, part.colour)).collect();
+    let (main, beside) = (theme::line(ui, Tint::Main.bytes(ui)), Tint::Beside.of(ui));
     Plot::new("force")
         .height((0.4 * ui.available_height()).max(140.0))
         // Powers of ten would leave a narrow plot of some millimetres without a number.
         .x_grid_spacer(depth_marks)
         .custom_x_axes(vec![
             AxisHints::new_x()
-                .label(texts::DEPTH_AXIS)
+                .label(say("depth-axis"))
                 .label_spacing(egui::Rangef::new(16.0, 28.0))
                 .formatter(|mark, _| depth_label(mark)),
         ])
-        .y_axis_label(texts::FORCE_AXIS)
+        .y_axis_label(say("force-axis"))
+        // Room for the numbers in the corner.
+        .set_margin_fraction(egui::vec2(0.06, 0.14))
         .legend(Legend::default().position(Corner::LeftTop))
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
         .show(ui, |plot| {
             for [depths, lower, upper] in band(&practice.records) {
-                let area = FilledArea::new(texts::BAND, &depths, &lower, &upper);
+                let area = FilledArea::new(say("band"), &depths, &lower, &upper);
                 plot.add(area.fill_color(egui::Color32::from_rgba_unmultiplied(0, 114, 178, 90)));
             }
             for curve in reference {
                 let line = Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone()));
-                plot.line(line.color(egui::Color32::GRAY).width(1.5));
+                plot.line(line.color(beside).width(1.5));
             }
-            plot.line(Line::new(texts::AXIAL, curve(&|f| f.axial)).width(2.0).color(egui::Color32::WHITE));
+            plot.line(Line::new(say("axial"), curve(&|f| f.axial)).width(2.0).color(main));
             if show_parts {
-                for part in &ForceParts::PARTS {
-                    let [r, g, b] = part.colour;
+                for (part, colour) in ForceParts::PARTS.iter().zip(&colours) {
                     let points = curve(&|f| (part.of)(f));
-                    plot.line(Line::new(part.name, points).color(egui::Color32::from_rgb(r, g, b)));
+                    plot.line(Line::new(said("force", part.name), points).color(*colour));
                 }
             }
         });
@@ -375,83 +477,67 @@ fn band(records: &[FrameRecord]) -> Vec<[Vec<f64>; 3]> {
 
 /// What the last frame has, and how fast the run goes.
 fn numbers(ui: &mut egui::Ui, practice: &Practice, record: &FrameRecord, haptic: Option<LoopTiming>) {
-    egui::Grid::new("numbers").num_columns(2).striped(true).show(ui, |ui| {
+    // Names go on in the next line where there is no room for both columns.
+    let half = 0.56 * ui.available_width();
+    egui::Grid::new("numbers").num_columns(2).striped(true).max_col_width(half).show(ui, |ui| {
         let mut row = |name: &str, value: String| {
             ui.label(name);
             ui.label(value);
             ui.end_row();
         };
         let largest = practice.records.iter().map(|r| r.force.axial).fold(0.0, f64::max);
-        row(texts::LARGEST_FORCE, format!("{largest:.3} N"));
-        row(texts::ASIDE, format!("{:.3} N", record.force.lateral.length()));
-        row(texts::WORK, format!("{:.2} mJ", record.energy.external * 1e3));
-        row(texts::STORED, format!("{:.2} mJ", record.energy.elastic * 1e3));
-        row(texts::FRICTION, format!("{:.2} mJ", record.energy.friction * 1e3));
-        row(texts::CUTTING, format!("{:.2} mJ", record.energy.cutting * 1e3));
-        row(texts::FRAMES, format!("{:.0} /s", practice.timing.frames_per_second()));
-        row(texts::PHYSICS, format!("{:.1} ms", practice.timing.physics * 1e3));
+        row(say("largest-force"), format!("{largest:.3} N"));
+        row(say("aside"), format!("{:.3} N", record.force.lateral.length()));
+        row(say("work"), format!("{:.2} mJ", record.energy.external * 1e3));
+        row(say("stored"), format!("{:.2} mJ", record.energy.elastic * 1e3));
+        row(say("friction"), format!("{:.2} mJ", record.energy.friction * 1e3));
+        row(say("cutting"), format!("{:.2} mJ", record.energy.cutting * 1e3));
+        row(say("frames"), format!("{:.0} /s", practice.timing.frames_per_second()));
+        row(say("physics"), format!("{:.1} ms", practice.timing.physics * 1e3));
         let factor = practice.timing.real_time_factor();
-        row(texts::REAL_TIME, if factor > 0.0 { format!("{factor:.2}") } else { "-".into() });
+        row(say("real-time"), if factor > 0.0 { format!("{factor:.2}") } else { "-".into() });
         if practice.leader == Leader::Hand {
             let latency = practice.latency;
-            let told = format!("{} frame(s), {:.0} ms", latency.most_frames, latency.mean * 1e3);
-            row(texts::LATENCY, if latency.count > 0 { told } else { "-".into() });
-            row(texts::TOO_FAST, format!("{}", practice.limited_frames));
+            let places =
+                [("frames", latency.most_frames.into()), ("milliseconds", format!("{:.0}", latency.mean * 1e3).into())];
+            let told = say_with("latency-told", &places);
+            row(say("latency"), if latency.count > 0 { told } else { "-".into() });
+            row(say("too-fast"), format!("{}", practice.limited_frames));
         }
         if let Some(timing) = haptic {
-            row(texts::HAPTIC_RATE, format!("{:.0} /s", timing.rate()));
+            row(say("haptic-rate"), format!("{:.0} /s", timing.rate()));
             let told = format!("{:.1} ms, {:.1} ms", timing.longest_gap * 1e3, timing.latency * 1e3);
-            row(texts::HAPTIC_GAP, told);
+            row(say("haptic-gap"), told);
         }
     });
 }
 
 /// Whether the run is healthy.
 fn lights(ui: &mut egui::Ui, record: &FrameRecord) {
-    ui.horizontal_wrapped(|ui| {
+    ui.vertical(|ui| {
         let imbalance = record.verdict.worst_imbalance;
         let bound = crate::verdict::Quantity::EnergyImbalance.bound();
         let stops = bound.stop.map_or(f64::INFINITY, |stop| stop.0);
         light(
             ui,
-            texts::ENERGY_LIGHT,
+            say("energy-light"),
             &format!("{:.2} %", 100.0 * imbalance),
             imbalance <= bound.ok,
             imbalance <= stops,
         );
         let clamped = record.health.clamped_nodes;
-        light(ui, texts::CLAMPED_LIGHT, &clamped.to_string(), clamped == 0, clamped < 10);
+        light(ui, say("clamped-light"), &clamped.to_string(), clamped == 0, clamped < 10);
         let inverted = record.health.inverted_cells;
-        light(ui, texts::INVERTED_LIGHT, &inverted.to_string(), inverted == 0, inverted < 5);
+        light(ui, say("inverted-light"), &inverted.to_string(), inverted == 0, inverted < 5);
     });
-}
-
-/// What an attempt was worth; false where it was closed.
-pub fn debriefing(context: &egui::Context, score: &Score, progress: &[(u32, u64, f64)]) -> bool {
-    let mut open = true;
-    egui::Window::new(texts::DEBRIEFING).open(&mut open).default_width(620.0).show(context, |ui| {
-        egui::ScrollArea::vertical().max_height(480.0).show(ui, |ui| {
-            ui.monospace(score.text());
-            if progress.len() > 1 {
-                let points: PlotPoints = progress.iter().map(|(n, _, value)| [f64::from(*n), *value]).collect();
-                Plot::new("progress")
-                    .height(140.0)
-                    .x_axis_label(texts::ATTEMPT)
-                    .y_axis_label(texts::PROGRESS)
-                    .allow_scroll(false)
-                    .show(ui, |plot| plot.line(Line::new(texts::PROGRESS, points)));
-            }
-        });
-    });
-    open
 }
 
 /// A sign that does not need its colour to be read: a tick, a warning or a cross with its value.
 fn light(ui: &mut egui::Ui, name: &str, value: &str, good: bool, bearable: bool) {
     let (sign, colour) = match (good, bearable) {
-        (true, _) => ("ok", egui::Color32::from_rgb(86, 180, 233)),
-        (_, true) => ("!", egui::Color32::from_rgb(240, 228, 66)),
-        _ => ("!!", egui::Color32::from_rgb(213, 94, 0)),
+        (true, _) => ("ok", Tint::Good.of(ui)),
+        (_, true) => ("!", Tint::Caution.of(ui)),
+        _ => ("!!", Tint::Bad.of(ui)),
     };
     ui.colored_label(colour, format!("{name}: {value} {sign}"));
 }

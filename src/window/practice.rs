@@ -4,33 +4,33 @@
 //! [`Practice::finish`].
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
 use super::band::Band;
-use super::hand::InputDevice;
-use super::reach::Reach;
+use super::hand::{InputDevice, Recording};
 use super::source::Source;
-use super::texts;
+pub use super::times::{Latency, Timing};
 use super::tuning::{Taken, Tuning};
+use super::written::{Written, session_file};
 use crate::gpu::Gpu;
 use crate::needle::motion::HandPose;
 use crate::observables::FrameRecord;
 use crate::output::{DrivenFace, OutputFolder, Tables};
 use crate::scene::Scene;
-use crate::session::{SESSION, SceneChange, Session, SessionFile};
-use crate::simulation::advice::tool_mach;
+use crate::session::{SceneChange, Session};
+use crate::simulation::change;
 use crate::simulation::checkpoint::Checkpoint;
+use crate::simulation::reach::{Reach, speed_limit};
 use crate::simulation::{Purpose, Simulation};
 use crate::training::kinematic::Sample;
 use crate::training::score::Score;
+use crate::words::say;
 use crate::{Error, Result};
 
-/// Tool speed over the scaled shear wave speed beyond which inertia, not tissue, answers the hand.
-const LARGEST_MACH: f64 = 0.3;
-
-/// Frames between two moments of a script that one can go back to, and how many of them are kept.
+/// Frames between two moments of a script, or of an attempt that is seen again, that one can go back to: half a second. Beyond so many of
+/// them every second one goes, and from there on they lie twice as far apart.
 const MARK_EVERY: usize = 30;
 const MOST_MARKS: usize = 64;
 
@@ -65,87 +65,8 @@ pub enum State {
     Stopped(String),
 }
 
-/// Times of the last frames [s].
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Timing {
-    /// Simulated time of a frame.
-    pub simulated: f64,
-    /// Wall time from the start of a frame to its results, smoothed.
-    pub physics: f64,
-    /// Wall time from one drawn frame to the next, smoothed.
-    pub between: f64,
-    /// Wall time for which the run has been on, and what was simulated in it.
-    pub running: f64,
-    pub done: f64,
-}
-
-/// How long inputs took until the hand felt them.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Latency {
-    /// Inputs that were measured.
-    pub count: u64,
-    /// Frames of the tissue that ended between an input and its force, the frame that has it included; most of all.
-    pub most_frames: u64,
-    /// Wall time, mean and longest [s].
-    pub mean: f64,
-    pub longest: f64,
-}
-
-impl Latency {
-    fn add(&mut self, frames: u64, time: f64) {
-        self.count += 1;
-        self.most_frames = self.most_frames.max(frames);
-        self.mean += (time - self.mean) / self.count as f64;
-        self.longest = self.longest.max(time);
-    }
-}
-
-impl Timing {
-    /// Takes a wall time into a mean over about ten frames.
-    fn smooth(mean: &mut f64, value: f64) {
-        *mean = if *mean == 0.0 { value } else { 0.9 * *mean + 0.1 * value };
-    }
-
-    /// Simulated over wall time while the run was on.
-    pub fn achieved(&self) -> f64 {
-        if self.running > 0.0 { self.done / self.running } else { 0.0 }
-    }
-
-    /// Simulated time over wall time that the physics alone would reach.
-    pub fn real_time_factor(&self) -> f64 {
-        if self.physics > 0.0 { self.simulated / self.physics } else { 0.0 }
-    }
-
-    pub fn frames_per_second(&self) -> f64 {
-        if self.between > 0.0 { 1.0 / self.between } else { 0.0 }
-    }
-}
-
 fn purpose(leader: Leader) -> Purpose {
     Purpose { led: leader == Leader::Hand, drawn: true, lanes: true }
-}
-
-/// Largest speed of a hand that is let through [m/s].
-fn speed_limit(simulation: &Simulation) -> f64 {
-    let script = simulation.model.scene.motion.largest_speed();
-    let wave = tool_mach(&simulation.model).map(|mach| script / mach);
-    wave.map_or(f64::INFINITY, |wave| LARGEST_MACH * wave).max(script)
-}
-
-/// Where an attempt is written to.
-struct Written {
-    folder: OutputFolder,
-    tables: Tables,
-    /// Where a hand leads.
-    session: Option<SessionFile>,
-}
-
-/// The file of what a hand does.
-fn session_file(folder: &OutputFolder, leader: Leader, session: &Session) -> Result<Option<SessionFile>> {
-    match leader {
-        Leader::Hand => SessionFile::create(&folder.file(SESSION), session).map(Some),
-        Leader::Script => Ok(None),
-    }
 }
 
 /// One attempt.
@@ -160,6 +81,8 @@ pub struct Practice {
     pub unwritten: Option<String>,
     pub simulation: Simulation,
     pub leader: Leader,
+    /// Who leads the attempt behind this one.
+    next_leader: Leader,
     pub state: State,
     pub tuning: Tuning,
     pub records: Vec<FrameRecord>,
@@ -175,8 +98,13 @@ pub struct Practice {
     pub latency: Latency,
     /// The next frame is the first after a change: what it takes longer is part of it.
     freshly_changed: bool,
-    /// Moments of a script that one can go back to.
+    /// Moments that one can go back to, and the frames between two of them.
     marks: Vec<Checkpoint>,
+    mark_every: usize,
+    /// An attempt that is seen again: where its hand led the needle, frame by frame.
+    replay: Option<Vec<HandPose>>,
+    /// The moment that it is on its way to [s].
+    heading: Option<f64>,
     /// The user wants a band around the force; why there is none, where there cannot be one.
     wants_band: bool,
     band: Option<Band>,
@@ -228,7 +156,7 @@ impl Practice {
                 Some(Written { folder, tables, session: file })
             }
         };
-        let speed_limit = speed_limit(&simulation);
+        let speed_limit = speed_limit(&simulation.model);
         let simulated = simulation.steps_per_frame() as f64 * simulation.dt();
         Ok(Practice {
             tuning: Tuning::new(source),
@@ -239,6 +167,7 @@ impl Practice {
             unwritten: None,
             simulation,
             leader,
+            next_leader: leader,
             state: State::Paused,
             records: Vec::new(),
             session,
@@ -250,6 +179,9 @@ impl Practice {
             latency: Latency::default(),
             freshly_changed: false,
             marks: Vec::new(),
+            mark_every: MARK_EVERY,
+            replay: None,
+            heading: None,
             wants_band: false,
             band: None,
             no_band: None,
@@ -268,7 +200,7 @@ impl Practice {
             return;
         }
         if !self.session.changes.is_empty() {
-            self.no_band = Some(texts::BAND_ENDED.into());
+            self.no_band = Some(say("band-ended").into());
             return;
         }
         match Band::of(&self.simulation, &self.tuning.source, &self.session.poses) {
@@ -294,30 +226,43 @@ impl Practice {
     /// The companion does not know what was changed in a scene that runs.
     fn end_band(&mut self) {
         if self.band.take().is_some() {
-            self.no_band = Some(texts::BAND_ENDED.into());
+            self.no_band = Some(say("band-ended").into());
         }
     }
 
-    /// The same from the beginning.
-    ///
-    /// # Errors
-    /// As [`Practice::new`].
-    pub fn again(&mut self, leader: Leader) -> Result<()> {
-        self.save()?;
-        let (scene, source, gpu) = (self.scene.clone(), self.tuning.source.clone(), self.gpu.clone());
-        let simulation = Simulation::for_purpose(scene.clone(), Some(gpu.clone()), purpose(leader))?;
-        self.begin(simulation, scene, source, leader)
+    /// The same from the beginning: made ready on a thread, and taken by [`Practice::take_changes`]. The run waits meanwhile.
+    pub fn again(&mut self, leader: Leader) {
+        if self.state == State::Running {
+            self.state = State::Paused;
+        }
+        self.next_leader = leader;
+        self.tuning.wish_for(self.tuning.coming().clone(), change::Reach::Start);
+    }
+
+    /// Where the attempt of a number goes: `out`, `out_2`, `out_3`, ...
+    pub fn folder_of(out: &Path, attempt: u32) -> PathBuf {
+        match attempt {
+            1 => out.to_path_buf(),
+            n => PathBuf::from(format!("{}_{n}", out.display())),
+        }
+    }
+
+    /// The same as attempt number `attempt` of those that go to `out`.
+    pub fn counted_from(self, out: Option<PathBuf>, attempt: u32) -> Self {
+        Practice { out, attempt, ..self }
+    }
+
+    /// Number of the attempt behind this one; one without a frame leaves its place to the next, and seeing one again is none.
+    pub fn next_attempt(&self) -> u32 {
+        self.attempt + u32::from(!self.records.is_empty() && self.replay.is_none())
     }
 
     /// Begins with a simulation at its beginning.
     fn begin(&mut self, simulation: Simulation, scene: Scene, source: Source, leader: Leader) -> Result<()> {
         let gpu = self.gpu.clone();
-        let (out, attempt) = (self.out.clone(), self.attempt + u32::from(!self.records.is_empty()));
-        // The attempt before keeps its folder; one without a frame leaves its place to the next.
-        let folder = out.as_deref().map(|out| match attempt {
-            1 => out.to_path_buf(),
-            n => PathBuf::from(format!("{}_{n}", out.display())),
-        });
+        let (out, attempt) = (self.out.clone(), self.next_attempt());
+        // The attempt before keeps its folder.
+        let folder = out.as_deref().map(|out| Self::folder_of(out, attempt));
         self.written = None;
         // What the window was opened with stays what one goes back to.
         let first = self.tuning.opened_with();
@@ -326,6 +271,94 @@ impl Practice {
         next.show_band(self.wants_band);
         *self = Practice { out, attempt, latency: self.latency, ..next };
         Ok(())
+    }
+
+    /// Begins the attempt again as it was, led by what the hand did. Nothing of it is written; one can go to any moment of it.
+    ///
+    /// # Errors
+    /// As [`Practice::new`]; `Error::Input` where no hand led, and where the scene was changed meanwhile.
+    pub fn see_again(&mut self) -> Result<()> {
+        self.save()?;
+        let poses = match &self.replay {
+            Some(poses) => poses.clone(),
+            None if self.may_see_again() => self.session.poses.clone(),
+            None => return Err(Error::input(say("replay-refused"), say("replay-refused-way-out"))),
+        };
+        let (scene, source, gpu) = (self.scene.clone(), self.tuning.source.clone(), self.gpu.clone());
+        let simulation = Simulation::for_purpose(scene.clone(), Some(gpu.clone()), purpose(Leader::Hand))?;
+        let (out, attempt, first) = (self.out.take(), self.next_attempt(), self.tuning.opened_with());
+        let mut next = Practice::with(simulation, scene, source, gpu, Leader::Hand, None, false)?;
+        next.tuning.set_opened_with(first);
+        *self = Practice { out, attempt, latency: self.latency, replay: Some(poses), ..next };
+        Ok(())
+    }
+
+    /// True where a hand led, and the scene stayed what it was.
+    pub fn may_see_again(&self) -> bool {
+        self.leader == Leader::Hand && self.session.changes.is_empty() && !self.session.poses.is_empty()
+    }
+
+    /// True while an attempt is seen again.
+    pub fn is_replay(&self) -> bool {
+        self.replay.is_some()
+    }
+
+    /// Length of the attempt that is seen again [frames].
+    pub fn replay_frames(&self) -> usize {
+        self.replay.as_ref().map_or(0, Vec::len)
+    }
+
+    /// Goes to a moment of an attempt that is seen again [s]: back at once, ahead by [`Practice::catch_up`]. Call it between frames.
+    ///
+    /// # Errors
+    /// `Error::Device`.
+    pub fn go_to(&mut self, time: f64) -> Result<()> {
+        if self.records.last().is_some_and(|r| r.time > time) {
+            self.go_back(time)?;
+        }
+        self.heading = Some(time);
+        Ok(())
+    }
+
+    /// The moment that an attempt that is seen again is on its way to [s].
+    pub fn heading(&self) -> Option<f64> {
+        self.heading
+    }
+
+    /// True where frames are to be computed to get there.
+    pub fn is_heading(&self) -> bool {
+        self.heading.is_some()
+    }
+
+    /// Computes frames towards the moment that was asked for, for about `budget`; call it between frames.
+    ///
+    /// # Errors
+    /// As [`Practice::finish`].
+    pub fn catch_up(&mut self, budget: Duration) -> Result<()> {
+        let (begin, state) = (Instant::now(), self.state.clone());
+        while let Some(time) = self.heading {
+            let reached = self.end_of_next().is_none_or(|end| end > time + 1e-9);
+            if reached {
+                self.heading = None;
+            } else if begin.elapsed() >= budget {
+                break;
+            } else {
+                // The poses of the attempt lead, whatever hand is there.
+                let mut nobody = Recording::new(Vec::new());
+                self.start(&mut nobody)?;
+                self.finish(&mut nobody)?;
+            }
+        }
+        if !matches!(self.state, State::Ended | State::Stopped(_)) {
+            self.state = state;
+        }
+        Ok(())
+    }
+
+    /// End of the next frame of an attempt that is seen again [s]; `None` behind its last.
+    fn end_of_next(&self) -> Option<f64> {
+        let more = matches!(self.state, State::Running | State::Paused) && self.records.len() < self.replay_frames();
+        more.then(|| self.simulation.end_of(self.records.len() as u64))
     }
 
     /// Makes the changes that a session made before its next frame.
@@ -356,7 +389,8 @@ impl Practice {
     /// # Errors
     /// What befalls the engine, and what the folder of a new attempt cannot take.
     pub fn take_changes(&mut self) -> Result<Renewed> {
-        let taken = match self.tuning.take(&mut self.simulation, &self.gpu, purpose(self.leader)) {
+        // Other kernels serve the attempt that runs.
+        let taken = match self.tuning.take(&mut self.simulation, &self.gpu, purpose(self.next_leader)) {
             Ok(taken) => taken,
             Err(error @ (Error::Diverged { .. } | Error::Device(_))) => {
                 self.state = State::Stopped(error.to_string());
@@ -370,7 +404,7 @@ impl Practice {
             Taken::Engine => Renewed::Buffers,
             Taken::Simulation(source, simulation) => {
                 self.save()?;
-                let (leader, runs) = (self.leader, self.state == State::Running);
+                let (leader, runs) = (self.next_leader, self.state == State::Running);
                 let paces = std::mem::take(&mut self.tuning.paces);
                 self.begin(*simulation, source.scene()?, source, leader)?;
                 self.tuning.paces = paces;
@@ -386,7 +420,7 @@ impl Practice {
         self.end_band();
         self.session.changes.push(SceneChange { frame, overrides: self.tuning.source.overrides.clone() });
         self.scene = self.tuning.source.scene()?;
-        self.speed_limit = speed_limit(&self.simulation);
+        self.speed_limit = speed_limit(&self.simulation.model);
         self.freshly_changed = true;
         // What was before had other constants.
         self.marks.clear();
@@ -418,14 +452,23 @@ impl Practice {
     /// # Errors
     /// `Error::Device`.
     pub fn start(&mut self, hand: &mut dyn InputDevice) -> Result<()> {
-        if let Some(now) = self.simulation.hand() {
+        if let Some(poses) = &self.replay {
+            // None is left: nothing is started, and the run is at its end.
+            if let Some(pose) = poses.get(self.session.poses.len()).copied() {
+                self.session.poses.push(pose);
+                self.simulation.lead(&pose);
+                if let Some(band) = &mut self.band {
+                    band.lead(&pose);
+                }
+            }
+        } else if let Some(now) = self.simulation.hand() {
             // Nothing is under way: what ends next has the input.
             self.fresh = hand.fresh_input().map(|since| (since, self.records.len() as u64));
             // The first frame is a single step: the way of a whole frame in it would be a blow that stores energy no work paid for.
             let first = self.session.poses.is_empty();
             let duration = if first { self.simulation.end_of(0) } else { self.timing.simulated };
             let wanted = hand.pose(&now, duration);
-            let pose = self.within_reach(&now, wanted, duration);
+            let pose = self.within_reach(&now, wanted, duration, hand.places_the_tip());
             self.session.poses.push(pose);
             self.simulation.lead(&pose);
             if let Some(band) = &mut self.band {
@@ -436,14 +479,20 @@ impl Practice {
         self.simulation.start_frames()
     }
 
+    /// True before the first frame of an attempt that a hand leads: its first input begins it.
+    pub fn waits_for_a_hand(&self) -> bool {
+        self.leader == Leader::Hand && self.state == State::Paused && self.records.is_empty()
+    }
+
     /// True where a hand may choose the angle and the point of entry.
     pub fn path_is_free(&self) -> bool {
         self.simulation.model.puncture.as_ref().is_some_and(|p| p.free.is_some())
     }
 
     /// What the tissue can follow of what the hand wants.
-    fn within_reach(&mut self, now: &HandPose, wanted: HandPose, duration: f64) -> HandPose {
+    fn within_reach(&mut self, now: &HandPose, wanted: HandPose, duration: f64, places_the_tip: bool) -> HandPose {
         let reach = Reach::of(&self.simulation.model, self.speed_limit);
+        let wanted = if places_the_tip { reach.behind_the_skin(wanted) } else { wanted };
         let (pose, limited) = reach.within(now, &wanted, duration);
         self.limited_frames += u64::from(limited);
         pose
@@ -530,20 +579,30 @@ impl Practice {
         (self.leader == Leader::Hand && self.session.write(&place).is_ok()).then_some(place)
     }
 
-    /// True where one can go back: a script is watched, and nothing of it is written.
+    /// True where one can go back: a script is watched, or an attempt seen again, and nothing of it is written.
     pub fn may_go_back(&self) -> bool {
-        self.leader == Leader::Script && self.written.is_none() && !self.marks.is_empty()
+        self.is_marked() && !self.marks.is_empty()
+    }
+
+    fn is_marked(&self) -> bool {
+        (self.leader == Leader::Script || self.replay.is_some()) && self.written.is_none()
     }
 
     /// Keeps this moment, where one may want to go back to it.
     fn mark(&mut self) -> Result<()> {
-        if self.leader == Leader::Script
-            && self.written.is_none()
-            && self.marks.len() < MOST_MARKS
-            && self.records.len() % MARK_EVERY == 1
-        {
-            self.marks.push(self.simulation.checkpoint()?);
+        // The first frame is a mark whatever their distance: there is always one to go back to.
+        if !self.is_marked() || self.records.len() % self.mark_every != 1 {
+            return Ok(());
         }
+        if self.marks.len() == MOST_MARKS {
+            self.mark_every *= 2;
+            let every = self.mark_every as u64;
+            self.marks.retain(|mark| mark.frames % every == 1);
+            if self.records.len() % self.mark_every != 1 {
+                return Ok(());
+            }
+        }
+        self.marks.push(self.simulation.checkpoint()?);
         Ok(())
     }
 
@@ -557,7 +616,11 @@ impl Practice {
         let Some(index) = self.marks.iter().rposition(before) else { return Ok(()) };
         self.marks.truncate(index + 1);
         self.simulation.resume(&self.marks[index])?;
+        self.simulation.forget_the_lead();
         self.records.truncate(place(&self.marks[index]));
+        if self.replay.is_some() {
+            self.session.poses.truncate(self.records.len());
+        }
         if let Some(band) = &mut self.band {
             band.go_back(&mut self.records);
         }
@@ -590,11 +653,7 @@ impl Practice {
     /// # Errors
     /// `Error::Input` where nothing was recorded. A folder that takes no scores is told in the window.
     pub fn debrief(&mut self, reference: Option<&Score>) -> Result<Score> {
-        let sample = |record: &FrameRecord| {
-            let pose = self.simulation.tool_pose(record.time)?;
-            Some(Sample { time: record.time, tip: pose.tip, direction: pose.direction })
-        };
-        let samples: Vec<Sample> = self.records.iter().filter_map(sample).collect();
+        let samples = self.samples();
         let mut score = Score::of(&self.scene, &samples, &self.records, reference)?;
         if let State::Stopped(reason) = &self.state {
             score.fail(reason.clone());
@@ -607,6 +666,17 @@ impl Practice {
             self.hold_back(error);
         }
         Ok(score)
+    }
+
+    /// The needle at the end of a frame that was recorded.
+    pub fn sample(&self, record: &FrameRecord) -> Option<Sample> {
+        let pose = self.simulation.tool_pose(record.time)?;
+        Some(Sample { time: record.time, tip: pose.tip, direction: pose.direction })
+    }
+
+    /// The same of all frames.
+    pub fn samples(&self) -> Vec<Sample> {
+        self.records.iter().filter_map(|record| self.sample(record)).collect()
     }
 
     /// Where the tool is drawn: tip and direction at the end of the last frame that was started.

@@ -5,13 +5,14 @@ use glam::DVec3;
 use super::marks;
 use super::practice::Practice;
 use super::probe::{ATTENUATION, Orientation, Probe, ProbePlane};
-use super::texts;
+use super::slider::named;
 use super::tool_shape::{ToolCorner, ToolPlace};
 use super::ultrasound::{SIZE, Ultrasound, Window};
 use crate::Result;
 use crate::gpu::Gpu;
 use crate::mesh::Mesh;
 use crate::scene::Scene;
+use crate::words::say;
 
 /// Largest gain and time gain of the sliders [dB], [dB/cm].
 const GAIN: f64 = 20.0;
@@ -97,7 +98,7 @@ fn depth_scale(painter: &egui::Painter, picture: egui::Rect, window: &Window) {
         let (from, to) = (picture.right() + 2.0, picture.right() + if long { 10.0 } else { 6.0 });
         painter.hline(from..=to, y, egui::Stroke::new(1.0, colour));
         if long {
-            let text = if depth == 0 { texts::MILLIMETRES.to_string() } else { depth.to_string() };
+            let text = if depth == 0 { say("millimetres").to_string() } else { depth.to_string() };
             let at = egui::pos2(to + 2.0, y);
             painter.text(at, egui::Align2::LEFT_CENTER, text, egui::FontId::proportional(11.0), colour);
         }
@@ -106,9 +107,9 @@ fn depth_scale(painter: &egui::Painter, picture: egui::Rect, window: &Window) {
 
 fn settings(ui: &mut egui::Ui, probe: &mut Probe, scene: &Scene, mesh: &Mesh) {
     ui.spacing_mut().slider_width = 90.0;
-    ui.strong(texts::ULTRASOUND);
+    ui.strong(say("ultrasound"));
     ui.horizontal(|ui| {
-        for (orientation, name) in [(Orientation::Along, texts::ALONG), (Orientation::Across, texts::ACROSS)] {
+        for (orientation, name) in [(Orientation::Along, say("along")), (Orientation::Across, say("across"))] {
             if ui.radio(probe.orientation == orientation, name).clicked() {
                 (probe.orientation, probe.offset) = (orientation, 0.0);
             }
@@ -116,14 +117,14 @@ fn settings(ui: &mut egui::Ui, probe: &mut Probe, scene: &Scene, mesh: &Mesh) {
     });
     let [low, high] = reach(probe, scene, mesh).map(|offset| offset * 1e3);
     let mut offset = probe.offset * 1e3;
-    ui.add(egui::Slider::new(&mut offset, low..=high).fixed_decimals(1).text(texts::SLICE_OFFSET));
+    named(ui, egui::Slider::new(&mut offset, low..=high).fixed_decimals(1), say("slice-offset"));
     probe.offset = offset * 1e-3;
-    ui.add(egui::Slider::new(&mut probe.gain, -GAIN..=GAIN).fixed_decimals(0).text(texts::GAIN));
+    named(ui, egui::Slider::new(&mut probe.gain, -GAIN..=GAIN).fixed_decimals(0), say("gain"));
     let mut time_gain = probe.time_gain * 1e-2;
-    ui.add(egui::Slider::new(&mut time_gain, 0.0..=TIME_GAIN).fixed_decimals(1).text(texts::TIME_GAIN));
+    named(ui, egui::Slider::new(&mut time_gain, 0.0..=TIME_GAIN).fixed_decimals(1), say("time-gain"));
     // The slider's steps must not move the value that it begins with.
     probe.time_gain = if (time_gain * 1e2 - ATTENUATION).abs() < 1.0 { ATTENUATION } else { time_gain * 1e2 };
-    ui.add(egui::Label::new(egui::RichText::new(texts::ILLUSTRATION).weak()).wrap());
+    ui.add(egui::Label::new(egui::RichText::new(say("illustration")).weak()).wrap());
 }
 
 /// How far the slice can be moved and still be in the tissue [m].

@@ -1,6 +1,7 @@
 //! Draws tissue and needle from the solver's own buffers, on the solver's own device.
 
 use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
 use wgpu::util::DeviceExt;
 
 use super::anatomy_view::{self, AnatomyView};
@@ -75,7 +76,7 @@ pub struct SceneView {
     /// Materials that are seen through there, as in [`Look::through`].
     through: u32,
     depth: Option<(wgpu::Extent3d, wgpu::TextureView)>,
-    /// Parts in natural colours, where the scene has labels.
+    /// Parts in natural colours, of a block whose faces do not part.
     anatomy: Option<AnatomyView>,
 }
 
@@ -169,14 +170,14 @@ impl SceneView {
         let veil_bindings = bindings(device, &veil, &resources);
         let layer_bindings = bindings(device, &layer_veil, &resources);
         let tool_bindings = bindings(device, &tool, &[view.as_entire_binding()]);
-        let anatomy = model.scene.case.as_ref().and_then(|_| {
+        let anatomy = {
             let source = format!("{SHADER}{}", anatomy_view::SHADER);
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some("anatomy"),
                 source: wgpu::ShaderSource::Wgsl(gpu.drawing(&source)),
             });
             AnatomyView::new(gpu, model, &module, format, (&view, &drawn[0]))
-        });
+        };
         let nothing = || {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: None,
@@ -223,7 +224,7 @@ impl SceneView {
     /// As [`SceneView::new`].
     pub fn take_model(&mut self, gpu: &Gpu, engine: &GpuEngine, model: &Model) -> Result<bool> {
         // Another cell edge or another patient: the surfaces lie in other cells.
-        if self.copies.is_some() == model.separation.pairs.is_empty() || model.scene.case.is_some() {
+        if self.copies.is_some() == model.separation.pairs.is_empty() || self.anatomy.is_some() {
             return Ok(false);
         }
         (self.rest, self.copies) = mesh_buffers(&gpu.device, model);
@@ -264,6 +265,11 @@ impl SceneView {
         if let Some(anatomy) = &mut self.anatomy {
             anatomy.cut(gpu, model, plane);
         }
+    }
+
+    /// Names of parts in natural colours, and where they are written, at rest [m].
+    pub fn anchors(&self) -> &[(String, DVec3)] {
+        self.anatomy.as_ref().map_or(&[], AnatomyView::anchors)
     }
 
     /// Puts the tool, and what else stands in the view, to its place.

@@ -1,4 +1,5 @@
-//! The needle as triangles: rings around its centre-line from the tip to the hub.
+//! The needle as triangles: rings around its centre-line from the tip to the hub, with a mark every centimetre and the hub in the colour
+//! of its diameter (ISO 6009).
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -11,7 +12,80 @@ const AROUND: usize = 24;
 const ALONG: usize = 48;
 
 /// How far a needle is drawn behind its tip [m].
-const DRAWN_LENGTH: f64 = 60e-3;
+const DRAWN_LENGTH: f64 = 100e-3;
+
+/// Distance of the depth marks, and their width [m]; every fifth is as wide again.
+const MARK_EVERY: f64 = 10e-3;
+const MARK_WIDTH: f64 = 0.6e-3;
+const MARK: [u8; 4] = [32, 34, 40, 255];
+
+/// Radius and length of the hub [m].
+const HUB_RADIUS: f64 = 2.1e-3;
+const HUB_LENGTH: f64 = 14e-3;
+
+/// Outer diameters [m] and the colours of their hubs, sRGB. Source: ISO 6009:2016; the standard gives names of colours, these stand for
+/// them.
+const HUBS: [(f64, [u8; 3]); 17] = [
+    (0.3e-3, [240, 205, 40]),
+    (0.33e-3, [205, 40, 40]),
+    (0.36e-3, [40, 140, 135]),
+    (0.4e-3, [145, 148, 150]),
+    (0.45e-3, [125, 75, 40]),
+    (0.5e-3, [235, 125, 30]),
+    (0.55e-3, [130, 85, 160]),
+    (0.6e-3, [30, 70, 160]),
+    (0.7e-3, [45, 45, 48]),
+    (0.8e-3, [20, 100, 60]),
+    (0.9e-3, [240, 205, 40]),
+    (1.1e-3, [240, 230, 200]),
+    (1.2e-3, [240, 150, 175]),
+    (1.4e-3, [170, 50, 110]),
+    (1.6e-3, [240, 240, 240]),
+    (1.8e-3, [125, 145, 165]),
+    (2.1e-3, [150, 205, 150]),
+];
+
+/// Colour of the hub of a needle.
+fn hub_colour(needle: &NeedleShape) -> [u8; 4] {
+    let off = |d: f64| (d - 2.0 * needle.radius).abs();
+    let nearest = HUBS.into_iter().reduce(|best, next| if off(next.0) < off(best.0) { next } else { best });
+    let [r, g, b] = nearest.map_or([STEEL[0], STEEL[1], STEEL[2]], |(_, colour)| colour);
+    [r, g, b, 255]
+}
+
+/// The marks on a shaft: begin and end behind the tip [m].
+fn marks(needle: &NeedleShape, length: f64) -> Vec<(f64, f64)> {
+    let count = (length / MARK_EVERY).floor() as usize;
+    (1..=count)
+        .map(|n| (n as f64 * MARK_EVERY, if n.is_multiple_of(5) { 2.0 * MARK_WIDTH } else { MARK_WIDTH }))
+        .map(|(s, width)| (s - 0.5 * width, s + 0.5 * width))
+        .filter(|(begin, end)| *begin > needle.tip_length && *end < length)
+        .collect()
+}
+
+/// Distances behind the tip where a shaft has rings [m]: at its ends, between them where it bends, at its marks.
+fn shaft_rings(needle: &NeedleShape, length: f64, is_bent: bool) -> Vec<f64> {
+    let between = if is_bent { 1 } else { ALONG };
+    let even = (0..=ALONG).step_by(between);
+    let mut rings: Vec<f64> =
+        even.map(|n| needle.tip_length + (length - needle.tip_length) * n as f64 / ALONG as f64).collect();
+    rings.extend(marks(needle, length).into_iter().flat_map(|(begin, end)| [begin, end]));
+    rings.sort_by(f64::total_cmp);
+    rings
+}
+
+/// The hub behind a shaft.
+fn hub(needle: &NeedleShape, length: f64, place: &ToolPlace) -> Vec<ToolCorner> {
+    let colour = hub_colour(needle);
+    let profile = [
+        (length, 0.0),
+        (length, 0.6 * HUB_RADIUS),
+        (length + 0.35 * HUB_LENGTH, HUB_RADIUS),
+        (length + HUB_LENGTH, HUB_RADIUS),
+        (length + HUB_LENGTH, 0.0),
+    ];
+    revolve(&profile, place, &|_, _| 0.0, &|_| colour)
+}
 
 /// Steel, and what lies in a bore; sRGB and how much of it is drawn.
 pub const STEEL: [u8; 4] = [178, 184, 194, 255];
@@ -74,6 +148,8 @@ pub fn triangles(tool: &Tool, place: &ToolPlace) -> Vec<ToolCorner> {
 
 fn needle_triangles(needle: &NeedleShape, place: &ToolPlace) -> Vec<ToolCorner> {
     let length = needle.length.min(DRAWN_LENGTH);
+    let marked = marks(needle, length);
+    let steel = |s: f64| if marked.iter().any(|(_, end)| *end == s) { MARK } else { STEEL };
     let shaft = |n: usize| needle.tip_length + (length - needle.tip_length) * n as f64 / ALONG as f64;
     if let Some(bore) = needle.bore {
         // The needle is open where it holds a core: outer wall, bore, core.
@@ -93,26 +169,28 @@ fn needle_triangles(needle: &NeedleShape, place: &ToolPlace) -> Vec<ToolCorner> 
             let profile: Vec<(f64, f64)> = [(0.0, 0.0)].into_iter().chain(along).chain([(core, 0.0)]).collect();
             corners.extend(revolve(&profile, place, &|_, _| 0.0, &|_| CORE));
         }
+        corners.extend(hub(needle, length, place));
         return corners;
     }
-    // A straight shaft has no rings between its ends.
-    let between = if place.line.is_none() { ALONG } else { 1 };
-    match needle.tip {
+    let rings = shaft_rings(needle, length, place.line.is_some());
+    let mut corners = match needle.tip {
         TipShape::Bevel { heading } => {
             // The ground face: at the angle phi from the heading the tube begins further back.
             let back = move |phi: f64, s: f64| {
                 if s > 0.0 { 0.0 } else { 0.5 * needle.tip_length * (1.0 - (phi - heading).cos()) }
             };
             let mut profile = vec![(0.0, 0.0), (0.0, needle.radius)];
-            profile.extend((0..=ALONG).step_by(between).map(|n| (shaft(n), needle.radius)));
-            revolve(&profile, place, &back, &|_| STEEL)
+            profile.extend(rings.into_iter().map(|s| (s, needle.radius)));
+            revolve(&profile, place, &back, &steel)
         }
         _ => {
             let mut profile = vec![(0.0, 0.0), (needle.tip_length, needle.radius)];
-            profile.extend((0..=ALONG).step_by(between).skip(1).map(|n| (shaft(n), needle.radius)));
-            revolve(&profile, place, &|_, _| 0.0, &|_| STEEL)
+            profile.extend(rings.into_iter().skip(1).map(|s| (s, needle.radius)));
+            revolve(&profile, place, &|_, _| 0.0, &steel)
         }
-    }
+    };
+    corners.extend(hub(needle, length, place));
+    corners
 }
 
 /// Turns a profile (distance behind the tip, radius) around the centre-line; `back(angle, s)`: how far a corner is set back;
@@ -162,11 +240,25 @@ mod tests {
         let place = ToolPlace::straight(tip, DVec3::NEG_Z);
         let corners = triangles(&Tool::Needle(needle), &place);
         let lowest = corners.iter().map(|c| c.place[2]).fold(f32::INFINITY, f32::min);
-        let widest =
-            corners.iter().map(|c| (f64::from(c.place[0]) - tip.x).hypot(f64::from(c.place[1]))).fold(0.0, f64::max);
+        let shaft = |c: &&ToolCorner| f64::from(c.place[2]) < tip.z + 0.099;
+        let widest = corners
+            .iter()
+            .filter(shaft)
+            .map(|c| (f64::from(c.place[0]) - tip.x).hypot(f64::from(c.place[1])))
+            .fold(0.0, f64::max);
         assert!((f64::from(lowest) - tip.z).abs() < 1e-8 && (widest / 0.825e-3 - 1.0).abs() < 1e-3);
         assert!(corners.iter().all(|c| (DVec3::from(c.normal.map(f64::from)).length() - 1.0).abs() < 1e-5));
         assert_eq!(corners.len() % 3, 0);
+        // A mark every centimetre, ten of them but the one at the hub; the hub of 16G is white.
+        let mut marks: Vec<i64> = corners
+            .iter()
+            .filter(|c| c.colour == MARK)
+            .map(|c| ((f64::from(c.place[2]) - tip.z) * 100.0).round() as i64)
+            .collect();
+        marks.sort_unstable();
+        marks.dedup();
+        assert_eq!(marks, (1..=9).collect::<Vec<i64>>());
+        assert!(corners.iter().any(|c| c.colour == [240, 240, 240, 255]));
     }
 
     #[test]
@@ -184,6 +276,6 @@ mod tests {
         let glass = corners.iter().filter(|c| c.colour[3] < 255);
         assert!(glass.clone().count() > 0 && glass.clone().all(|c| c.place[2] < -2.9e-3));
         let empty = triangles(&Tool::Needle(needle), &ToolPlace { core: 0.0, ..place });
-        assert!(empty.iter().all(|c| c.colour == STEEL));
+        assert!(empty.iter().all(|c| c.colour == STEEL || c.place[2] > 0.091));
     }
 }

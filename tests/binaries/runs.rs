@@ -8,9 +8,15 @@ mod checkpoint;
 mod common;
 #[path = "../error_bar.rs"]
 mod error_bar;
+#[path = "../lesson.rs"]
+mod lesson;
+#[path = "../mistakes.rs"]
+mod mistakes;
 #[path = "../scenes/main.rs"]
 mod scenes;
 #[path = "../session.rs"]
 mod session;
+#[path = "../teaching.rs"]
+mod teaching;
 #[path = "../training.rs"]
 mod training;

@@ -2,10 +2,16 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../debriefing.rs"]
+mod debriefing;
+#[path = "../layout.rs"]
+mod layout;
 #[path = "../panels.rs"]
 mod panels;
 #[path = "../practice.rs"]
 mod practice;
+#[path = "../teacher_screen.rs"]
+mod teacher_screen;
 #[path = "../ultrasound.rs"]
 mod ultrasound;
 #[path = "../window.rs"]

@@ -125,6 +125,14 @@ pub fn execute(args: &ImportArgs, start: Instant) -> Result<u8> {
     run::execute(&run, start)
 }
 
+/// What a file of a patient holds, in lines for people.
+///
+/// # Errors
+/// Where it cannot be read or is of no kind that is read here.
+pub fn told(file: &Path) -> Result<String> {
+    Ok(Content::read(file, "mm".parse()?, None)?.text())
+}
+
 fn check_gauge(gauge: &str) -> Result<()> {
     if needles::needle(gauge).is_some() {
         return Ok(());

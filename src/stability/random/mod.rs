@@ -28,7 +28,7 @@
 //! | solver | safety 0.3 to 0.9, an own step up to 0.9 of the stable one, damping up to 200/s, hourglass stiffness 0.03 to 1 |
 
 mod generator;
-mod numbers;
+pub mod numbers;
 mod reasonable;
 mod report;
 mod runner;

@@ -48,6 +48,12 @@ impl Numbers {
         (self.bits() % count as u64) as usize
     }
 
+    /// From the normal distribution of mean 0 and deviation 1 (Box and Muller 1958).
+    pub fn normal(&mut self) -> f64 {
+        // 1 - x is never 0.
+        (-2.0 * (1.0 - self.unit()).ln()).sqrt() * (std::f64::consts::TAU * self.unit()).cos()
+    }
+
     pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
         from[self.below(from.len())]
     }

@@ -8,6 +8,8 @@ use crate::{Error, Result};
 /// What a session may come to: how many pictures were drawn, how fast, and how the run stands.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ViewOutcome {
+    /// A scene was shown; all figures but the last of the devices are those of the last one.
+    pub practised: bool,
     pub pictures: u64,
     /// Wall time from the start of the program to the first picture [s].
     pub first_picture: f64,
@@ -38,6 +40,9 @@ impl ViewOutcome {
     pub fn text(self) -> Result<String> {
         if let Some(reason) = self.stopped {
             return Err(Error::Device(reason));
+        }
+        if !self.practised {
+            return Ok("the window was closed, no scene was opened".into());
         }
         let latency = self.latency;
         let felt = match latency.count {

@@ -2,29 +2,30 @@
 
 use std::time::{Duration, Instant};
 
-use super::Open;
+use super::practice_screen::PracticeScreen;
+use super::stage::{PICTURE, Stage};
 use crate::Result;
 use crate::window::hand::InputDevice;
-use crate::window::panels::{ReferenceCurve, Wishes};
+use crate::window::panels::Wishes;
 use crate::window::practice::{Renewed, State};
+use crate::window::settings::Settings;
 
-/// Shortest time between two pictures [s].
-const PICTURE: f64 = 1.0 / 60.0;
 /// Longest time between two pictures while the tissue lags behind [s].
 const SLOWEST_PICTURE: f64 = 1.0 / 21.0;
 /// Longest simulated time that is made up for [s].
 const DEBT: f64 = 0.2;
-/// Pictures after which pauses are counted.
-const WARM_UP: u64 = 5;
 /// Time between two looks at the range of the field [s].
 const LOOK_AT_RANGE: f64 = 0.4;
 
-impl Open {
+impl PracticeScreen {
     /// True where a frame of the tissue is due. Time that a picture took is made up for; a slow machine shows slow motion and owes
     /// nothing beyond that.
     fn frame_is_due(&mut self) -> bool {
         let passed = self.counted.elapsed().as_secs_f64();
         self.counted = Instant::now();
+        if self.practice.waits_for_a_hand() && self.recording.is_none() && self.devices.asks(&self.desk) {
+            self.practice.state = State::Running;
+        }
         if self.practice.state != State::Running {
             self.due = 0.0;
             // An input that nothing answers is no latency.
@@ -42,90 +43,68 @@ impl Open {
     }
 
     /// Draws a picture, and computes the frame of the tissue that is due beside it.
-    pub(super) fn picture(&mut self, reference: &[ReferenceCurve]) -> Result<Wishes> {
+    pub(super) fn picture(&mut self, stage: &mut Stage, settings: &mut Settings) -> Result<Wishes> {
         let begin = Instant::now();
-        self.next = begin + Duration::from_secs_f64(PICTURE);
+        stage.next = begin + Duration::from_secs_f64(PICTURE);
         self.devices.tend(&mut self.practice, &self.desk);
-        let due = std::mem::take(&mut self.ahead) || self.start_if_due()?;
+        let due = std::mem::take(&mut self.ahead) || self.start_if_due(stage)?;
         // Tissue that lags behind goes first, as long as the eye does not see it.
         let late = self.due >= self.practice.timing.simulated;
         if due && late && self.shown.elapsed().as_secs_f64() < SLOWEST_PICTURE {
-            self.next = begin;
-            self.finish()?;
+            stage.next = begin;
+            self.finish(stage)?;
             return Ok(Wishes::default());
         }
         self.shown = begin;
         let mut wishes = Wishes::default();
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let panels = self.panels_are_due().then(|| self.run_panels(reference, &mut wishes));
-        self.draw(&mut encoder, panels)?;
+        let mut encoder = stage.gpu.device.create_command_encoder(&Default::default());
+        let panels = self.panels_are_due(stage).then(|| self.run_panels(stage, settings, &mut wishes));
+        self.draw(stage, &mut encoder, panels)?;
         // Nothing to show it on: the tissue goes on, the picture is left out.
-        let shown = match self.surface.get_current_texture() {
-            wgpu::CurrentSurfaceTexture::Success(texture) | wgpu::CurrentSurfaceTexture::Suboptimal(texture) => {
-                Some(texture).filter(|shown| shown.texture.size() == self.canvas.size())
-            }
-            wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
-                self.surface.configure(&self.gpu.device, &self.config);
-                None
-            }
-            _ => None,
-        };
-        if let Some(shown) = &shown {
-            let (from, to) = (self.canvas.as_image_copy(), shown.texture.as_image_copy());
-            encoder.copy_texture_to_texture(from, to, self.canvas.size());
-        }
-        self.gpu.queue.submit([encoder.finish()]);
+        let shown = stage.copied(&mut encoder);
+        stage.gpu.queue.submit([encoder.finish()]);
         if wishes.step && !due {
-            self.start()?;
+            self.start(stage)?;
         }
         if due || wishes.step {
-            self.finish()?;
+            self.finish(stage)?;
         }
         // A software adapter shows a picture by copying it, on this thread: the tissue goes on meanwhile.
         let wished = wishes != Wishes::default() || self.practice.tuning.waits();
-        self.ahead = self.gpu.is_software() && !wished && self.start_if_due()?;
-        if let Some(shown) = shown {
-            self.window.pre_present_notify();
-            self.gpu.queue.present(shown);
-            self.pictures += 1;
+        self.ahead = stage.gpu.is_software() && !wished && self.start_if_due(stage)?;
+        if stage.present(shown) {
             self.practice.drawn();
-            // The first pictures wait for their shaders.
-            if let Some(before) = self.presented.replace(Instant::now())
-                && self.pictures > WARM_UP
-            {
-                self.longest_pause = self.longest_pause.max(before.elapsed().as_secs_f64());
-            }
         }
-        self.gpu.check()?;
+        stage.gpu.check()?;
         if self.choices.automatic && self.ranged.is_none_or(|at| at.elapsed().as_secs_f64() >= LOOK_AT_RANGE) {
             self.ranged = Some(begin);
-            self.follow_range()?;
+            self.follow_range(&stage.gpu)?;
         }
         Ok(wishes)
     }
 
-    fn start_if_due(&mut self) -> Result<bool> {
+    fn start_if_due(&mut self, stage: &mut Stage) -> Result<bool> {
         let due = self.frame_is_due();
         if due {
-            self.start()?;
+            self.start(stage)?;
         }
         Ok(due)
     }
 
     /// Waits for the frame that was begun ahead, if one was: nothing is under way then.
-    pub(super) fn settle(&mut self) -> Result<()> {
+    pub(super) fn settle(&mut self, stage: &mut Stage) -> Result<()> {
         match std::mem::take(&mut self.ahead) {
-            true => self.finish(),
+            true => self.finish(stage),
             false => Ok(()),
         }
     }
 
     /// Gives the device the next frame.
-    fn start(&mut self) -> Result<()> {
+    fn start(&mut self, stage: &mut Stage) -> Result<()> {
         if let Some(session) = &self.recorded
             && self.practice.follow(session)? == Renewed::Buffers
         {
-            self.take_buffers()?;
+            self.take_buffers(stage)?;
         }
         match &mut self.recording {
             Some(recording) => self.practice.start(recording),
@@ -134,15 +113,16 @@ impl Open {
     }
 
     /// Waits for the frame that was given.
-    fn finish(&mut self) -> Result<()> {
+    fn finish(&mut self, stage: &mut Stage) -> Result<()> {
         let inputs = self.practice.latency.count;
         match &mut self.recording {
             Some(recording) => self.practice.finish(recording)?,
             None => self.practice.finish(&mut self.devices.with(&mut self.desk))?,
         }
         self.devices.felt(&self.practice);
+        self.lesson.tend(&self.practice);
         // The force that answers an input is read at once.
-        self.stale |= self.practice.latency.count > inputs;
+        stage.stale |= self.practice.latency.count > inputs;
         Ok(())
     }
 }

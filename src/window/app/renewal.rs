@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::Open;
+use super::practice_screen::PracticeScreen;
+use super::stage::Stage;
 use crate::Result;
 use crate::gpu::compose::{SOURCES, read_sources};
 use crate::reading;
@@ -14,9 +15,9 @@ use crate::window::scene_view::SceneView;
 use crate::window::section::RestPlane;
 use crate::window::source::Source;
 
-impl Open {
+impl PracticeScreen {
     /// Cuts the tissue, and sees through layers, as the choices say.
-    pub(super) fn cut(&mut self) {
+    pub(super) fn cut(&mut self, stage: &Stage) {
         let model = &self.practice.simulation.model;
         let (low, high) = model.mesh.bounds();
         let plane = self.choices.cut.map(|(axis, at)| {
@@ -25,21 +26,21 @@ impl Open {
             let sign = if axis == 2 { 1.0 } else { -1.0 };
             RestPlane { normal: DVec3::AXES[axis] * sign, offset: sign * along }
         });
-        self.view.cut(&self.gpu, model, plane, self.choices.look.through);
+        self.view.cut(&stage.gpu, model, plane, self.choices.look.through);
     }
 
     /// After a restart: the buffers are new.
-    pub(super) fn rebind(&mut self) -> Result<()> {
+    pub(super) fn rebind(&mut self, stage: &mut Stage) -> Result<()> {
         let model = self.practice.simulation.model.clone();
         if let Some(engine) = self.practice.simulation.on_device()
-            && !self.view.take_model(&self.gpu, engine, &model)?
+            && !self.view.take_model(&stage.gpu, engine, &model)?
         {
-            self.view = SceneView::new(&self.gpu, engine, &model, self.config.format)?;
+            self.view = SceneView::new(&stage.gpu, engine, &model, stage.config.format)?;
         }
         self.choices.parts = legend(&model);
-        self.scan.close(&mut self.painter);
-        self.cut();
-        self.alive.writes_to(self.practice.folder());
+        self.scan.close(&mut stage.painter);
+        self.cut(stage);
+        stage.alive.writes_to(self.practice.folder());
         self.due = 0.0;
         Ok(())
     }
@@ -64,10 +65,10 @@ impl Open {
     }
 
     /// After a change of effects: the engine is new, the mesh and all that is drawn of it the same.
-    pub(super) fn take_buffers(&mut self) -> Result<()> {
-        self.scan.close(&mut self.painter);
+    pub(super) fn take_buffers(&mut self, stage: &mut Stage) -> Result<()> {
+        self.scan.close(&mut stage.painter);
         match self.practice.simulation.on_device() {
-            Some(engine) => self.view.take_buffers(&self.gpu, engine),
+            Some(engine) => self.view.take_buffers(&stage.gpu, engine),
             None => Ok(()),
         }
     }

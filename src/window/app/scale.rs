@@ -1,17 +1,17 @@
 //! The scale of the colours follows what the field holds.
 
-use super::Open;
+use super::practice_screen::PracticeScreen;
 use crate::Result;
-use crate::gpu::Memory;
+use crate::gpu::{Gpu, Memory};
 use crate::observables::field::{Lane, Range};
 use crate::window::panels;
 
 /// Part of the nodes that may lie beyond the automatic scale.
 const BEYOND_SCALE: f64 = 0.002;
 
-impl Open {
+impl PracticeScreen {
     /// Brings the ends of the scale to what the field holds now.
-    pub(super) fn follow_range(&mut self) -> Result<()> {
+    pub(super) fn follow_range(&mut self, gpu: &Gpu) -> Result<()> {
         let scale = &mut self.choices.scale;
         let (Lane::Node(lane), Range::Positive(_) | Range::Signed(_)) = (scale.field.lane, scale.field.range) else {
             *scale = panels::default_scale(scale.field);
@@ -19,7 +19,7 @@ impl Open {
         };
         let Some(engine) = self.practice.simulation.on_device() else { return Ok(()) };
         let Some(buffer) = engine.memory("drawn_nodes").and_then(Memory::buffer) else { return Ok(()) };
-        let bytes = self.gpu.read_back(buffer)?;
+        let bytes = gpu.read_back(buffer)?;
         let mut values: Vec<f32> =
             bytes.chunks_exact(16).map(|b| bytemuck::pod_read_unaligned::<[f32; 4]>(b)[lane].abs()).collect();
         values.sort_unstable_by(f32::total_cmp);
