@@ -28,13 +28,16 @@ pub struct FacePair {
     pub tip_driven: Option<f64>,
 }
 
+/// In [`Separation::tie_of`]: tied to nothing.
+pub const NO_TIE: u32 = u32::MAX;
+
 /// Which pairs exist, and what is tied.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Separation {
     pub pairs: Vec<FacePair>,
     /// Groups of tied copies, each ascending.
     pub ties: Vec<Vec<u32>>,
-    /// Index into `ties` per node; `u32::MAX` for a node that is tied to nothing. Empty without doubled lines.
+    /// Index into `ties` per node; [`NO_TIE`] for a node that is tied to nothing. Empty without doubled lines.
     pub tie_of: Vec<u32>,
 }
 
@@ -203,7 +206,7 @@ fn groups(root: &mut [u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
     for node in 0..root.len() as u32 {
         members.entry(find(root, node)).or_default().push(node);
     }
-    let mut tie_of = vec![u32::MAX; root.len()];
+    let mut tie_of = vec![NO_TIE; root.len()];
     let ties: Vec<Vec<u32>> = members.into_values().filter(|m| m.len() > 1).collect();
     for (tie, members) in ties.iter().enumerate() {
         members.iter().for_each(|n| tie_of[*n as usize] = tie as u32);

@@ -1,6 +1,8 @@
 //! A label map: a small number per voxel that says what is there, and where the voxels lie in the patient.
 
 use std::collections::BTreeMap;
+use std::fmt;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::{DMat3, DVec3};
 
@@ -8,7 +10,7 @@ use glam::{DMat3, DVec3};
 pub const MOST_VOXELS: usize = 300_000_000;
 
 /// Labels on a regular grid of voxels, in patient coordinates RAS (x to the right, y to the front, z to the head).
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Clone, PartialEq, Default)]
 pub struct LabelMap {
     /// Voxels along i, j, k.
     pub size: [usize; 3],
@@ -20,6 +22,21 @@ pub struct LabelMap {
     pub labels: Vec<u16>,
     /// Names that the file gives to labels.
     pub names: BTreeMap<u16, String>,
+}
+
+/// A hash stands for the labels: scenes are told apart by this text, and written out millions of labels took longer than a scene to load.
+impl fmt::Debug for LabelMap {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let mut hasher = DefaultHasher::new();
+        self.labels.hash(&mut hasher);
+        f.debug_struct("LabelMap")
+            .field("size", &self.size)
+            .field("steps", &self.steps)
+            .field("origin", &self.origin)
+            .field("labels", &format_args!("{:016x}", hasher.finish()))
+            .field("names", &self.names)
+            .finish()
+    }
 }
 
 impl LabelMap {
@@ -150,6 +167,18 @@ mod tests {
         assert_eq!(map.label_at(behind), 0);
         assert_eq!(map.label_at(map.position(2, 0, 0) - map.steps * DVec3::new(0.0, 0.51, 0.0)), 0);
         assert_eq!([f64::NAN, f64::INFINITY, 1e300, -1e300].map(|x| map.label_at(DVec3::splat(x))), [0; 4]);
+    }
+
+    #[test]
+    fn maps_are_told_apart_by_their_text_without_all_labels_in_it() {
+        let map = leaning();
+        let mut other = map.clone();
+        other.labels[5] = 1;
+        let text = |map: &LabelMap| format!("{map:?}");
+        assert_eq!(text(&map), text(&leaning()));
+        assert_ne!(text(&map), text(&other));
+        let many = LabelMap { labels: vec![1; 100_000], ..map };
+        assert!(text(&many).len() < 500, "{}", text(&many).len());
     }
 
     #[test]

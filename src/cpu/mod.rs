@@ -17,6 +17,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 use lanes::LaneCells;
 pub use lanes::unknown_to_lanes;
+use needle_contact::NearNodes;
 use rayon::prelude::*;
 
 use crate::effects::adhesion::Bond;
@@ -60,6 +61,9 @@ pub struct CpuEngine {
     /// Largest nodal speed [m/s] and centres of the faces at rest [m], which look at all of a mesh of tetrahedra.
     speed_limit: f64,
     face_centres: [DVec3; 6],
+    /// Rest positions of the nodes [m], and the columns of the tip's anchors, which a bent grid works out with much ado.
+    rest: Vec<DVec3>,
+    anchor_columns: Arc<[tip::Column]>,
     info: EngineInfo,
     state: State,
     /// True where lanes were asked for; cells in lanes; without them they are in `cells`.
@@ -74,6 +78,8 @@ pub struct CpuEngine {
     /// Force across the needle on every anchor of a free tip [N].
     tip_sway: DVec3,
     contact_energy: f64,
+    /// Contact nodes of a free path that are looked at.
+    near: Option<NearNodes>,
     /// In the scheme `opening`: how far the tip advanced in this step, and how far the dimple shifted the path with it [m].
     advanced: [f64; 2],
     /// True in the last step of a frame, at which energies are told.
@@ -133,7 +139,7 @@ impl CpuEngine {
             Err(unknown) => format!("f64: lanes do not know {unknown}"),
         };
         let lanes = lanes.ok();
-        let bytes = nodes * (3 * size_of::<DVec3>() + 8)
+        let bytes = nodes * (4 * size_of::<DVec3>() + 8)
             + lanes.as_ref().map_or(cells * size_of::<CellForces>(), LaneCells::bytes)
             + state.stiffness.len() * 8
             + state.points.len() * (size_of::<PointState>() + model.prony_term_count() * size_of::<DMat3>())
@@ -143,6 +149,8 @@ impl CpuEngine {
             dt,
             speed_limit: model.speed_limit(dt),
             face_centres: Face::ALL.map(|face| model.face_centre(face)),
+            rest: (0..nodes).map(|node| model.mesh.rest_position(node)).collect(),
+            anchor_columns: tip::anchor_columns(&model),
             info: EngineInfo {
                 engine: if wants_lanes { "cpu" } else { "cpu64" }.into(),
                 adapter: format!("{} CPU threads, {arithmetic}", rayon::current_num_threads()),
@@ -160,6 +168,7 @@ impl CpuEngine {
             tip_energy: 0.0,
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
+            near: NearNodes::of(&model),
             advanced: [0.0; 2],
             measures: false,
             opening_elastic: 0.0,
@@ -197,7 +206,15 @@ impl CpuEngine {
             copies().for_each(|n| (forces[n], bounds[n]) = sum);
         }
         (self.state, self.sums) = kept;
+        self.look_at_all();
         (forces, bounds)
+    }
+
+    /// The state is another one: what the contact knew of its nodes means nothing.
+    fn look_at_all(&mut self) {
+        if let Some(near) = &mut self.near {
+            near.is_stale = true;
+        }
     }
 
     /// All stages but the last: forces and stiffness bounds.
@@ -243,6 +260,18 @@ impl CpuEngine {
         match &self.lanes {
             Some(lanes) => lanes.team().each(count, work),
             None => (0..count).into_par_iter().map(work).collect(),
+        }
+    }
+
+    /// Calls `work` with ranges that make up `0..count`, on all threads; results in their order.
+    fn in_ranges<R: Send>(&self, count: usize, work: impl Fn(std::ops::Range<usize>) -> R + Sync + Send) -> Vec<R> {
+        let ranges = |part: usize| (0..count).step_by(part).map(move |first| first..(first + part).min(count));
+        match &self.lanes {
+            Some(lanes) => {
+                let team = lanes.team();
+                team.map(ranges(team.part(count)), |_, range| work(range))
+            }
+            None => ranges(2048).collect::<Vec<_>>().into_par_iter().map(work).collect(),
         }
     }
 
@@ -321,33 +350,40 @@ impl CpuEngine {
     fn measure_stored(&mut self) {
         let (model, elements, state) = (&self.model, &self.elements, &self.state);
         let states = CellStates { points: &state.points, stiffness: &state.stiffness };
-        let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
-        let measures: Vec<CellMeasure> = (0..model.mesh.cell_count())
-            .into_par_iter()
-            .map(|cell| elements.measure(model, cell, &state.displacement, averaged.as_ref().map(|a| a[cell]), states))
-            .collect();
+        let in_f64 = || -> Vec<CellMeasure> {
+            let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
+            let of = |cell: usize| averaged.as_ref().map(|a| a[cell]);
+            let measure = |cell: usize| elements.measure(model, cell, &state.displacement, of(cell), states);
+            (0..model.mesh.cell_count()).into_par_iter().map(measure).collect()
+        };
+        let in_lanes = |lanes: &LaneCells| lanes.measure(model, elements, &state.displacement, &state.stiffness);
+        let measures = self.lanes.as_ref().and_then(in_lanes).unwrap_or_else(in_f64);
         let dissipated = self.dissipated();
         let sums = &mut self.sums;
-        sums.energy.elastic = measures.iter().map(|m| m.elastic).sum();
+        let mut energies = [0.0; 3];
+        let health = &mut sums.health;
+        (health.min_j, health.min_corner_j) = (f64::INFINITY, f64::INFINITY);
+        for (cell, m) in measures.iter().enumerate() {
+            for (sum, value) in energies.iter_mut().zip([m.elastic, m.hourglass, m.viscous]) {
+                *sum += value;
+            }
+            health.largest_damage = health.largest_damage.max(m.damage);
+            // What deletion has taken out may be turned inside out.
+            if m.damage >= 1.0 || state.stiffness.get(cell) == Some(&0.0) {
+                health.deleted_cells += 1;
+                continue;
+            }
+            health.min_j = health.min_j.min(m.jacobian);
+            health.min_corner_j = health.min_corner_j.min(m.corner_jacobian);
+            if m.jacobian <= 0.0 || m.corner_jacobian <= 0.0 {
+                health.inverted_cells += 1;
+                health.folded_cells += u32::from(m.jacobian > 0.0);
+                health.inverted_cell.get_or_insert(cell as u32);
+            }
+        }
         // Beside what cells hold of a path of no width.
-        sums.energy.elastic += self.opening_elastic;
-        sums.energy.hourglass = measures.iter().map(|m| m.hourglass).sum();
-        sums.energy.viscous = measures.iter().map(|m| m.viscous).sum();
-        // What deletion has taken out may be turned inside out.
-        let is_severed = |cell: usize| state.stiffness.get(cell) == Some(&0.0);
-        let present = || measures.iter().enumerate().filter(|(c, m)| m.damage < 1.0 && !is_severed(*c)).map(|(_, m)| m);
-        sums.health.deleted_cells = (measures.len() - present().count()) as u32;
-        sums.health.largest_damage = measures.iter().map(|m| m.damage).fold(0.0, f64::max);
-        sums.health.min_j = present().map(|m| m.jacobian).fold(f64::INFINITY, f64::min);
-        sums.health.min_corner_j = present().map(|m| m.corner_jacobian).fold(f64::INFINITY, f64::min);
-        let inverted = |m: &CellMeasure| m.damage < 1.0 && (m.jacobian <= 0.0 || m.corner_jacobian <= 0.0);
-        let mut broken =
-            measures.iter().enumerate().filter(|(c, m)| inverted(m) && !is_severed(*c)).map(|(c, _)| c as u32);
-        let folded = |m: &CellMeasure| inverted(m) && m.jacobian > 0.0;
-        sums.health.folded_cells =
-            measures.iter().enumerate().filter(|(c, m)| folded(m) && !is_severed(*c)).count() as u32;
-        sums.health.inverted_cell = broken.next();
-        sums.health.inverted_cells = u32::from(sums.health.inverted_cell.is_some()) + broken.count() as u32;
+        sums.energy.elastic = energies[0] + self.opening_elastic;
+        (sums.energy.hourglass, sums.energy.viscous) = (energies[1], energies[2]);
         sums.energy += dissipated - self.booked;
         self.booked = dissipated;
         self.take_own_supply();
@@ -491,6 +527,7 @@ impl Engine for CpuEngine {
             return Err(Error::Device("state of another mesh".into()));
         }
         self.state = state.clone();
+        self.look_at_all();
         self.booked = self.dissipated();
         Ok(())
     }
@@ -504,6 +541,7 @@ impl Engine for CpuEngine {
         match image {
             EngineImage::Cpu { state, booked, lanes } if *lanes == self.wants_lanes && state.fits(&self.state) => {
                 self.state = State::clone(state);
+                self.look_at_all();
                 self.booked = *booked;
                 self.finished.clear();
                 Ok(())

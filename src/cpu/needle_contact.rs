@@ -9,9 +9,44 @@ use super::slit_contact::SlitContact;
 use super::{ContactSums, CpuEngine};
 use crate::effects::friction::stick_or_slide;
 use crate::engine::{ContactState, State};
-use crate::model::{ANCHOR_COUNT, PuncturePlan};
+use crate::model::{ANCHOR_COUNT, ContactNode, Model, PuncturePlan};
 use crate::needle::gap::Profile;
 use crate::needle::{ToolPose, swing};
+
+/// In [`NearNodes::of_node`]: no contact node.
+const NO_CONTACT: u32 = u32::MAX;
+
+/// Which contact nodes of a free path are looked at in a step. Most are far away from the needle, and nothing of theirs changes.
+pub(super) struct NearNodes {
+    /// Node and its place at rest [m], of every contact node; contact node of every node.
+    places: Vec<(u32, DVec3)>,
+    of_node: Vec<u32>,
+    /// Numbers of those that the needle touches or has passed.
+    busy: Vec<u32>,
+    /// The state is one that somebody has written.
+    pub is_stale: bool,
+}
+
+impl NearNodes {
+    /// For a model with a free path, whose contact nodes are all nodes beside it.
+    pub fn of(model: &Model) -> Option<Self> {
+        model.puncture.as_ref()?.free.as_ref()?;
+        let place = |contact: &ContactNode| (contact.node, model.mesh.rest_position(contact.node as usize));
+        let mut of_node = vec![NO_CONTACT; model.mesh.node_count()];
+        for (index, contact) in model.contact_nodes.iter().enumerate() {
+            of_node[contact.node as usize] = index as u32;
+        }
+        let places = model.contact_nodes.iter().map(place).collect();
+        Some(NearNodes { places, of_node, busy: Vec::new(), is_stale: true })
+    }
+
+    /// Keeps those of `looked_at` that must be looked at again wherever they are.
+    fn keep(&mut self, looked_at: &[u32], memories: &[ContactState]) {
+        self.busy.clear();
+        let is_busy = |memory: &ContactState| memory.passed || memory.touching;
+        self.busy.extend(looked_at.iter().filter(|index| is_busy(&memories[**index as usize])));
+    }
+}
 
 impl CpuEngine {
     /// Stage `needle_contact`: nodes of the ring that the tip has passed stay outside the opened path (potential
@@ -25,17 +60,20 @@ impl CpuEngine {
         let profile = Profile { shift: turned, ..plan.profile };
         let (coordinate, tip) = (self.state.tip_coordinate, self.state.tip);
         let needle = Needle { model: &model, plan, pose, profile, d: -pose.direction, coordinate, tip, line };
+        let looked_at = self.nodes_at_needle(&needle, &tip_loads);
         let State { contact: memories, displacement, velocity, .. } = &mut self.state;
         let slit = SlitContact { model: &model, plan, profile, pose, coordinate, line, displacement, velocity };
         let mut stored = self.tip_energy;
-        for (index, (contact, memory)) in model.contact_nodes.iter().zip(memories).enumerate() {
+        for index in &looked_at {
+            let index = *index as usize;
+            let (contact, memory) = (&model.contact_nodes[index], &mut memories[index]);
             let node = contact.node as usize;
             let mut sums = ContactSums::default();
             if let Some((force, stiffness)) = tip_loads.get(&node) {
                 sums.tip = *force;
                 self.added_bound[node] += stiffness;
             }
-            let rest = model.mesh.rest_position(node);
+            let rest = self.rest[node];
             let lever = rest + displacement[node] - pose.tip;
             let carries = sums.tip != DVec3::ZERO;
             // Most nodes of a free path, all of them where a hand leads: nothing of theirs would change.
@@ -84,6 +122,39 @@ impl CpuEngine {
             }
         }
         self.contact_energy = stored;
+        if let Some(near) = &mut self.near {
+            near.keep(&looked_at, memories);
+        }
+    }
+
+    /// Numbers of the contact nodes that the needle may have to do with, in their order: all of them on a planned path; on a free one, where
+    /// every node is a contact node, what is not far from it, what it has touched or passed, and what carries the tip.
+    fn nodes_at_needle(&mut self, needle: &Needle, tip_loads: &HashMap<usize, (DVec3, f64)>) -> Vec<u32> {
+        let count = needle.model.contact_nodes.len();
+        let all = || (0..count as u32).collect::<Vec<u32>>();
+        // A needle that bends is near to nothing along a straight line.
+        if needle.line.is_some() {
+            self.look_at_all();
+            return all();
+        }
+        let Some(mut near) = self.near.take() else { return all() };
+        if std::mem::take(&mut near.is_stale) {
+            near.keep(&all(), &self.state.contact);
+        }
+        let displacement = &self.state.displacement;
+        let is_near = |index: &usize| {
+            let (node, rest) = near.places[*index];
+            !needle.is_far_from(rest, rest + displacement[node as usize] - needle.pose.tip)
+        };
+        let found =
+            self.in_ranges(count, |range| range.filter(is_near).map(|index| index as u32).collect::<Vec<u32>>());
+        let mut all: Vec<u32> = found.into_iter().flatten().collect();
+        all.extend(&near.busy);
+        all.extend(tip_loads.keys().map(|node| near.of_node[*node]).filter(|index| *index != NO_CONTACT));
+        all.sort_unstable();
+        all.dedup();
+        self.near = Some(near);
+        all
     }
 
     /// Force [N] and stiffness [N/m] of the tip springs at the nodes that they act on.

@@ -110,7 +110,7 @@ impl CpuEngine {
         let (lanes, measures) = (&self.lanes, self.measures);
         let shape = |lanes: &Option<LaneCells>, cell: u32| Shape {
             material: model.material(cell as usize),
-            regular: lanes.as_ref().map(|lanes| lanes.law(model.material_index(cell as usize))),
+            regular: lanes.as_ref().and_then(|lanes| lanes.law(model.material_index(cell as usize))),
             measures,
         };
         let points = self.each(now.len(), |i| {

@@ -1,18 +1,29 @@
 //! Stages `advance_tip` and `soften_path` in f64. Equations: src/effects/puncture.rs.
 
-use glam::DVec3;
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
 
 use super::CpuEngine;
 use crate::effects::adhesion::{self, Bond};
 use crate::effects::puncture::{self, advance_limit, bounded_stretch, tip_advance};
 use crate::engine::elements::CellStates;
 use crate::mesh::{BlockMesh, CORNERS, Mesh};
-use crate::model::PuncturePlan;
+use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
 use crate::needle::tip_contact::Touch;
 
 /// Nodes around a material point, their weights, and the derivative of the weights along the path [1/m].
 type Around = ([usize; 8], [f64; 8], [f64; 8]);
+
+/// A column of cells, and a place in it, 0..1 per axis.
+pub(super) type Column = ([usize; 2], DVec2);
+
+/// The columns of a block in which its anchors stand before a path straight down. A bent grid takes iterations to find them.
+pub(super) fn anchor_columns(model: &Model) -> Arc<[Column]> {
+    let (Some(plan), Some(block)) = (&model.puncture, model.mesh.as_block()) else { return [].into() };
+    plan.anchors.iter().map(|anchor| block.column(anchor.surface.truncate())).collect()
+}
 
 /// An anchor at the material coordinate of the tip.
 struct PlacedAnchor {
@@ -53,9 +64,20 @@ impl TipLoads {
 
 impl CpuEngine {
     /// What is around the anchor number `index` at the material coordinate `a` [m].
-    fn around_anchor(mesh: &Mesh, plan: &PuncturePlan, index: usize, a: f64, direction: DVec3) -> Around {
+    fn around_anchor(
+        mesh: &Mesh,
+        plan: &PuncturePlan,
+        (index, columns): (usize, &[Column]),
+        a: f64,
+        direction: DVec3,
+    ) -> Around {
         match mesh {
-            Mesh::Block(block) => Self::locate(block, plan.anchors[index].surface + direction * a, direction),
+            Mesh::Block(block) => {
+                let x = plan.anchors[index].surface + direction * a;
+                let is_vertical = direction.truncate() == DVec2::ZERO;
+                let column = if is_vertical { columns[index] } else { block.column(x.truncate()) };
+                Self::weights(block, column, x.z, direction)
+            }
             Mesh::Tets(_) => {
                 let (nodes, weights, slopes) = plan.lines[index].weights(a);
                 let none = |values: [f64; 4]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
@@ -65,10 +87,11 @@ impl CpuEngine {
         }
     }
 
-    /// Trilinear position in the mesh: nodes, weights and derivative of the weights along `direction` (in a bent grid the
+    /// Trilinear position in a column at the height `z` [m]: nodes, weights and derivative of the weights along `direction` (in a bent grid the
     /// direction of its axis).
-    fn locate(mesh: &BlockMesh, x: DVec3, direction: DVec3) -> Around {
-        let ([i, j, k], xi) = mesh.locate(x);
+    fn weights(mesh: &BlockMesh, ([i, j], in_column): Column, z: f64, direction: DVec3) -> Around {
+        let (k, zeta) = mesh.along(2, z);
+        let xi = in_column.extend(zeta);
         let cell = mesh.cell_index(i, j, k);
         let width = mesh.cell_size(cell);
         let (mut weight, mut slope) = ([0.0; 8], [0.0; 8]);
@@ -89,6 +112,7 @@ impl CpuEngine {
     pub(super) fn advance_tip(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
         let model = self.model.clone();
         let mesh = &model.mesh;
+        let columns = self.anchor_columns.clone();
         let t = pose.direction;
         let count = plan.anchors.len() as f64;
         let spring = plan.params.tip_stiffness / count;
@@ -96,7 +120,7 @@ impl CpuEngine {
         let place = |u: &[DVec3], a: f64| -> Vec<PlacedAnchor> {
             (0..plan.anchors.len())
                 .map(|index| {
-                    let (nodes, weights, slope) = Self::around_anchor(mesh, plan, index, a, t);
+                    let (nodes, weights, slope) = Self::around_anchor(mesh, plan, (index, &columns), a, t);
                     let (mut du, mut stretch) = (0.0, 1.0);
                     for i in 0..8 {
                         let along = u[nodes[i]].dot(t);

@@ -285,7 +285,7 @@ pub struct CellMeasure {
 
 impl CellMeasure {
     /// A cell without tissue.
-    fn of_nothing() -> Self {
+    pub fn of_nothing() -> Self {
         CellMeasure { jacobian: 1.0, corner_jacobian: 1.0, ..CellMeasure::default() }
     }
 }

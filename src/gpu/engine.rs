@@ -174,6 +174,16 @@ impl GpuEngine {
         self.buffers.get(name)
     }
 
+    /// Takes the displacement of a state that another engine computed, and nothing else of it.
+    pub(crate) fn write_displacement(&mut self, state: &State) {
+        let source = self.source();
+        for array in arrays::all().filter(|array| array.name == "node_displacement") {
+            if let (Some(buffer), Some(exchange)) = (self.buffers.get(array.name), array.state) {
+                buffer.write(&self.gpu.queue, &(exchange.write)(&source, state));
+            }
+        }
+    }
+
     /// Brings the fields that a window draws up to date with the present state.
     pub fn encode_fields(&self, encoder: &mut wgpu::CommandEncoder) {
         let mut pass = encoder.begin_compute_pass(&Default::default());

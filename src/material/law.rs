@@ -7,6 +7,7 @@
 use glam::DMat3;
 
 use super::regular::Polynomial;
+use super::stretches::Powers;
 use super::{Continuation, Isochoric, LAWS, Mode, TangentBound};
 
 /// Most constants of a law: the lanes of `Material.constants` in the shaders.
@@ -157,6 +158,10 @@ pub trait IsochoricLaw {
     fn polynomial(&self) -> Option<Polynomial> {
         None
     }
+    /// Its constants where it is a sum of powers of the stretches.
+    fn powers(&self) -> Option<Powers<f64>> {
+        None
+    }
     /// Nominal stress of an incompressible sample at the stretch, or amount of shear, `x` [Pa].
     fn nominal_stress(&self, mode: Mode, x: f64) -> f64;
 }
@@ -245,6 +250,12 @@ macro_rules! laws {
             fn polynomial(&self) -> Option<Polynomial> {
                 match self {
                     $(Isochoric::$Law(l) => IsochoricLaw::polynomial(l)),+
+                }
+            }
+
+            fn powers(&self) -> Option<Powers<f64>> {
+                match self {
+                    $(Isochoric::$Law(l) => IsochoricLaw::powers(l)),+
                 }
             }
 

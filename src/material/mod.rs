@@ -31,6 +31,7 @@ pub mod neo_hookean;
 pub mod number;
 pub mod ogden;
 pub mod regular;
+pub mod stretches;
 pub mod yeoh;
 
 pub use invariants::{InvariantLaw, Slopes};
@@ -40,6 +41,7 @@ pub use mode::Mode;
 use glam::{DMat3, DVec3};
 use kinematics::{cofactor, double_dot, jacobian_minus_one};
 use regular::Polynomial;
+use stretches::Powers;
 
 use crate::units::four_digits;
 

@@ -2,6 +2,9 @@
 
 use std::ops::{Add, Mul, Sub};
 
+/// A second-order tensor by its columns.
+pub type Tensor<N> = [[N; 3]; 3];
+
 /// A real number, or one per lane.
 pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// The same constant in every lane.
@@ -14,6 +17,10 @@ pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     fn root(self) -> Self;
     /// `x^(-1/3)` of a value between 0.4 and 2.2.
     fn inverse_cube_root(self) -> Self;
+    /// `ln(1 + x)` of a value above -1.
+    fn logarithm(self) -> Self;
+    /// `exp(x) - 1` of a value between -20 and 20.
+    fn exponential(self) -> Self;
     /// The larger one.
     fn larger(self, other: Self) -> Self;
     /// The smaller one.
@@ -50,6 +57,16 @@ impl Number for f64 {
     #[inline(always)]
     fn inverse_cube_root(self) -> Self {
         1.0 / self.cbrt()
+    }
+
+    #[inline(always)]
+    fn logarithm(self) -> Self {
+        self.ln_1p()
+    }
+
+    #[inline(always)]
+    fn exponential(self) -> Self {
+        self.exp_m1()
     }
 
     #[inline(always)]

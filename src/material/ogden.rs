@@ -19,6 +19,7 @@ use super::kinematics::{
     J_CONTINUATION, cofactor, is_measure_continued, isochoric_measure, jacobian_minus_one, symmetric_eigen,
 };
 use super::law::{Constant, Constants, Form, IsochoricLaw, Law, Search};
+use super::stretches::Powers;
 use super::{Continuation, Isochoric, Mode, TangentBound, Verdict};
 
 pub const LAW: Law = Law {
@@ -214,6 +215,10 @@ impl IsochoricLaw for Ogden {
 
     fn continuation(&self, h: DMat3) -> Option<Continuation> {
         if self.is_flat(h) { Some(Continuation::Volume) } else { self.is_thin(h).then_some(Continuation::Stretch) }
+    }
+
+    fn powers(&self) -> Option<Powers<f64>> {
+        (self.alpha > 0.0).then_some(Powers { mu: self.mu, alpha: self.alpha })
     }
 
     /// The closed forms in the stretches; those in the invariants are at [`crate::material::fit`], too.

@@ -5,20 +5,20 @@
 //! e1 = I1 - 3 = tr E,  e2 = I2 - 3 = 2 e1 + tr cof E,  dj = J - 1 = tr H + tr cof H + det H
 //! P_iso = 2 w1 J^(-2/3) (H - s1 K + (1 - s1) I),                          s1 = I1/(3 J)
 //!       + 2 w2 J^(-4/3) (2 H + e1 F - F E - s2 K + (2 - s2) I),           s2 = 2 I2/(3 J)
+//! I1bar - 3 = r^(-2) (d1 + (r - 1)^2 (2 r + 1)),                          r = J^(1/3),  d1 = e1 - 2 dj = |H|^2 - 2 tr cof H - 2 det H
+//! I2bar - 3 = r^(-4) (2 d1 + tr cof E - (r - 1)^2 (3 r^2 + 2 r + 1))
 //! ```
 
 // Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
 #![allow(clippy::needless_range_loop)]
 
-use super::number::Number;
+use super::number::{Number, Tensor};
+use super::stretches::{Powers, Stretches};
 
 /// J between which the forms of this file hold to the last digits of f32.
 pub const LEAST_J: f64 = 0.4;
 /// See [`LEAST_J`].
 pub const LARGEST_J: f64 = 2.2;
-
-/// A second-order tensor by its columns.
-pub type Tensor<N> = [[N; 3]; 3];
 
 /// `W_iso = c1 e + c2 e^2 + c3 e^3 + c01 (I2bar - 3)` with `e = I1bar - 3` [Pa]: neo-Hooke, Mooney-Rivlin and Yeoh.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -83,6 +83,9 @@ pub struct Regular<N> {
     root: N,
     e1: N,
     e2: N,
+    /// dj - tr H, and e2 - 2 e1.
+    dj_second: N,
+    e2_second: N,
 }
 
 /// Of two vectors.
@@ -117,7 +120,8 @@ impl<N: Number> Regular<N> {
     pub fn new(h: Tensor<N>) -> Option<Self> {
         let cof_h = [cross(h[1], h[2]), cross(h[2], h[0]), cross(h[0], h[1])];
         let trace = h[0][0] + h[1][1] + h[2][2];
-        let dj = trace + (cof_h[0][0] + cof_h[1][1] + cof_h[2][2]) + dot(h[0], cof_h[0]);
+        let (cof_trace, determinant) = (cof_h[0][0] + cof_h[1][1] + cof_h[2][2], dot(h[0], cof_h[0]));
+        let dj = trace + cof_trace + determinant;
         if !dj.is_within(LEAST_J - 1.0, LARGEST_J - 1.0) {
             return None;
         }
@@ -134,7 +138,8 @@ impl<N: Number> Regular<N> {
         ];
         let [xx, yy, zz, yz, zx, xy] = strain;
         let e1 = xx + yy + zz;
-        let e2 = two.mul_add(e1, (yy * zz - yz * yz) + (zz * xx - zx * zx) + (xx * yy - xy * xy));
+        let e2_second = (yy * zz - yz * yz) + (zz * xx - zx * zx) + (xx * yy - xy * xy);
+        let e2 = two.mul_add(e1, e2_second);
         let mut k = cof_h;
         for a in 0..3 {
             for b in 0..3 {
@@ -142,7 +147,8 @@ impl<N: Number> Regular<N> {
             }
             k[a][a] = k[a][a] + trace;
         }
-        Some(Regular { h, strain, cofactor_less_one: k, dj, j, root: j.inverse_cube_root(), e1, e2 })
+        let (root, dj_second) = (j.inverse_cube_root(), cof_trace + determinant);
+        Some(Regular { h, strain, cofactor_less_one: k, dj, j, root, e1, e2, dj_second, e2_second })
     }
 
     /// Slopes w1, w2 and w11 of the law.
@@ -210,6 +216,37 @@ impl<N: Number> Regular<N> {
             p[a][a] = p[a][a] + by_one;
         }
         p
+    }
+
+    /// W_iso + 1/2 kappa (J - 1)^2 [J/m^3], to the digits of its own size however small the strain.
+    #[inline(always)]
+    pub fn energy(&self, law: &Constants<N>, bulk_modulus: N) -> N {
+        let Regular { h, dj, j, root, .. } = *self;
+        let n = dj;
+        let (one, two) = (n.of(1.0), n.of(2.0));
+        let d1 = dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]) - two * self.dj_second;
+        let r2 = root * root;
+        let r = j * r2;
+        // r - 1, of r^3 - 1.
+        let less = dj.over(r.mul_add(r, r) + one);
+        let squared = less * less;
+        let e = r2 * squared.mul_add(two * r + one, d1);
+        let mut w = e * law.c1;
+        if !law.is_linear {
+            w = e * e.mul_add(e.mul_add(law.c3, law.c2), law.c1);
+        }
+        if law.has_c01 {
+            let e2 = two.mul_add(d1, self.e2_second) - squared * (r * n.of(3.0)).mul_add(r, two * r + one);
+            w = (r2 * r2 * e2).mul_add(law.c01, w);
+        }
+        (n.of(0.5) * bulk_modulus * dj).mul_add(dj, w)
+    }
+
+    /// P_iso of powers of the stretches, and its part of the straight bound of the tangent [Pa]; `None` where a lane has left their range.
+    #[inline(always)]
+    pub fn stress_and_bound_of_powers(&self, powers: &Powers<N>) -> Option<(Tensor<N>, N)> {
+        let stretches = Stretches::new(self.strain, powers)?;
+        Some(stretches.stress_and_bound(powers, &self.h, &self.cofactor_less_one, self.dj))
     }
 
     /// Bound of the isochoric tangent, straight and turned, of `InvariantLaw::tangent_bound` [Pa].
@@ -321,6 +358,20 @@ mod tests {
                 // The laws themselves lose 1e-16 of the modulus to cancellation.
                 let allowed = 1e-12 * entries(exact) + 1e-15 * law.shear_modulus() * 10.0;
                 assert!(entries(found - exact) < allowed, "{word:?} at {h}: {found} {exact}");
+                let energy = law.isochoric_energy(h) + 0.5 * BULK * jacobian_minus_one(h).powi(2);
+                let found = state.energy(&polynomial.in_lanes(BULK), BULK);
+                // The law itself has its invariants to 1e-15 or so.
+                let allowed = 1e-11 * energy + 2e-15 * law.shear_modulus();
+                assert!((found - energy).abs() < allowed, "{word:?} at {h}: {found} {energy}");
+                // And the derivative of the energy is the stress, at any size of strain.
+                let (size, along) = (h.to_cols_array().iter().fold(0.0f64, |a, x| a.max(x.abs())), h);
+                let at = |t: f64| {
+                    let state = Regular::new((h + along * t).to_cols_array_2d()).unwrap();
+                    state.energy(&polynomial.in_lanes(BULK), BULK)
+                };
+                let slope = (at(1e-4) - at(-1e-4)) / 2e-4;
+                let power: f64 = exact.to_cols_array().iter().zip(along.to_cols_array()).map(|(p, h)| p * h).sum();
+                assert!((slope - power).abs() < 1e-5 * (power.abs() + energy), "{word:?} {size:e}: {slope} {power}");
                 let bound = law.tangent_bound(h, BULK);
                 let [straight, turned] = state.tangent_bound(&polynomial.in_lanes(BULK), BULK);
                 let close = |a: f64, b: f64| (a - b).abs() <= 1e-11 * (BULK + b.abs());

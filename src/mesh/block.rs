@@ -190,18 +190,25 @@ impl BlockMesh {
     /// The cell that holds a point of the block (or the nearest one) and the place in it, 0..1 per axis. Never a gap: a
     /// point on a doubled line belongs to the cell above it.
     pub fn locate(&self, x: DVec3) -> ([usize; 3], DVec3) {
-        let along = |a: usize, x: f64| {
-            let lines = &self.lines[a];
-            let i = lines.partition_point(|l| *l <= x).clamp(1, lines.len() - 1) - 1;
-            (i, ((x - lines[i]) / (lines[i + 1] - lines[i])).clamp(0.0, 1.0))
-        };
-        let (k, zeta) = along(2, x.z);
+        let (([i, j], local), (k, zeta)) = (self.column(x.truncate()), self.along(2, x.z));
+        ([i, j, k], local.extend(zeta))
+    }
+
+    /// The cells between two lines of an axis that hold the coordinate `x` [m], and the place between the lines, 0..1.
+    pub fn along(&self, axis: usize, x: f64) -> (usize, f64) {
+        let lines = &self.lines[axis];
+        let i = lines.partition_point(|l| *l <= x).clamp(1, lines.len() - 1) - 1;
+        (i, ((x - lines[i]) / (lines[i + 1] - lines[i])).clamp(0.0, 1.0))
+    }
+
+    /// The column of cells that holds a point of the plane, as [`BlockMesh::locate`] finds it, and the place in it, 0..1 per axis.
+    pub fn column(&self, x: DVec2) -> ([usize; 2], DVec2) {
         let Some(bore) = self.bore else {
-            let ((i, xi), (j, eta)) = (along(0, x.x), along(1, x.y));
-            return ([i, j, k], DVec3::new(xi, eta, zeta));
+            let ((i, xi), (j, eta)) = (self.along(0, x.x), self.along(1, x.y));
+            return ([i, j], DVec2::new(xi, eta));
         };
         // The map keeps directions: bisect the distance along the ray from the axis.
-        let p = x.truncate() - bore.centre;
+        let p = x - bore.centre;
         let reach = p.length();
         let ray = if reach > 0.0 { p / reach } else { DVec2::X };
         let (mut low, mut high) = (0.0, 2.0 * reach);
@@ -214,11 +221,10 @@ impl BlockMesh {
             }
         }
         let square = bore.centre + ray * (0.5 * (low + high));
-        let ((i, xi), (j, eta)) = (along(0, square.x), along(1, square.y));
+        let ((i, xi), (j, eta)) = (self.along(0, square.x), self.along(1, square.y));
         // The cell is bilinear between its corners, the map is not.
-        let local = self.place_in_column([i, j], x.truncate(), DVec2::new(xi, eta));
-        let local = local.clamp(DVec2::ZERO, DVec2::ONE);
-        ([i, j, k], local.extend(zeta))
+        let local = self.place_in_column([i, j], x, DVec2::new(xi, eta));
+        ([i, j], local.clamp(DVec2::ZERO, DVec2::ONE))
     }
 
     /// As [`BlockMesh::locate`], but where the grid is bent the cell whose straight sides hold the point: between a circle and

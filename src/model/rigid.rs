@@ -14,8 +14,8 @@ use crate::scene::Scene;
 /// millimetre, far stiffer than all tissue before it.
 pub const STIFFNESS: f64 = 50.0e3;
 
-/// Force at which a hand or a drive stops pushing against bone [N]. Choice of this project.
-pub const LARGEST_FORCE: f64 = 10.0;
+/// Force at which a hand or a drive stops pushing against bone [N].
+pub const LARGEST_FORCE: f64 = crate::scene::LARGEST_FORCE_LIMIT;
 
 /// How deep a tip gets into it [m].
 pub const DEEPEST: f64 = LARGEST_FORCE / STIFFNESS;

@@ -10,14 +10,13 @@ use std::sync::Arc;
 use super::flexible_needle::FlexibleNeedle;
 use super::run_engine::takes_lanes;
 use super::start::{choose_step, sizes, too_many_steps};
-use super::{LONGEST_LED, Purpose, RunEngine, Simulation};
+use super::{LONGEST_LED, Purpose, RunEngine, Simulation, stretch};
 use crate::cpu::CpuEngine;
 use crate::engine::clock::Clock;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::engine::{ContactState, Engine, FramePlan, FrameSums, State, StepInput};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuEngine};
-use crate::material::Verdict;
 use crate::material_point::PointState;
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -202,7 +201,7 @@ impl Simulation {
         };
         self.total_steps = self.clock.steps_until(end);
         self.frames = 1 + self.clock.frame_of(self.total_steps);
-        self.watch_stretch = self.model.materials.iter().any(|m| !matches!(m.law.verdict(), Verdict::Stable));
+        self.watch_stretch = stretch::must_watch(&self.model);
         if let Some(image) = self.needle.as_ref().map(|needle| needle.save()) {
             // The same beam in another tissue.
             self.needle = FlexibleNeedle::new(&self.model, self.kinematics.as_ref(), self.clock.dt);

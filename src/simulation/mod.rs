@@ -33,6 +33,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 pub use run_engine::RunEngine;
+use run_engine::Shown;
 pub use start::{EngineChoice, choose_step};
 
 use crate::engine::clock::Clock;
@@ -162,6 +163,15 @@ impl Simulation {
     /// The engine on a device, for those who draw from its buffers.
     pub fn on_device(&self) -> Option<&GpuEngine> {
         self.engine.on_device()
+    }
+
+    /// Brings the buffers on the device up to the present state, for those who draw from them: displacements, with `fields` all that
+    /// stresses are computed from.
+    ///
+    /// # Errors
+    /// `Error::Device`.
+    pub fn show(&mut self, fields: bool) -> Result<()> {
+        self.engine.show(if fields { Shown::Everything } else { Shown::Displacement })
     }
 
     /// The opened device, if the engine runs on one.
@@ -301,7 +311,6 @@ impl Simulation {
         let Some(mut sums) = self.engine.collect(true)? else {
             return Err(Error::Device("the engine lost a frame".into()));
         };
-        self.engine.show()?;
         self.collected += 1;
         let bent = self.answer_of_the_needle(&mut sums);
         let when = (&self.clock, self.clock.first_step(sums.frame));

@@ -15,18 +15,29 @@ use crate::model::Model;
 /// The engine of a run.
 pub enum RunEngine {
     Gpu(Box<GpuEngine>),
-    /// With an engine on a device that computes nothing: a window draws from its buffers, which get the state of every frame.
+    /// With an engine on a device that computes nothing: a window draws from its buffers, which get the state when it asks.
     Cpu {
         engine: Box<CpuEngine>,
         drawn: Option<Box<GpuEngine>>,
+        shown: Shown,
     },
+}
+
+/// What the buffers of a device that computes nothing hold of the present state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Shown {
+    /// That of an earlier moment.
+    #[default]
+    Nothing,
+    Displacement,
+    Everything,
 }
 
 /// True where the CPU engine takes a model although there is a device: a software adapter, whose work is the processor's too, that nobody has
 /// asked for by name, and a model that lanes know.
 pub(super) fn takes_lanes(model: &Model, device: &Gpu, purpose: Purpose) -> bool {
     let is_free = purpose.lanes && device.is_software() && !adapter_wanted_by_name();
-    is_free && unknown_to_lanes(&model.scene, &model.mesh).is_none()
+    is_free && unknown_to_lanes(&model.scene).is_none()
 }
 
 impl RunEngine {
@@ -37,7 +48,7 @@ impl RunEngine {
     pub fn new(model: &Arc<Model>, device: Option<&Gpu>, dt: f64, most_steps: usize, purpose: Purpose) -> Result<Self> {
         let on_processor = |drawn| {
             let make = if purpose.lanes { CpuEngine::in_lanes } else { CpuEngine::new };
-            RunEngine::Cpu { engine: Box::new(make(model.clone(), dt)), drawn }
+            RunEngine::Cpu { engine: Box::new(make(model.clone(), dt)), drawn, shown: Shown::default() }
         };
         Ok(match device {
             Some(gpu) if takes_lanes(model, gpu, purpose) => {
@@ -60,12 +71,20 @@ impl RunEngine {
         }
     }
 
-    /// Gives the state to those who draw, where another engine computed it.
-    pub fn show(&mut self) -> Result<()> {
-        match self {
-            RunEngine::Cpu { engine, drawn: Some(drawn) } => drawn.write_state(engine.state()),
-            _ => Ok(()),
+    /// Gives so much of the state to those who draw, where another engine computed it and they do not have it yet.
+    ///
+    /// # Errors
+    /// `Error::Device`.
+    pub fn show(&mut self, wanted: Shown) -> Result<()> {
+        let RunEngine::Cpu { engine, drawn: Some(drawn), shown } = self else { return Ok(()) };
+        if *shown < wanted {
+            match wanted {
+                Shown::Everything => drawn.write_state(engine.state())?,
+                _ => drawn.write_displacement(engine.state()),
+            }
+            *shown = wanted;
         }
+        Ok(())
     }
 }
 
@@ -84,7 +103,11 @@ impl DerefMut for RunEngine {
     fn deref_mut(&mut self) -> &mut Self::Target {
         match self {
             RunEngine::Gpu(engine) => engine.as_mut(),
-            RunEngine::Cpu { engine, .. } => engine.as_mut(),
+            RunEngine::Cpu { engine, shown, .. } => {
+                // Whoever may change it may have.
+                *shown = Shown::Nothing;
+                engine.as_mut()
+            }
         }
     }
 }

@@ -6,14 +6,13 @@ use std::sync::Arc;
 
 use super::advice::advice;
 use super::flexible_needle::FlexibleNeedle;
-use super::{LONGEST_LED, Purpose, RunEngine, Simulation};
+use super::{LONGEST_LED, Purpose, RunEngine, Simulation, stretch};
 use crate::cpu::unknown_to_lanes;
 use crate::engine::clock::Clock;
 use crate::engine::stable_dt::{power_iteration, wave_speed_bound};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::device::adapter_wanted_by_name;
-use crate::material::Verdict;
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::needle::Kinematics;
@@ -86,7 +85,7 @@ impl Simulation {
     /// The same on a given mesh.
     pub fn with_mesh(scene: Scene, mesh: impl Into<Mesh>, choice: EngineChoice) -> Result<Self> {
         let mesh = mesh.into();
-        let (device, notices) = Self::choose_device(choice, &scene, &mesh)?;
+        let (device, notices) = Self::choose_device(choice, &scene)?;
         let lanes = matches!(choice, EngineChoice::Auto | EngineChoice::Cpu);
         let purpose = Purpose { lanes, ..Purpose::default() };
         Self::prepare(scene, mesh, device, notices, MOST_STEPS_PER_FRAME, purpose)
@@ -116,15 +115,13 @@ impl Simulation {
     }
 
     /// The device of a choice, and what is to be said about it; no device: the CPU engine.
-    fn choose_device(choice: EngineChoice, scene: &Scene, mesh: &Mesh) -> Result<(Option<Gpu>, Vec<String>)> {
+    fn choose_device(choice: EngineChoice, scene: &Scene) -> Result<(Option<Gpu>, Vec<String>)> {
         let mut notices = Vec::new();
         let device = match choice {
             EngineChoice::Cpu | EngineChoice::Cpu64 => None,
             EngineChoice::Gpu => Some(Gpu::open()?),
             EngineChoice::Auto => match Gpu::open() {
-                Ok(gpu)
-                    if gpu.is_software() && !adapter_wanted_by_name() && unknown_to_lanes(scene, mesh).is_none() =>
-                {
+                Ok(gpu) if gpu.is_software() && !adapter_wanted_by_name() && unknown_to_lanes(scene).is_none() => {
                     notices.push(format!(
                         "the adapter {} is software: the CPU engine takes this scene, in less time (--engine gpu: on the adapter)",
                         gpu.info.name
@@ -189,7 +186,7 @@ impl Simulation {
         let clock = Clock::new(dt, steps_per_frame);
         let total_steps = clock.steps_until(duration);
         let frames = 1 + clock.frame_of(total_steps);
-        let watch_stretch = model.materials.iter().any(|m| !matches!(m.law.verdict(), Verdict::Stable));
+        let watch_stretch = stretch::must_watch(&model);
         Ok(Simulation {
             stable_dt,
             clock,

@@ -6,7 +6,13 @@ use super::Simulation;
 use super::fields::displacement_gradients;
 use crate::error::{Error, Result};
 use crate::material::Verdict;
+use crate::model::Model;
 use crate::observables::FrameRecord;
+
+/// True where a material is stable within a range of stretches only; what has no stiffness at all is not watched.
+pub(super) fn must_watch(model: &Model) -> bool {
+    model.materials.iter().any(|m| matches!(m.law.verdict(), Verdict::StableBelow(_) | Verdict::StableAbove(_)))
+}
 
 impl Simulation {
     /// Stops when an element leaves the stretch range in which the material is stable.

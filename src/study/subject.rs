@@ -81,7 +81,7 @@ impl Subject {
                 found => found.ok(),
             },
         };
-        let is_known = choice != EngineChoice::Cpu64 && unknown_to_lanes(&scene, &Mesh::of_scene(&scene)).is_none();
+        let is_known = choice != EngineChoice::Cpu64 && unknown_to_lanes(&scene).is_none();
         let processor = if is_known { Engine::Cpu } else { Engine::Cpu64 };
         // As a run chooses.
         let engine = match &gpu {

@@ -53,7 +53,7 @@ pub fn engines(model: &Arc<Model>, dt: f64, max_steps: usize) -> Vec<(&'static s
     let mut engines: Vec<(&'static str, Box<dyn Engine>)> = vec![("cpu", Box::new(CpuEngine::new(model.clone(), dt)))];
     engines.extend(gpu_engine(model, dt, max_steps).map(|e| ("gpu", Box::new(e) as Box<dyn Engine>)));
     // Elsewhere it is the f64 engine once more.
-    if unknown_to_lanes(&model.scene, &model.mesh).is_none() {
+    if unknown_to_lanes(&model.scene).is_none() {
         engines.push(("lanes", Box::new(CpuEngine::in_lanes(model.clone(), dt))));
     }
     engines

@@ -188,25 +188,29 @@ fn the_bent_grid_keeps_its_volume_and_a_linear_field_its_stress() {
         at_most(
             &format!("{name}: force left inside, over the largest"),
             worst,
-            if name == "gpu" { 1e-5 } else { 1e-10 },
+            if name == "cpu" { 1e-10 } else { 1e-5 },
         );
     }
 }
 
 #[test]
-fn both_engines_agree_on_a_rough_field_in_the_bent_grid() {
+fn all_engines_agree_on_a_rough_field_in_the_bent_grid() {
     let model = bored(vec![Phase::Insert { speed: 2e-3, depth: 3e-3 }]);
     let mut random = Random(7);
     let u: Vec<DVec3> = (0..model.mesh.node_count()).map(|_| random.vector() * 4e-5).collect();
-    let forces: Vec<Vec<DVec3>> = engines(&model, 1e-6, 1)
+    let forces: Vec<(&str, Vec<DVec3>)> = engines(&model, 1e-6, 1)
         .into_iter()
-        .map(|(_, mut engine)| {
+        .map(|(name, mut engine)| {
             let state = State { displacement: u.clone(), ..engine.read_state().unwrap() };
             engine.write_state(&state).unwrap();
-            engine.internal_forces().unwrap()
+            (name, engine.internal_forces().unwrap())
         })
         .collect();
-    if let [cpu, gpu] = &forces[..] {
-        at_most("difference of the forces over the largest", relative_difference(gpu, cpu), 1e-4);
+    let (exact, others) = forces.split_first().unwrap();
+    assert!(others.iter().any(|(name, _)| *name == "lanes"));
+    for (name, found) in others {
+        let difference = relative_difference(found, &exact.1);
+        let allowed = if *name == "lanes" { 1e-5 } else { 1e-4 };
+        at_most(&format!("{name}: difference of the forces over the largest"), difference, allowed);
     }
 }

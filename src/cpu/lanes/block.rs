@@ -10,11 +10,13 @@ use pulp::Arch;
 
 use super::nodes::{NODE, NodeLines};
 use super::rows::{CellRows, gather_rows};
+use super::shapes::BentColumns;
 use super::{LaneMaterial, WIDEST, materials_of, threads_for};
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
-use crate::engine::elements::Elements;
+use crate::engine::elements::{CellMeasure, Elements};
 use crate::material::regular::Polynomial;
+use crate::material::stretches::Powers;
 use crate::mesh::BlockMesh;
 use crate::model::Model;
 
@@ -22,8 +24,9 @@ use crate::model::Model;
 pub(super) const PLACE: usize = 6;
 /// f32 per row of cells in [`LaneBlock::lines`]: force of every axis on four lines of nodes, and the bound of all.
 pub(super) const LINES: usize = 13;
-/// f32 per row of cells in [`Grid::mixed`]: c1, c2, c3, c01, bulk modulus, hourglass modulus, and 1 where a cell holds tissue.
-pub(super) const MIXED: usize = 7;
+/// f32 per row of cells in [`Grid::mixed`]: c1, c2, c3, c01, bulk modulus, hourglass modulus, 1 where a cell holds tissue, and mu and alpha of
+/// powers of the stretches.
+pub(super) const MIXED: usize = 9;
 /// What varies along x: an entry per cell, zeros behind the last and for gaps.
 #[derive(Debug, Default)]
 pub(super) struct EdgesX {
@@ -64,12 +67,16 @@ pub(super) struct Grid {
     pub x: EdgesX,
     pub y: Vec<Edge>,
     pub z: Vec<Edge>,
+    /// Columns between bent lines; `None`: all lines are straight.
+    pub bent: Option<BentColumns>,
     pub materials: Vec<LaneMaterial>,
     /// Constants of every cell, in rows of `stride`; empty where there is one material only.
     pub mixed: Vec<f32>,
     /// True where no material has c2 or c3, and where one has c01.
     pub is_linear: bool,
     pub has_c01: bool,
+    /// True where one has powers of the stretches.
+    pub has_powers: bool,
     pub quartic: f64,
     /// 1 for cells where open faces meet, in rows of `stride`; empty: none.
     pub on_edge: Vec<f32>,
@@ -120,8 +127,10 @@ impl LaneBlock {
                 },
                 y: edges(1),
                 z: edges(2),
+                bent: BentColumns::new(block, stride),
                 is_linear: materials.iter().all(|m| m.law.is_linear()),
                 has_c01: materials.iter().any(|m| m.law.c01 != 0.0),
+                has_powers: materials.iter().any(|m| m.powers.is_some()),
                 mixed,
                 materials,
                 quartic: elements.quartic(),
@@ -130,7 +139,7 @@ impl LaneBlock {
             team: Team::new(threads_for(block.cell_count())),
             places: vec![0.0; lines * PLACE],
             lines: vec![0.0; ny * nz * LINES * stride],
-            nodes: NodeLines::new(block.node_count(), nx + 1, stride),
+            nodes: NodeLines::new(model, nx + 1, stride),
         })
     }
 
@@ -139,9 +148,9 @@ impl LaneBlock {
         &self.team
     }
 
-    /// Law of a material.
-    pub fn law(&self, material: usize) -> Polynomial {
-        self.grid.materials[material].law
+    /// Law of a material, where it is a polynomial.
+    pub fn law(&self, material: usize) -> Option<Polynomial> {
+        self.grid.materials[material].polynomial()
     }
 
     /// Numbers of the nodes.
@@ -157,6 +166,7 @@ impl LaneBlock {
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
         4 * (self.places.len() + self.lines.len() + self.grid.on_edge.len() + self.grid.mixed.len())
+            + self.grid.bent.as_ref().map_or(0, BentColumns::bytes)
             + self.nodes.bytes()
     }
 
@@ -164,14 +174,31 @@ impl LaneBlock {
     pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3], stiffness: &[f64]) {
         let LaneBlock { grid, team, places, lines, nodes } = self;
         let (stride, [_, ny, nz]) = (grid.stride, grid.cells);
-        let weakened = stiffness.iter().any(|s| *s != 1.0);
-        let stiffness = if weakened { stiffness } else { &[] };
+        let stiffness = left_by_a_path(stiffness);
         let rows = CellRows { grid, places, model, elements, displacement, stiffness };
         let part = team.part(ny * nz);
         team.map(lines.chunks_mut(part * LINES * stride), |i, lines| rows.compute(i * part, lines));
         let lines = lines.as_slice();
         let part = team.part((ny + 1) * (nz + 1));
         team.map(nodes.numbers.chunks_mut(part * NODE * stride), |i, nodes| gather_rows(grid, lines, i * part, nodes));
+    }
+
+    /// Energies and Jacobians of all cells.
+    pub fn measure(
+        &self,
+        model: &Model,
+        elements: &Elements,
+        displacement: &[DVec3],
+        stiffness: &[f64],
+    ) -> Vec<CellMeasure> {
+        let LaneBlock { grid, team, places, .. } = self;
+        let [nx, ny, nz] = grid.cells;
+        let stiffness = left_by_a_path(stiffness);
+        let rows = CellRows { grid, places, model, elements, displacement, stiffness };
+        let part = team.part(ny * nz);
+        let mut measures = vec![CellMeasure::default(); nx * ny * nz];
+        team.map(measures.chunks_mut(part * nx), |i, measures| rows.measure(i * part, measures));
+        measures
     }
 
     /// Takes in a displacement that the last step did not make.
@@ -191,6 +218,11 @@ impl LaneBlock {
     }
 }
 
+/// The stiffness that a path left of every cell; empty where it left all of it.
+fn left_by_a_path(stiffness: &[f64]) -> &[f64] {
+    if stiffness.iter().any(|s| *s != 1.0) { stiffness } else { &[] }
+}
+
 /// Constants of every cell, row by row.
 fn mixed_rows(model: &Model, block: &BlockMesh, materials: &[LaneMaterial], stride: usize) -> Vec<f32> {
     if model.cell_material.is_empty() {
@@ -199,11 +231,14 @@ fn mixed_rows(model: &Model, block: &BlockMesh, materials: &[LaneMaterial], stri
     let [nx, ny, nz] = block.cells();
     let mut mixed = vec![0.0; ny * nz * MIXED * stride];
     for (row, values) in mixed.chunks_exact_mut(MIXED * stride).enumerate() {
+        // Nothing is divided by an exponent of zero, behind the last cell and where another law is.
+        values[(MIXED - 1) * stride..].fill(2.0);
         for i in 0..nx {
             let cell = row * nx + i;
             let m = &materials[model.material_index(cell)];
             let holds = if block.is_empty(cell) { 0.0 } else { 1.0 };
-            let numbers = [m.law.c1, m.law.c2, m.law.c3, m.law.c01, m.bulk_modulus, m.hourglass, holds];
+            let Powers { mu, alpha } = m.powers.unwrap_or(Powers { mu: 0.0, alpha: 2.0 });
+            let numbers = [m.law.c1, m.law.c2, m.law.c3, m.law.c01, m.bulk_modulus, m.hourglass, holds, mu, alpha];
             for (number, value) in numbers.into_iter().enumerate() {
                 values[number * stride + i] = value as f32;
             }

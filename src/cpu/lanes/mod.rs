@@ -1,12 +1,14 @@
 //! Cells in lanes of f32: one vector computes as many cells as the processor has lanes, of a structured block (`block`, `rows`) or of
-//! tetrahedra (`tets`, `tet_vectors`). Laws: `material/regular.rs`. No sum hangs on the number of threads.
+//! tetrahedra (`tets`, `tet_vectors`). Laws: `material/regular.rs` and `material/stretches.rs`. No sum hangs on the number of threads.
 //!
 //! A vector in which a cell has left the range of `material/regular.rs` is computed cell by cell in f64.
 
 mod block;
+mod measure;
 mod nodes;
 mod number;
 mod rows;
+mod shapes;
 mod tet_vectors;
 mod tets;
 
@@ -18,9 +20,11 @@ use self::tets::LaneTets;
 use super::integrate_nodes::{NodeStep, NodeSums};
 use super::team::Team;
 use crate::effects::TissueMaterial;
-use crate::engine::elements::{CellForces, Elements};
+use crate::engine::elements::{CellForces, CellMeasure, Elements};
+use crate::material::Isochoric;
 use crate::material::law::IsochoricLaw;
 use crate::material::regular::Polynomial;
+use crate::material::stretches::Powers;
 use crate::material_point::Material;
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -32,10 +36,19 @@ const WIDEST: usize = 16;
 /// Constants of a material, as a vector needs them.
 #[derive(Debug, Clone, Copy)]
 struct LaneMaterial {
+    /// Its polynomial part and its powers of the stretches: one of them is all of it.
     law: Polynomial,
+    powers: Option<Powers<f64>>,
     bulk_modulus: f64,
     /// kappa 3.11 mu0 [Pa].
     hourglass: f64,
+}
+
+impl LaneMaterial {
+    /// Its law, where it is a polynomial.
+    fn polynomial(&self) -> Option<Polynomial> {
+        self.powers.is_none().then_some(self.law)
+    }
 }
 
 /// The cells of a model in lanes.
@@ -48,7 +61,6 @@ impl LaneCells {
     /// # Errors
     /// What the lanes do not know of the model.
     pub fn new(model: &Model, elements: &Elements) -> Result<Self, String> {
-        known_mesh(&model.mesh)?;
         match &model.mesh {
             Mesh::Block(block) => LaneBlock::new(model, block, elements).map(LaneCells::Block),
             Mesh::Tets(mesh) => LaneTets::new(model, mesh, elements).map(LaneCells::Tets),
@@ -63,8 +75,8 @@ impl LaneCells {
         }
     }
 
-    /// Law of a material.
-    pub fn law(&self, material: usize) -> Polynomial {
+    /// Law of a material, where it is a polynomial.
+    pub fn law(&self, material: usize) -> Option<Polynomial> {
         match self {
             LaneCells::Block(cells) => cells.law(material),
             LaneCells::Tets(cells) => cells.law(material),
@@ -84,6 +96,20 @@ impl LaneCells {
         match self {
             LaneCells::Block(cells) => cells.compute(model, elements, displacement, stiffness),
             LaneCells::Tets(cells) => cells.compute(model, elements, displacement, stiffness),
+        }
+    }
+
+    /// Energies and Jacobians of all cells in the state of the last forces; `None`: these lanes leave that to f64.
+    pub fn measure(
+        &self,
+        model: &Model,
+        elements: &Elements,
+        displacement: &[DVec3],
+        stiffness: &[f64],
+    ) -> Option<Vec<CellMeasure>> {
+        match self {
+            LaneCells::Block(cells) => Some(cells.measure(model, elements, displacement, stiffness)),
+            LaneCells::Tets(_) => None,
         }
     }
 
@@ -137,29 +163,22 @@ pub fn width() -> usize {
     pulp::Arch::new().dispatch(Width)
 }
 
-/// What lanes do not know of a scene on a mesh; `None`: they know it.
-pub fn unknown_to_lanes(scene: &Scene, mesh: &Mesh) -> Option<String> {
+/// What lanes do not know of a scene; `None`: they know it.
+pub fn unknown_to_lanes(scene: &Scene) -> Option<String> {
     let mut tissues = std::iter::once(&scene.material).chain(scene.regions.iter().map(|region| &region.material));
     let known = |tissue: &TissueMaterial| known_law(&Material::of(tissue, &scene.effects)).map(drop);
-    known_mesh(mesh).and_then(|()| tissues.try_for_each(known)).err()
-}
-
-fn known_mesh(mesh: &Mesh) -> Result<(), String> {
-    match mesh {
-        Mesh::Block(block) if block.bore.is_some() => Err("the grid around a hollow needle".into()),
-        Mesh::Block(_) | Mesh::Tets(_) => Ok(()),
-    }
+    tissues.try_for_each(known).err()
 }
 
 fn materials_of(model: &Model, elements: &Elements) -> Result<Vec<LaneMaterial>, String> {
     let material = |(index, m): (usize, &Material)| {
-        let (law, bulk_modulus) = (known_law(m)?, m.law.bulk_modulus);
-        Ok(LaneMaterial { law, bulk_modulus, hourglass: elements.hourglass_of(index) })
+        let ((law, powers), bulk_modulus) = (known_law(m)?, m.law.bulk_modulus);
+        Ok(LaneMaterial { law, powers, bulk_modulus, hourglass: elements.hourglass_of(index) })
     };
     model.materials.iter().enumerate().map(material).collect()
 }
 
-fn known_law(material: &Material) -> Result<Polynomial, String> {
+fn known_law(material: &Material) -> Result<(Polynomial, Option<Powers<f64>>), String> {
     let effects = [
         (material.plasticity.is_some(), "plasticity"),
         (material.viscoelastic.is_some(), "viscoelasticity"),
@@ -171,7 +190,14 @@ fn known_law(material: &Material) -> Result<Polynomial, String> {
         return Err(name.into());
     }
     let law = &material.law.isochoric;
-    law.polynomial().ok_or_else(|| format!("the law {}", law.key()))
+    match (law.polynomial(), law.powers()) {
+        (Some(polynomial), powers) => Ok((polynomial, powers)),
+        (None, Some(powers)) => Ok((Polynomial::default(), Some(powers))),
+        (None, None) => Err(match law {
+            Isochoric::Ogden(_) => format!("the law {} with a negative exponent", law.key()),
+            _ => format!("the law {}", law.key()),
+        }),
+    }
 }
 
 /// Threads that so many cells are worth: a stage of a few hundred cells is done before another thread has joined.

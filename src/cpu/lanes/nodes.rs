@@ -1,18 +1,21 @@
 //! The step of the nodes of cells in lanes, line by line.
 //!
-//! Most nodes are free, carry no load, are tied to nothing and stay below the limits. Their step is
+//! Most nodes are free, carry no load and stay below the limits. Their step is
 //! `v+ = (a v + kick) c, u+ = u + dt v+` with `kick = f dt/m`: one loop over the components of a line. All others of the line take the step
-//! of the f64 engine afterwards.
+//! of the f64 engine afterwards. Copies that are tied have the force and the mass of all of them, summed in one order, so that they stay
+//! together to the last bit.
 
 use glam::DVec3;
 use pulp::{Arch, Simd, WithSimd};
 
+use super::WIDEST;
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
 use crate::effects::mass_scaling::{MOST_RAISED, RAISED_STEP_RATIO};
 use crate::engine::WATCHED_STEP_RATIO;
 use crate::engine::elements::CellForces;
-use crate::model::HELD;
+use crate::model::{HELD, Model};
+use crate::separation::NO_TIE;
 
 /// f32 per node: force of every axis, and the bound.
 pub(super) const NODE: usize = 4;
@@ -23,15 +26,42 @@ pub(super) struct NodeLines {
     width: usize,
     stride: usize,
     pub numbers: Vec<f32>,
+    /// Groups of tied copies in compressed rows, in the order of the model.
+    tie_starts: Vec<u32>,
+    copies: Vec<TiedCopy>,
+}
+
+/// One of the copies of a node that move as one.
+#[derive(Debug, Clone, Copy)]
+struct TiedCopy {
+    node: u32,
+    /// Where its first number stands.
+    first: u32,
 }
 
 impl NodeLines {
-    pub fn new(nodes: usize, width: usize, stride: usize) -> Self {
-        NodeLines { width, stride, numbers: vec![0.0; nodes.div_ceil(width) * NODE * stride] }
+    pub fn new(model: &Model, width: usize, stride: usize) -> Self {
+        let lines = model.mesh.node_count().div_ceil(width);
+        let mut lines = NodeLines {
+            width,
+            stride,
+            numbers: vec![0.0; lines * NODE * stride],
+            tie_starts: vec![0],
+            copies: Vec::new(),
+        };
+        for tie in &model.separation.ties {
+            let copy = |node: &u32| TiedCopy { node: *node, first: lines.first_number(*node as usize) as u32 };
+            let copies: Vec<_> = tie.iter().map(copy).collect();
+            lines.copies.extend(copies);
+            lines.tie_starts.push(lines.copies.len() as u32);
+        }
+        lines
     }
 
     pub fn bytes(&self) -> usize {
         size_of_val(self.numbers.as_slice())
+            + size_of_val(self.tie_starts.as_slice())
+            + size_of_val(self.copies.as_slice())
     }
 
     /// Where the first number of a node stands; the next follow a row later each.
@@ -41,9 +71,29 @@ impl NodeLines {
 
     /// Force on a node (-f_int) [N] and its stiffness bound [N/m].
     pub fn at(&self, node: usize) -> (DVec3, f64) {
-        let first = self.first_number(node);
+        self.from(self.first_number(node))
+    }
+
+    /// The same, where the first number of the node stands.
+    #[inline(always)]
+    fn from(&self, first: usize) -> (DVec3, f64) {
         let value = |number: usize| f64::from(self.numbers[first + number * self.stride]);
         (DVec3::new(value(0), value(1), value(2)), value(3))
+    }
+
+    /// What acts on the copies of a group: force [N], bound [N/m] and mass [kg] of all.
+    #[inline(always)]
+    fn of_tie(&self, step: &NodeStep, tie: usize) -> (DVec3, f64, f64) {
+        let copies = &self.copies[self.tie_starts[tie] as usize..self.tie_starts[tie + 1] as usize];
+        let (mut force, mut bound, mut mass) = (DVec3::ZERO, 0.0, 0.0);
+        for copy in copies {
+            let (of_cells, bound_of_cells) = self.from(copy.first as usize);
+            let node = copy.node as usize;
+            force += of_cells + step.external[node];
+            bound += bound_of_cells + step.added_bound[node];
+            mass += step.model.node_mass[node];
+        }
+        (force, bound, mass)
     }
 
     /// Adds forces of a cell (with the sign of f_int) and its bounds.
@@ -70,8 +120,7 @@ impl NodeLines {
         let (width, stride) = (self.width, self.stride);
         // Copies that are tied stand in other lines.
         let any = |node: usize| self.at(node);
-        let is_plain =
-            step.gravity == DVec3::ZERO && step.model.node_load.is_empty() && step.model.separation.ties.is_empty();
+        let is_plain = step.gravity == DVec3::ZERO && step.model.node_load.is_empty();
         let part = team.part(places.len());
         let nodes = displacement.chunks_mut(part * width).zip(velocity.chunks_mut(part * width));
         let lines = places.chunks_mut(part).zip(self.numbers.chunks(part * NODE * stride));
@@ -83,7 +132,7 @@ impl NodeLines {
             for (i, ((places, numbers), (u, v))) in lines.zip(u.chunks_mut(width).zip(v.chunks_mut(width))).enumerate()
             {
                 let first = (number * part + i) * width;
-                let line = NodeLine { stride, numbers };
+                let line = NodeLine { all: self, numbers };
                 let mut sums = NodeSums::default();
                 if is_plain {
                     arch.dispatch(PlainLine { step, first, line, u, v, scratch: &mut scratch, sums: &mut sums });
@@ -107,7 +156,7 @@ impl NodeLines {
 /// The numbers of one line.
 #[derive(Clone, Copy)]
 struct NodeLine<'a> {
-    stride: usize,
+    all: &'a NodeLines,
     numbers: &'a [f32],
 }
 
@@ -117,13 +166,14 @@ impl<'a> NodeLine<'a> {
     fn rows(&self, count: usize) -> [&'a [f32]; NODE] {
         let mut rows = [&self.numbers[..count]; NODE];
         for (number, row) in rows.iter_mut().enumerate() {
-            *row = &self.numbers[number * self.stride..][..count];
+            *row = &self.numbers[number * self.all.stride..][..count];
         }
         rows
     }
 }
 
-/// Arrays of a line: per component kick, new velocity, mass and raised part of it; nodes that are not plain, as they were.
+/// Arrays of a line, with room for a vector behind it: per component kick, new velocity, mass and raised part of it, both the share of a
+/// tied copy; nodes that are not plain, as they were.
 struct Scratch {
     kick: Vec<f64>,
     new: Vec<f64>,
@@ -134,7 +184,7 @@ struct Scratch {
 
 impl Scratch {
     fn new(width: usize) -> Self {
-        let zeros = vec![0.0; 3 * width];
+        let zeros = vec![0.0; 3 * width + WIDEST];
         Scratch { kick: zeros.clone(), new: zeros.clone(), mass: zeros.clone(), raised: zeros, others: Vec::new() }
     }
 }
@@ -173,13 +223,26 @@ impl WithSimd for PlainLine<'_, '_> {
         let is_driven = model.has_driven_faces();
         let flags = &model.node_flags[first..first + count];
         let [fx, fy, fz, bounds] = line.rows(count);
+        // Nothing of an earlier line stands behind a shorter one.
+        kick[3 * count..].fill(0.0);
+        mass[3 * count..].fill(0.0);
+        raised[3 * count..].fill(0.0);
+        let ties = model.separation.tie_of.get(first..first + count).unwrap_or(&[]);
         let numbers = kick.as_chunks_mut::<3>().0[..count]
             .iter_mut()
             .zip(mass.as_chunks_mut::<3>().0)
             .zip(raised.as_chunks_mut::<3>().0);
         for (i, ((kick, mass), raised)) in numbers.enumerate() {
-            let bound = f64::from(bounds[i]) + added_bound[i];
-            let own = masses[i];
+            let (force, bound, own, share) = match ties.get(i) {
+                Some(tie) if *tie != NO_TIE => {
+                    let (force, bound, all) = line.all.of_tie(step, *tie as usize);
+                    (force, bound, all, masses[i] / all)
+                }
+                _ => {
+                    let of_cells = DVec3::new(f64::from(fx[i]), f64::from(fy[i]), f64::from(fz[i]));
+                    (of_cells + external[i], f64::from(bounds[i]) + added_bound[i], masses[i], 1.0)
+                }
+            };
             let all = (bound * raise).max(own).min(MOST_RAISED * own);
             let stands = flags[i] & HELD == HELD && !is_driven && v[i] == DVec3::ZERO;
             if (flags[i] & HELD != 0 && !stands) || bound > watched * all {
@@ -193,26 +256,21 @@ impl WithSimd for PlainLine<'_, '_> {
                 continue;
             }
             let by = dt / all;
-            let force = external[i];
-            *kick = [
-                (f64::from(fx[i]) + force.x) * by,
-                (f64::from(fy[i]) + force.y) * by,
-                (f64::from(fz[i]) + force.z) * by,
-            ];
-            (*mass, *raised) = ([all; 3], [all - own; 3]);
+            *kick = [force.x * by, force.y * by, force.z * by];
+            (*mass, *raised) = ([share * all; 3], [share * (all - own); 3]);
         }
         let alpha = model.scene.solver.mass_damping;
         let (a, c) = (1.0 - 0.5 * alpha * dt, 1.0 / (1.0 + 0.5 * alpha * dt));
         let old: &mut [f64] = bytemuck::cast_slice_mut(v);
         let places: &mut [f64] = bytemuck::cast_slice_mut(u);
         let lanes = S::F64_LANES;
-        let all = old.len() / lanes * lanes;
+        new[..old.len()].copy_from_slice(old);
+        new[old.len()..].fill(0.0);
         let zero = simd.splat_f64s(0.0);
         let (mut damped, mut gained, mut fastest) = (zero, zero, zero);
         let (a_s, c_s, half) = (simd.splat_f64s(a), simd.splat_f64s(c), simd.splat_f64s(0.5));
-        let mut at = 0;
-        while at < all {
-            let before: S::f64s = load::<S>(old, at);
+        for at in (0..old.len()).step_by(lanes) {
+            let before: S::f64s = load::<S>(new, at);
             let after = simd.mul_f64s(simd.mul_add_f64s(before, a_s, load::<S>(kick, at)), c_s);
             let mid = simd.mul_f64s(half, simd.add_f64s(before, after));
             damped = simd.mul_add_f64s(load::<S>(mass, at), simd.mul_f64s(mid, mid), damped);
@@ -221,19 +279,9 @@ impl WithSimd for PlainLine<'_, '_> {
             gained = simd.mul_add_f64s(load::<S>(raised, at), grown, gained);
             fastest = simd.max_f64s(fastest, simd.abs_f64s(after));
             new[at..at + lanes].copy_from_slice(bytemuck::cast_slice(std::slice::from_ref(&after)));
-            at += lanes;
         }
-        let (mut damped, mut gained) = (simd.reduce_sum_f64s(damped), simd.reduce_sum_f64s(gained));
-        let mut fastest = simd.reduce_max_f64s(fastest);
-        while at < old.len() {
-            let (before, after) = (old[at], (old[at] * a + kick[at]) * c);
-            let mid = 0.5 * (before + after);
-            damped += mass[at] * (mid * mid);
-            gained += raised[at] * mid * (after - before);
-            fastest = fastest.max(after.abs());
-            new[at] = after;
-            at += 1;
-        }
+        let (damped, gained) = (simd.reduce_sum_f64s(damped), simd.reduce_sum_f64s(gained));
+        let fastest = simd.reduce_max_f64s(fastest);
         // The limit is one of the whole velocity: what may be beyond it, or is not a number, takes the other way.
         let largest = step.limit / 3f64.sqrt();
         if !(fastest < largest && damped.is_finite()) {

@@ -95,6 +95,43 @@ impl<S: Simd> Number for Lanes<S> {
         root
     }
 
+    // ln(1 + x) = 8 ln(1 + y) after three roots of 1 + x, by the series of y/(2 + y): digits of a small x are kept.
+    #[inline(always)]
+    fn logarithm(self) -> Self {
+        let one = self.of(1.0);
+        let mut y = self;
+        for _ in 0..3 {
+            y = y.over(one + (one + y).root());
+        }
+        let z = y.over(y + self.of(2.0));
+        let square = z * z;
+        let mut sum = self.of(1.0 / 11.0);
+        let mut degree = 9;
+        while degree > 0 {
+            sum = square.mul_add(sum, self.of(1.0 / f64::from(degree)));
+            degree -= 2;
+        }
+        self.of(16.0) * z * sum
+    }
+
+    // The series of x/32, then 1 + z squared five times.
+    #[inline(always)]
+    fn exponential(self) -> Self {
+        let one = self.of(1.0);
+        let x = self * self.of(1.0 / 32.0);
+        let mut sum = x.mul_add(self.of(1.0 / 8.0), one);
+        let mut degree = 7;
+        while degree > 1 {
+            sum = (x * self.of(1.0 / f64::from(degree))).mul_add(sum, one);
+            degree -= 1;
+        }
+        let mut z = x * sum;
+        for _ in 0..5 {
+            z = z.mul_add(z, z + z);
+        }
+        z
+    }
+
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
         Lanes { value: self.simd.max_f32s(self.value, other.value), ..self }

@@ -9,17 +9,17 @@ use pulp::{Simd, WithSimd};
 use super::block::{Grid, LINES, MIXED, PLACE};
 use super::nodes::NODE;
 use super::number::Lanes;
+use super::shapes::{Boxes, Prisms, SIGNS, Shape};
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, Elements};
 use crate::material::number::Number;
 use crate::material::regular::{Constants, Regular, dot};
+use crate::material::stretches::Powers;
 use crate::mesh::CORNERS;
 use crate::model::Model;
 
-/// Number in node lines of the corners of a cell: bit 0 along x, bit 1 along y, bit 2 along z.
-const PLACES: usize = 8;
 /// Products of two and of three signs, by their bits.
-const HOURGLASS: [usize; 4] = [6, 5, 3, 7];
+pub(super) const HOURGLASS: [usize; 4] = [6, 5, 3, 7];
 
 /// What all rows read.
 pub(super) struct CellRows<'a> {
@@ -41,7 +41,7 @@ struct RowForces {
 impl RowForces {
     fn new(stride: usize) -> Self {
         let width = WIDEST + stride;
-        RowForces { width, values: vec![0.0; (3 * PLACES + 1) * width] }
+        RowForces { width, values: vec![0.0; (3 * SIGNS + 1) * width] }
     }
 
     fn place(&self, corner: usize, axis: usize, cell: usize) -> usize {
@@ -49,7 +49,7 @@ impl RowForces {
     }
 
     fn bound(&self, cell: usize) -> usize {
-        self.place(PLACES, 0, cell)
+        self.place(SIGNS, 0, cell)
     }
 }
 
@@ -78,42 +78,97 @@ impl WithSimd for SomeRows<'_> {
         for (i, lines) in lines.chunks_exact_mut(LINES * stride).enumerate() {
             let row = first + i;
             cell_row(simd, rows, [row % ny, row / ny], &mut forces, &mut intact);
-            add_up(simd, &forces, stride, lines);
+            add_up(simd, &forces, stride, rows.grid.cells[0] + 1, lines);
         }
+    }
+}
+
+/// One row of cells.
+pub(super) struct Row<'a> {
+    first_cell: usize,
+    edges: [usize; 2],
+    node_lines: [&'a [f32]; 4],
+    on_edge: Option<&'a [f32]>,
+}
+
+impl Row<'_> {
+    /// Number of its first cell.
+    pub fn first_cell(&self) -> usize {
+        self.first_cell
+    }
+}
+
+impl<'a> CellRows<'a> {
+    /// The row at `[j, k]`; `intact`: gets the stiffness that a path left of its cells.
+    pub(super) fn row(&self, [j, k]: [usize; 2], intact: &mut [f32]) -> Row<'a> {
+        let CellRows { grid, places, stiffness, .. } = *self;
+        let (stride, [nx, ny, _]) = (grid.stride, grid.cells);
+        let first_cell = (k * ny + j) * nx;
+        if !stiffness.is_empty() {
+            for (to, from) in intact.iter_mut().zip(&stiffness[first_cell..first_cell + nx]) {
+                *to = *from as f32;
+            }
+        }
+        let line = |j: usize, k: usize| &places[(k * (ny + 1) + j) * PLACE * stride..][..PLACE * stride];
+        Row {
+            first_cell,
+            edges: [j, k],
+            node_lines: [line(j, k), line(j + 1, k), line(j, k + 1), line(j + 1, k + 1)],
+            on_edge: grid.on_edge.get((k * ny + j) * stride..(k * ny + j + 1) * stride),
+        }
+    }
+
+    /// The vector of a row whose first cell is `i`, and what its cells are made of; `None`: no cell of it holds tissue.
+    #[inline(always)]
+    pub(super) fn vector<'b, S: Simd>(
+        &self,
+        simd: S,
+        row: &Row<'b>,
+        i: usize,
+        intact: &'b [f32],
+    ) -> (Vector<'b>, Option<MaterialLanes<S>>) {
+        let CellRows { grid, model, .. } = *self;
+        let (first_cell, edges) = (row.first_cell, row.edges);
+        let last = (i + Lanes::<S>::COUNT).min(grid.cells[0]);
+        let kind = |i: usize| model.material_index(first_cell + i);
+        let first = kind(i);
+        let is_uniform = model.cell_material.is_empty() || (i..last).all(|i| kind(i) == first);
+        let vector = Vector { i, node_lines: row.node_lines, on_edge: row.on_edge, intact };
+        let empty = model.mesh.block().empty.as_slice();
+        if !empty.is_empty() && (i..last).all(|i| empty[first_cell + i]) {
+            return (vector, None);
+        }
+        let material = match is_uniform {
+            true => MaterialLanes::uniform(simd, &grid.materials[first]),
+            false => {
+                let row = edges[1] * grid.cells[1] + edges[0];
+                MaterialLanes::mixed(simd, grid, &grid.mixed[row * MIXED * grid.stride..], i)
+            }
+        };
+        (vector, Some(material))
     }
 }
 
 /// Forces and bounds of one row.
 #[inline(always)]
-fn cell_row<S: Simd>(simd: S, rows: &CellRows, [j, k]: [usize; 2], forces: &mut RowForces, intact: &mut [f32]) {
-    let CellRows { grid, places, model, .. } = *rows;
-    let (stride, [nx, ny, _]) = (grid.stride, grid.cells);
-    let first_cell = (k * ny + j) * nx;
-    if !rows.stiffness.is_empty() {
-        for (to, from) in intact.iter_mut().zip(&rows.stiffness[first_cell..first_cell + nx]) {
-            *to = *from as f32;
-        }
-    }
-    let line = |j: usize, k: usize| &places[(k * (ny + 1) + j) * PLACE * stride..][..PLACE * stride];
-    let node_lines = [line(j, k), line(j + 1, k), line(j, k + 1), line(j + 1, k + 1)];
-    let on_edge = grid.on_edge.get((k * ny + j) * stride..(k * ny + j + 1) * stride);
-    let empty = model.mesh.block().empty.as_slice();
+fn cell_row<S: Simd>(simd: S, rows: &CellRows, at: [usize; 2], forces: &mut RowForces, intact: &mut [f32]) {
+    let grid = rows.grid;
+    let nx = grid.cells[0];
+    let row = rows.row(at, intact);
     for i in (0..nx).step_by(Lanes::<S>::COUNT) {
-        let last = (i + Lanes::<S>::COUNT).min(nx);
-        let kind = |i: usize| model.material_index(first_cell + i);
-        let first = kind(i);
-        let is_uniform = model.cell_material.is_empty() || (i..last).all(|i| kind(i) == first);
-        let vector = Vector { i, edges: [j, k], node_lines, on_edge, intact };
-        if !empty.is_empty() && (i..last).all(|i| empty[first_cell + i]) {
+        let (vector, material) = rows.vector(simd, &row, i, intact);
+        let Some(material) = material else {
             nothing(simd, &vector, forces);
             continue;
-        }
-        let material = match is_uniform {
-            true => MaterialLanes::uniform(simd, &grid.materials[first]),
-            false => MaterialLanes::mixed(simd, grid, &grid.mixed[(k * ny + j) * MIXED * stride..], i),
         };
-        if !lane_forces(simd, grid, &material, &vector, forces) {
-            cells_one_by_one(rows, first_cell, i..last, forces);
+        let is_known = match &grid.bent {
+            None => lane_forces(simd, grid, &Boxes::new(simd, grid, i, at), &material, &vector, forces),
+            Some(columns) => {
+                lane_forces(simd, grid, &Prisms::new(simd, grid, columns, i, at), &material, &vector, forces)
+            }
+        };
+        if !is_known {
+            cells_one_by_one(rows, row.first_cell, i..(i + Lanes::<S>::COUNT).min(nx), forces);
         }
     }
 }
@@ -122,7 +177,7 @@ fn cell_row<S: Simd>(simd: S, rows: &CellRows, [j, k]: [usize; 2], forces: &mut 
 #[inline(always)]
 fn nothing<S: Simd>(simd: S, at: &Vector, forces: &mut RowForces) {
     let zero = Lanes::splat(simd, 0.0);
-    for corner in 0..PLACES {
+    for corner in 0..SIGNS {
         for axis in 0..3 {
             let place = forces.place(corner, axis, at.i);
             zero.store(&mut forces.values, place);
@@ -133,20 +188,28 @@ fn nothing<S: Simd>(simd: S, at: &Vector, forces: &mut RowForces) {
 }
 
 /// Constants of the materials of a vector.
-struct MaterialLanes<S: Simd> {
-    law: Constants<Lanes<S>>,
-    bulk: Lanes<S>,
-    hourglass: Lanes<S>,
+pub(super) struct MaterialLanes<S: Simd> {
+    pub law: Constants<Lanes<S>>,
+    /// `None`: no lane has any.
+    pub powers: Option<Powers<Lanes<S>>>,
+    pub bulk: Lanes<S>,
+    pub hourglass: Lanes<S>,
     /// 1 where a cell holds tissue, 0 where it is empty; `None`: all do.
-    holds: Option<Lanes<S>>,
+    pub holds: Option<Lanes<S>>,
 }
 
 impl<S: Simd> MaterialLanes<S> {
     /// One material.
     #[inline(always)]
     fn uniform(simd: S, material: &LaneMaterial) -> Self {
+        let zero = Lanes::splat(simd, 0.0);
+        let mut powers = None;
+        if let Some(of_material) = &material.powers {
+            powers = Some(of_material.in_lanes(zero));
+        }
         MaterialLanes {
-            law: material.law.in_lanes(Lanes::splat(simd, 0.0)),
+            law: material.law.in_lanes(zero),
+            powers,
             bulk: Lanes::splat(simd, material.bulk_modulus as f32),
             hourglass: Lanes::splat(simd, material.hourglass as f32),
             holds: None,
@@ -166,8 +229,13 @@ impl<S: Simd> MaterialLanes<S> {
             is_linear: grid.is_linear,
             has_c01: grid.has_c01,
         };
+        let powers = match grid.has_powers {
+            true => Some(Powers { mu: Lanes::load(simd, row, number(7)), alpha: Lanes::load(simd, row, number(8)) }),
+            false => None,
+        };
         MaterialLanes {
             law,
+            powers,
             bulk: Lanes::load(simd, row, number(4)),
             hourglass: Lanes::load(simd, row, number(5)),
             holds: Some(Lanes::load(simd, row, number(6))),
@@ -176,23 +244,22 @@ impl<S: Simd> MaterialLanes<S> {
 }
 
 /// One vector of cells of a row.
-struct Vector<'a> {
+pub(super) struct Vector<'a> {
     /// The first of its cells.
-    i: usize,
-    edges: [usize; 2],
+    pub i: usize,
     node_lines: [&'a [f32]; 4],
     on_edge: Option<&'a [f32]>,
-    intact: &'a [f32],
+    pub intact: &'a [f32],
 }
 
 /// Sums and differences of the values at the corners: what a field has of every product of signs (`xi`, `eta`, `xi eta` ... by their
 /// bits), and back.
 #[inline(always)]
-fn hadamard<N: Number>(mut v: [N; PLACES]) -> [N; PLACES] {
+pub(super) fn hadamard<N: Number>(mut v: [N; SIGNS]) -> [N; SIGNS] {
     let mut bit = 1;
-    while bit < PLACES {
+    while bit < SIGNS {
         let mut low = 0;
-        while low < PLACES {
+        while low < SIGNS {
             if low & bit == 0 {
                 let (a, b) = (v[low], v[low | bit]);
                 (v[low], v[low | bit]) = (a + b, b - a);
@@ -206,11 +273,11 @@ fn hadamard<N: Number>(mut v: [N; PLACES]) -> [N; PLACES] {
 
 /// The transpose of [`hadamard`].
 #[inline(always)]
-fn spread<N: Number>(mut v: [N; PLACES]) -> [N; PLACES] {
+fn spread<N: Number>(mut v: [N; SIGNS]) -> [N; SIGNS] {
     let mut bit = 1;
-    while bit < PLACES {
+    while bit < SIGNS {
         let mut low = 0;
-        while low < PLACES {
+        while low < SIGNS {
             if low & bit == 0 {
                 let (sum, difference) = (v[low], v[low | bit]);
                 (v[low], v[low | bit]) = (sum - difference, sum + difference);
@@ -222,41 +289,42 @@ fn spread<N: Number>(mut v: [N; PLACES]) -> [N; PLACES] {
     v
 }
 
+/// Displacement of every corner less that of the first one [m], by axis.
+#[inline(always)]
+pub(super) fn differences<S: Simd>(simd: S, stride: usize, at: &Vector) -> [[Lanes<S>; SIGNS]; 3] {
+    let mut all = [[Lanes::splat(simd, 0.0); SIGNS]; 3];
+    for axis in 0..3 {
+        let (high, low) = (2 * axis * stride + at.i, (2 * axis + 1) * stride + at.i);
+        let first = [Lanes::load(simd, at.node_lines[0], high), Lanes::load(simd, at.node_lines[0], low)];
+        for corner in 1..SIGNS {
+            let (line, beside) = (at.node_lines[corner / 2], corner % 2);
+            all[axis][corner] = (Lanes::load(simd, line, high + beside) - first[0])
+                + (Lanes::load(simd, line, low + beside) - first[1]);
+        }
+    }
+    all
+}
+
 /// Forces and bounds of a vector; false where a cell has left the range of these forms.
 #[inline(always)]
 fn lane_forces<S: Simd>(
     simd: S,
     grid: &Grid,
+    shape: &impl Shape<S>,
     material: &MaterialLanes<S>,
     at: &Vector,
     forces: &mut RowForces,
 ) -> bool {
     let stride = grid.stride;
     // No closures and no adapters of iterators from here on: what is not inlined falls back to calls per operation.
-    let [ey, ez] = [grid.y[at.edges[0]], grid.z[at.edges[1]]];
     let zero = Lanes::splat(simd, 0.0);
     let one = Lanes::splat(simd, 1.0);
-    let quarter =
-        [Lanes::load(simd, &grid.x.quarter, at.i), Lanes::splat(simd, ey.quarter), Lanes::splat(simd, ez.quarter)];
-    // Modes of every axis, from differences to the first corner.
-    let mut modes = [[zero; PLACES]; 3];
+    let differences = differences(simd, stride, at);
+    let mut modes = [[zero; SIGNS]; 3];
     for axis in 0..3 {
-        let (high, low) = (2 * axis * stride + at.i, (2 * axis + 1) * stride + at.i);
-        let first = [Lanes::load(simd, at.node_lines[0], high), Lanes::load(simd, at.node_lines[0], low)];
-        let mut v = [zero; PLACES];
-        for corner in 1..PLACES {
-            let (line, beside) = (at.node_lines[corner / 2], corner % 2);
-            v[corner] = (Lanes::load(simd, line, high + beside) - first[0])
-                + (Lanes::load(simd, line, low + beside) - first[1]);
-        }
-        modes[axis] = hadamard(v);
+        modes[axis] = hadamard(differences[axis]);
     }
-    let mut h = [[zero; 3]; 3];
-    for b in 0..3 {
-        for axis in 0..3 {
-            h[b][axis] = modes[axis][1 << b] * quarter[b];
-        }
-    }
+    let mut h = shape.gradient(&modes);
     if let Some(holds) = material.holds {
         // An empty cell may be as crooked as it likes.
         for b in 0..3 {
@@ -268,11 +336,19 @@ fn lane_forces<S: Simd>(
     let Some(state) = Regular::new(h) else { return false };
     let intact = Lanes::load(simd, at.intact, at.i);
     let bulk = material.bulk;
-    let p = state.stress(&material.law, bulk * state.dj);
-    let volume = Lanes::load(simd, &grid.x.length, at.i) * Lanes::splat(simd, ey.length * ez.length);
-    let edge = Lanes::load(simd, &grid.x.cube_root, at.i) * Lanes::splat(simd, ey.cube_root * ez.cube_root);
-    let inverse_square =
-        Lanes::load(simd, &grid.x.inverse_square, at.i) * Lanes::splat(simd, ey.inverse_square * ez.inverse_square);
+    let mut p = state.stress(&material.law, bulk * state.dj);
+    let mut of_powers = zero;
+    if let Some(powers) = &material.powers {
+        let Some((added, bound)) = state.stress_and_bound_of_powers(powers) else { return false };
+        of_powers = bound;
+        for b in 0..3 {
+            for axis in 0..3 {
+                p[b][axis] = p[b][axis] + added[b][axis];
+            }
+        }
+    }
+    let [volume, edge, inverse_square] = shape.sizes();
+    shape.take_linear(&mut modes);
     // Hourglass modes: products of two and of three signs; an eighth of the sums.
     let mut q2 = zero;
     for mode in &modes {
@@ -284,38 +360,34 @@ fn lane_forces<S: Simd>(
     let folding = Lanes::splat(simd, grid.quartic as f32) * q2 * inverse_square;
     let hourglass = material.hourglass * edge;
     let kh = intact * hourglass * (one + folding) * Lanes::splat(simd, 1.0 / 64.0);
-    let by_stress = intact * volume;
+    let by_mode = shape.scaled(intact * volume).turned(&p);
     for axis in 0..3 {
-        let mut v = [zero; PLACES];
+        let mut v = [zero; SIGNS];
         for b in 0..3 {
-            v[1 << b] = p[b][axis] * (by_stress * quarter[b]);
+            v[1 << b] = by_mode[b][axis];
         }
         for bits in HOURGLASS {
             v[bits] = modes[axis][bits] * kh;
         }
+        shape.add_linear(&mut v);
         let v = spread(v);
-        for corner in 0..PLACES {
+        for corner in 0..SIGNS {
             let place = forces.place(corner, axis, at.i);
             v[corner].store(&mut forces.values, place);
         }
     }
     let [straight, turned] = state.tangent_bound(&material.law, bulk);
-    let mut cof = state.cofactor();
-    for b in 0..3 {
-        for axis in 0..3 {
-            cof[b][axis] = cof[b][axis] * quarter[b];
-        }
-    }
+    let straight = straight + of_powers;
+    let cof = shape.turned(&state.cofactor());
     let (xx, yy, zz) = (dot(cof[0], cof[0]), dot(cof[1], cof[1]), dot(cof[2], cof[2]));
     let (xy, yz, zx) = (dot(cof[0], cof[1]).size(), dot(cof[1], cof[2]).size(), dot(cof[2], cof[0]).size());
     let mut turning = (xx + xy + zx).larger(yy + xy + yz).larger(zz + yz + zx);
-    let [bx, by, bz] = [quarter[0] * quarter[0], quarter[1] * quarter[1], quarter[2] * quarter[2]];
-    let mut shearing = bx.larger(by).larger(bz);
+    let [mut shearing, all_shearing] = shape.squares();
     if let Some(on_edge) = at.on_edge {
         let on_edge = Lanes::load(simd, on_edge, at.i);
         let all = xx + yy + zz + Lanes::splat(simd, 2.0) * (xy + yz + zx);
         turning = on_edge.mul_add(all - turning, turning);
-        shearing = on_edge.mul_add(bx + by + bz - shearing, shearing);
+        shearing = on_edge.mul_add(all_shearing - shearing, shearing);
     }
     let of_modes = hourglass * (one + Lanes::splat(simd, 3.0) * folding) * Lanes::splat(simd, 0.125);
     let stiff = (bulk + turned) * turning + straight * shearing;
@@ -348,18 +420,18 @@ fn cells_one_by_one(rows: &CellRows, first_cell: usize, cells: std::ops::Range<u
 
 /// Adds up along x: the near corner of a cell and the far one of the cell before it meet in a node.
 #[inline(always)]
-fn add_up<S: Simd>(simd: S, forces: &RowForces, stride: usize, lines: &mut [f32]) {
+fn add_up<S: Simd>(simd: S, forces: &RowForces, stride: usize, nodes: usize, lines: &mut [f32]) {
     for line in 0..4 {
         for axis in 0..3 {
             let (near, far) = (forces.place(2 * line, axis, 0), forces.place(2 * line + 1, axis, 0));
-            for i in (0..stride).step_by(Lanes::<S>::COUNT) {
+            for i in (0..nodes).step_by(Lanes::<S>::COUNT) {
                 let sum = Lanes::load(simd, &forces.values, near + i) + Lanes::load(simd, &forces.values, far + i - 1);
                 sum.store(lines, (3 * line + axis) * stride + i);
             }
         }
     }
     let bound = forces.bound(0);
-    for i in (0..stride).step_by(Lanes::<S>::COUNT) {
+    for i in (0..nodes).step_by(Lanes::<S>::COUNT) {
         let sum = Lanes::load(simd, &forces.values, bound + i) + Lanes::load(simd, &forces.values, bound + i - 1);
         sum.store(lines, 12 * stride + i);
     }
@@ -383,7 +455,7 @@ impl WithSimd for Gathered<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Gathered { grid, lines, first, nodes } = self;
-        let (stride, [_, ny, nz]) = (grid.stride, grid.cells);
+        let (stride, [nx, ny, nz]) = (grid.stride, grid.cells);
         for (i, node) in nodes.chunks_exact_mut(NODE * stride).enumerate() {
             let (j, k) = ((first + i) % (ny + 1), (first + i) / (ny + 1));
             // Rows of cells beside this line, and which of their four lines it is.
@@ -398,7 +470,7 @@ impl WithSimd for Gathered<'_> {
                 }
             }
             for number in 0..NODE {
-                for i in (0..stride).step_by(Lanes::<S>::COUNT) {
+                for i in (0..=nx).step_by(Lanes::<S>::COUNT) {
                     let mut sum = Lanes::splat(simd, 0.0);
                     for (row, line) in around.iter().flatten() {
                         let which = if number == 3 { 12 } else { 3 * line + number };

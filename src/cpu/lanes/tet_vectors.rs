@@ -12,9 +12,9 @@ use super::tets::{GRADIENT, NO_CELL, Place, SHAPE, TetShapes};
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, CellShape, Elements};
 use crate::material::kinematics::jacobian_minus_one;
-use crate::material::number::Number;
+use crate::material::number::{Number, Tensor};
 use crate::material::regular::LEAST_J;
-use crate::material::regular::{Regular, Tensor, dot};
+use crate::material::regular::{Regular, dot};
 use crate::material_point::Volumetric;
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -261,7 +261,19 @@ fn lane_forces<S: Simd>(simd: S, material: &LaneMaterial, group: &Group, i: usiz
         let own = volume.of(material.bulk_modulus) * Lanes::load(simd, group.remaining, i);
         pressure = own.mul_add(flat, pressure);
     }
-    let p = state.stress(&law_left, pressure);
+    let mut p = state.stress(&law_left, pressure);
+    let mut of_powers = zero;
+    if let Some(powers) = &material.powers {
+        let powers = powers.in_lanes(volume);
+        let Some((added, bound)) = state.stress_and_bound_of_powers(&powers) else { return false };
+        of_powers = bound;
+        let left = if group.weakened { Lanes::load(simd, group.remaining, i) } else { Lanes::splat(simd, 1.0) };
+        for b in 0..3 {
+            for axis in 0..3 {
+                p[b][axis] = left.mul_add(added[b][axis], p[b][axis]);
+            }
+        }
+    }
     let force = at_corners(p, gradient);
     for corner in 0..4 {
         for axis in 0..3 {
@@ -270,6 +282,7 @@ fn lane_forces<S: Simd>(simd: S, material: &LaneMaterial, group: &Group, i: usiz
     }
     let bulk = Lanes::splat(simd, material.bulk_modulus as f32);
     let [straight, turned] = state.tangent_bound(&law, bulk);
+    let straight = straight + of_powers;
     let cof = at_corners(state.cofactor(), gradient);
     let (mut turning, mut shearing) = ([zero; 4], [zero; 4]);
     for corner in 0..4 {

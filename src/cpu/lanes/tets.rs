@@ -205,7 +205,7 @@ impl LaneTets {
             changes: vec![0.0; slots],
             pressures: vec![0.0; nodes],
             forces: vec![[0.0; 4]; 4 * slots],
-            nodes: NodeLines::new(nodes, LINE, LINE),
+            nodes: NodeLines::new(model, LINE, LINE),
             shapes,
         })
     }
@@ -215,9 +215,9 @@ impl LaneTets {
         &self.team
     }
 
-    /// Law of a material.
-    pub fn law(&self, material: usize) -> Polynomial {
-        self.shapes.materials[material].law
+    /// Law of a material, where it is a polynomial.
+    pub fn law(&self, material: usize) -> Option<Polynomial> {
+        self.shapes.materials[material].polynomial()
     }
 
     /// Numbers of the nodes.
