@@ -3,7 +3,7 @@
 # a linker, the Vulkan loader, and a software Vulkan driver where no driver is there at all.
 # Arguments name further programs that are wanted, each in the Debian package of its name in small letters:
 # `scripts/setup.sh parallel`. The word `window` stands for the libraries that a window needs, `gamepad` and `sound` for
-# what a gamepad and tones need to be built in.
+# what a gamepad and tones need to be built in. `screen-reader` needs nothing: what talks to readers is compiled in.
 # Installs nothing when all is there; says what it installs; without apt or the right to use it, it says what is missing
 # and goes on (Stylet then runs on its CPU engine).
 set -euo pipefail
@@ -31,6 +31,8 @@ for program in "$@"; do
         if [ "$(uname -s)" = Linux ]; then
             pkg-config --exists alsa 2>/dev/null || missing+=(libasound2-dev pkg-config)
         fi
+    elif [ "$program" = screen-reader ]; then
+        :
     elif ! command -v "$program" >/dev/null; then
         missing+=("${program,,}")
     fi

@@ -2,7 +2,8 @@
 //! [Project Fluent](https://projectfluent.org). [`say`] gives a text, [`say_with`] fills its places.
 //!
 //! Names of keys, columns and files are not words in this sense: they stay English whatever the language, as does the command line.
-//! English is complete (`tests/words.rs` compares all others with it) and stands in where a text is missing.
+//! English is complete (`tests/words.rs` compares all others with it) and stands in where a text is missing. What a scene says in English
+//! itself, its briefing and its names, is in the file `tasks` of every other language.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -30,7 +31,7 @@ macro_rules! files {
 /// All languages; the first stands in for every other.
 pub static LANGUAGES: [Language; 2] = [
     Language { code: "en", name: "English", files: files!("en": "window" "start" "lesson" "teacher") },
-    Language { code: "de", name: "Deutsch", files: files!("de": "window" "start" "lesson" "teacher") },
+    Language { code: "de", name: "Deutsch", files: files!("de": "window" "start" "lesson" "teacher" "tasks") },
 ];
 
 /// Number of the present language.

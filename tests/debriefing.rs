@@ -18,9 +18,10 @@ use stylet::window::hand::{Desk, InputDevice, Key, Recording};
 use stylet::window::lesson::Lesson;
 use stylet::window::practice::{Leader, Practice, Renewed, State};
 use stylet::window::source::Source;
+use stylet::words::say;
 
 use crate::common;
-use crate::layout::{english, everywhere, wrong};
+use crate::layout::{MARGIN, WITH_MARGIN, english, everywhere, wrong};
 
 const COARSE: [&str; 2] = ["tissue.cell_size_mm=1.3", "tissue.size_mm=[14, 14, 12]"];
 
@@ -135,6 +136,13 @@ fn through_the_vessel() -> Scene {
     ];
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/training/avoid_vessel.toml");
     Scene::load(&path, &overrides.map(String::from)).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Where the way to the next task lies in a window of 1280 x 800 [points]; texts are English.
+pub fn place_of_next_task() -> egui::Pos2 {
+    let harness = harness(debriefing(&through_the_vessel()), WITH_MARGIN);
+    let place = harness.get_by_label(say("debrief-next")).rect().center();
+    place - egui::vec2(MARGIN, MARGIN)
 }
 
 struct Shown {

@@ -10,12 +10,14 @@ use egui::epaint::{ClippedShape, Shape, TextShape};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use stylet::training::history::History;
+use stylet::training::scene_words;
 use stylet::training::trainees;
 use stylet::window::camera::Camera;
 use stylet::window::hand::{Desk, Recording};
 use stylet::window::help::{self, Help};
 use stylet::window::panels::{self, Choices, Wishes};
 use stylet::window::practice::{Leader, Practice, State};
+use stylet::window::scan::Scan;
 use stylet::window::screens::Next;
 use stylet::window::settings::{Fold, Settings, Theme};
 use stylet::window::source::Source;
@@ -141,7 +143,7 @@ fn the_check_finds_what_is_wrong() {
     assert!(over.iter().any(|w| w.contains("lies over")), "{over:?}");
 }
 
-fn in_a_window<S>(
+pub fn in_a_window<S>(
     size: [f32; 2],
     state: S,
     mut draw: impl FnMut(&mut egui::Ui, &mut S) + 'static,
@@ -179,6 +181,30 @@ fn every_text_of_the_start_screen_is_read() {
             let wrong = wrong(&harness.output().shapes, &[]);
             assert!(wrong.is_empty(), "{place}: {}", wrong.join("\n"));
         }
+    });
+}
+
+/// A label map that was dropped: what it holds, and the form that makes a scene of it; then the refusal of a line that misses it.
+#[test]
+fn every_text_of_a_file_that_was_brought_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/cases/liver.nrrd");
+    everywhere(|size, place| {
+        let mut start = StartScreen::new(folder.path());
+        assert_eq!(start.bring(file.clone()), None);
+        let mut harness = in_a_window(size, (start, Settings::default()), |ui, (start, settings)| {
+            start.show(ui, settings);
+        });
+        let make = say("bring-make");
+        let begin = std::time::Instant::now();
+        while harness.query_by_label(make).is_none() {
+            assert!(begin.elapsed().as_secs() < 60, "{place}: the file is not read");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            harness.run_steps(1);
+        }
+        harness.run_steps(4);
+        let found = wrong(&harness.output().shapes, &[]);
+        assert!(found.is_empty(), "{place}: {}", found.join("\n"));
     });
 }
 
@@ -257,6 +283,48 @@ fn the_keys_are_read_everywhere() {
     }
 }
 
+/// The window of 1280 x 800 with the margin that the harness puts around its contents.
+pub const WITH_MARGIN: [f32; 2] = [1280.0 + 2.0 * MARGIN, 800.0 + 2.0 * MARGIN];
+pub const MARGIN: f32 = 8.0;
+
+/// Where things of the start screen lie in a window of 1280 x 800 [points]; texts are English.
+pub struct StartPlaces {
+    pub new_trainee: egui::Pos2,
+    /// The button beside the name of a new trainee.
+    pub create: egui::Pos2,
+    pub hit_a_lesion: egui::Pos2,
+}
+
+impl StartPlaces {
+    pub fn of(history: &Path) -> StartPlaces {
+        let state = (StartScreen::new(history), Settings::default());
+        let mut harness = in_a_window([1280.0, 800.0], state, |ui, (start, settings)| _ = start.show(ui, settings));
+        let new_trainee = harness.get_by_label(say("start-new-trainee"));
+        let (place, hit_a_lesion) = (new_trainee.rect().center(), harness.get_by_role_and_label(Role::Button, CARD));
+        let hit_a_lesion = hit_a_lesion.rect().center();
+        new_trainee.click();
+        harness.run_steps(4);
+        let create = harness.get_by_label(say("start-create")).rect().center();
+        StartPlaces { new_trainee: place, create, hit_a_lesion }
+    }
+}
+
+/// What a drag of the needle does: where that is chosen.
+pub struct DragPlaces {
+    pub pushes: egui::Pos2,
+    pub tilts: egui::Pos2,
+}
+
+/// Where `Finish`, and what a drag does, lie beside the view of a task in a window of 1280 x 800 [points].
+pub fn places_of_a_task(scene: &str, gpu: &stylet::gpu::Gpu) -> (egui::Pos2, DragPlaces) {
+    let harness = in_a_window(WITH_MARGIN, bench(scene, gpu), panels);
+    let place = |key: &str| {
+        let label = words::say_of(key).unwrap();
+        harness.get_by_label(label).rect().center() - egui::vec2(MARGIN, MARGIN)
+    };
+    (place("finish"), DragPlaces { pushes: place("drag-along"), tilts: place("drag-tilt") })
+}
+
 /// An attempt with some frames, and what its panels need.
 struct Bench {
     practice: Practice,
@@ -266,6 +334,7 @@ struct Bench {
     settings: Settings,
     wishes: Wishes,
     help: bool,
+    scan: Scan,
 }
 
 fn bench(scene: &str, gpu: &stylet::gpu::Gpu) -> Bench {
@@ -293,11 +362,12 @@ fn bench(scene: &str, gpu: &stylet::gpu::Gpu) -> Bench {
         settings: Settings { theme: Theme::Light, ..Settings::default() },
         wishes: Wishes::default(),
         help: false,
+        scan: Scan::default(),
     }
 }
 
 fn panels(ui: &mut egui::Ui, bench: &mut Bench) {
-    let Bench { practice, choices, camera, desk, settings, wishes, help } = bench;
+    let Bench { practice, choices, camera, desk, settings, wishes, help, scan } = bench;
     theme::apply(ui.ctx(), settings);
     egui::Panel::top("bar").show(ui, |ui| panels::bar(ui, &practice.scene().title, settings, wishes, help));
     let [left, right] = panels::widths(ui.available_width());
@@ -317,6 +387,12 @@ fn panels(ui: &mut egui::Ui, bench: &mut Bench) {
             });
         });
     }
+    if choices.look.probe.on {
+        let height = (0.34 * ui.available_height()).clamp(130.0, 270.0);
+        egui::Panel::bottom("ultrasound").default_size(height).show(ui, |ui| {
+            scan.panel(ui, &mut choices.look.probe, practice.scene(), &practice.simulation.model.mesh);
+        });
+    }
     egui::CentralPanel::no_frame().show(ui, |ui| _ = ui.available_rect_before_wrap());
 }
 
@@ -334,9 +410,31 @@ fn every_text_around_the_view_is_read_and_panels_keep_their_width() {
                     harness.get_by_label(label).click();
                     harness.run_steps(10);
                 }
-                let wrong = wrong(&harness.output().shapes, &[&title]);
+                let wrong = wrong(&harness.output().shapes, &[scene_words::title(&title)]);
                 all.extend(wrong.into_iter().map(|wrong| format!("{scene}, {place}: {wrong}")));
             }
+        });
+    }
+    assert!(all.is_empty(), "{}", all.join("\n"));
+}
+
+/// The slice of the ultrasound below the view, with its settings, and the panels beside it.
+#[test]
+fn every_text_beside_the_ultrasound_is_read() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut all = Vec::new();
+    for scene in ["scenes/training/avoid_vessel.toml", "scenes/layers.toml"] {
+        everywhere(|size, place| {
+            let mut bench = bench(scene, &gpu);
+            bench.choices.look.probe.on = true;
+            let title = bench.practice.scene().title.clone();
+            let harness = in_a_window(size, bench, panels);
+            assert!(
+                harness.query_by_role_and_label(Role::RadioButton, say("along")).is_some(),
+                "{place}: no ultrasound"
+            );
+            let found = wrong(&harness.output().shapes, &[scene_words::title(&title)]);
+            all.extend(found.into_iter().map(|found| format!("{scene}, {place}: {found}")));
         });
     }
     assert!(all.is_empty(), "{}", all.join("\n"));

@@ -84,10 +84,18 @@ fn judged(scene: &Scene, attempts: Vec<Attempt>) {
         println!("{}: {}: {goals:?}", scene.name, attempt.what);
         assert!(score.trust.is_good(), "{}: {}: {:?}", scene.name, attempt.what, score.trust.reasons);
         match attempt.fails {
-            None => assert_eq!(score.passed(), Some(true), "{}: {}: {goals:?}", scene.name, attempt.what),
+            None => {
+                assert_eq!(score.passed(), Some(true), "{}: {}: {goals:?}", scene.name, attempt.what);
+                assert_eq!(score.share(), Some(1.0));
+                // Every task has a limit of the force that its own way keeps, with a quarter of it to spare and of some use.
+                let force = score.goals.iter().find(|g| g.key == "force_limit").expect("a limit of the force");
+                let (peak, limit) = (force.measured.expect("a force"), force.most.expect("a limit"));
+                assert!(peak < 0.75 * limit && limit < 5.0, "{}: {peak} N, limit {limit} N", scene.name);
+            }
             Some((key, words)) => {
                 assert_eq!(score.passed(), Some(false), "{}: {}: {goals:?}", scene.name, attempt.what);
                 let failed = score.goals.iter().any(|g| g.key == key && g.met == Some(false) && g.text.contains(words));
+                assert!(score.share().is_some_and(|share| share < 1.0));
                 assert!(failed, "{}: {}: not for {key} {words}: {goals:?}", scene.name, attempt.what);
             }
         }
@@ -242,6 +250,7 @@ fn a_lumbar_puncture_meets_bone_or_stops_before_the_dura() {
         vec![
             passes("as planned", vec![planned(&scene, 54.0)]),
             fails("onto bone", "avoid", "vertebrae", vec![into_region(&scene, "vertebrae")]),
+            fails("pressed onto bone", "force_limit", "", vec![into_region(&scene, "vertebrae")]),
             fails("before the ligament", "stop_in_layer", "", vec![planned(&scene, 30.0)]),
         ],
     );

@@ -13,6 +13,9 @@ use stylet::training::texts::Better;
 use stylet::training::{Trust, notes, task::GoalResult};
 use stylet::window::screens::Next;
 use stylet::window::teacher::{Page, Teacher};
+use stylet::words::say;
+
+use crate::layout::{english, everywhere, in_a_window, wrong};
 
 struct Screen {
     teacher: Teacher,
@@ -36,6 +39,7 @@ fn score(passes: f64, met: bool) -> Score {
         least: None,
         most: Some(2.0),
         met: Some(met),
+        weight: 1.0,
     };
     Score {
         scene: "made_up".into(),
@@ -74,6 +78,7 @@ fn harness(root: &Path, page: Page, size: [f32; 2], text: f32) -> Harness<'stati
 
 #[test]
 fn the_class_is_shown_and_written() {
+    let _english = english();
     let place = school();
     for text in [1.0, 1.5] {
         let mut harness = harness(place.path(), Page::Class, [1024.0, 640.0], text);
@@ -107,6 +112,7 @@ fn the_class_is_shown_and_written() {
 
 #[test]
 fn an_empty_history_and_a_broken_file_are_told() {
+    let _english = english();
     let place = tempfile::tempdir().unwrap();
     let none = harness(&place.path().join("none"), Page::Class, [1024.0, 640.0], 1.0);
     assert!(none.query_by_label_contains("There are no attempts in").is_some());
@@ -118,6 +124,7 @@ fn an_empty_history_and_a_broken_file_are_told() {
 
 #[test]
 fn two_attempts_stand_side_by_side() {
+    let _english = english();
     let place = school();
     let mut harness = harness(place.path(), Page::Comparison, [1280.0, 800.0], 1.0);
     assert!(harness.query_by_label("Choose two attempts.").is_some());
@@ -136,6 +143,7 @@ fn two_attempts_stand_side_by_side() {
 
 #[test]
 fn notes_are_kept_beside_the_attempt() {
+    let _english = english();
     let place = school();
     let mut harness = harness(place.path(), Page::Notes, [1024.0, 640.0], 1.0);
     harness.get_all_by_label("Attempt to comment").last().unwrap().click();
@@ -159,6 +167,7 @@ fn notes_are_kept_beside_the_attempt() {
 
 #[test]
 fn a_task_of_ones_own_is_saved_and_tried() {
+    let _english = english();
     let place = school();
     let mut harness = harness(place.path(), Page::Task, [1280.0, 1400.0], 1.0);
     let base = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/training/avoid_vessel.toml");
@@ -168,14 +177,52 @@ fn a_task_of_ones_own_is_saved_and_tried() {
     harness.run_steps(3);
     harness.get_by_label("Take").click();
     harness.run_steps(3);
+    assert!(harness.query_by_label("Passes through the surface: at most 2").is_some());
+    assert!(harness.query_by_label("Stay away from vessel, as the scene draws it").is_some());
     harness.get_by_label("Stay away from vessel").click();
     harness.run_steps(3);
     harness.get_by_label("Check and save").click();
     harness.run_steps(3);
     let file = place.path().join("tasks/my_task.toml");
     let scene = Scene::load(&file, &[]).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(scene.task.unwrap().goals.len(), 2, "the lesion, and the vessel as a region");
+    assert_eq!(scene.task.unwrap().goals.len(), 4, "the lesion, the vessel as a region, what the scene had beside");
     harness.get_by_label("Try it").click();
     harness.run_steps(2);
     assert_eq!(harness.state().next, Some(Next::Scene(file)));
+}
+
+/// Every page with attempts, and the form with a task in a block and one in a patient.
+#[test]
+fn every_text_of_the_pages_is_read() {
+    let place = school();
+    let mut all = Vec::new();
+    everywhere(|size, where_| {
+        for page in [Page::Class, Page::Comparison, Page::Notes, Page::Task] {
+            let mut teacher = Teacher::new(place.path());
+            teacher.turn_to(page);
+            let mut harness = in_a_window(size, teacher, |ui, teacher| _ = teacher.show(ui));
+            let mut look = |harness: &Harness<Teacher>, about: &str| {
+                let found = wrong(&harness.output().shapes, &[]);
+                all.extend(found.into_iter().map(|found| format!("{page:?} {about}, {where_}: {found}")));
+            };
+            look(&harness, "");
+            if page != Page::Task {
+                continue;
+            }
+            for scene in ["scenes/training/avoid_vessel.toml", "scenes/anatomy/neck_vein.toml"] {
+                let field = harness.get_all_by_label(say("own-base")).last().unwrap();
+                field.focus();
+                harness.run_steps(2);
+                harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
+                harness.run_steps(2);
+                harness.event(egui::Event::Text(scene.into()));
+                harness.run_steps(2);
+                harness.get_by_label(say("own-take")).click();
+                harness.run_steps(4);
+                assert!(harness.query_by_label(say("own-save")).is_some(), "{where_}: {scene} is not taken");
+                look(&harness, scene);
+            }
+        }
+    });
+    assert!(all.is_empty(), "{}", all.join("\n"));
 }

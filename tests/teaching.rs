@@ -7,12 +7,12 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::Value;
 use stylet::commands::report::{ReportArgs, ReportOutcome, report};
-use stylet::scene::{Goal, Scene};
+use stylet::scene::{Goal, Obstacle, Scene, Task};
 use stylet::simulation::{Purpose, Simulation};
 use stylet::training::class::{Class, Trend, iso_8601, key_figures};
 use stylet::training::history::{Attempt, History};
 use stylet::training::notes::{self, Note};
-use stylet::training::own_task::{Aim, OwnTask, Way};
+use stylet::training::own_task::{Aim, Avoided, OwnTask, Way};
 use stylet::training::report::{Side, of_attempt, of_trainee, of_two, pairs, two_as_text};
 use stylet::training::score::{Row, Score};
 use stylet::training::skill::{HABITS, Level};
@@ -41,6 +41,7 @@ fn score(task: &str, met: usize, figures: [f64; 4]) -> Score {
         least: None,
         most: Some(2.0),
         met: Some(n < met),
+        weight: 1.0,
     };
     let [distance, passes, smooth, time] = figures;
     Score {
@@ -179,7 +180,7 @@ fn statements_keep_the_rules_of_xapi() {
     list.iter().for_each(|s| check_statement(s, home));
     let verbs: Vec<&str> = list.iter().map(|s| s["verb"]["display"]["en-US"].as_str().unwrap()).collect();
     assert_eq!(verbs, ["failed", "failed", "passed", "attempted"]);
-    assert_eq!(list[1]["result"]["score"], serde_json::json!({ "scaled": 0.5, "raw": 1, "min": 0, "max": 2 }));
+    assert_eq!(list[1]["result"]["score"], serde_json::json!({ "scaled": 0.5, "raw": 1.0, "min": 0, "max": 2.0 }));
     assert_eq!((&list[1]["result"]["duration"], &list[1]["result"]["success"]), (&"PT9.25S".into(), &false.into()));
     assert_eq!(list[3]["result"]["response"], "the guard stopped it");
     assert!(list[3]["result"].get("success").is_none() && list[3]["result"]["completion"] == false);
@@ -263,11 +264,16 @@ fn a_task_of_ones_own_is_a_scene_that_loads() {
         let (before, after) = (Scene::load(&base, &[]).unwrap(), Scene::load(&as_it_was, &[]).unwrap());
         assert!((before.motion.deepest() - after.motion.deepest()).abs() < 1e-6);
         assert!(before.motion.direction.angle_between(after.motion.direction) < 1e-5, "{}", base.display());
-        assert_eq!(before.task.as_ref().unwrap().time_limit, after.task.as_ref().unwrap().time_limit);
+        let [had, has] = [&before, &after].map(|scene| scene.task.clone().unwrap());
+        assert_eq!(
+            (had.time_limit, had.force_limit, had.goals.len()),
+            (has.time_limit, has.force_limit, has.goals.len())
+        );
         let region = task.regions.first().unwrap().clone();
         task.name = "my \"own\" task".into();
         task.time_limit = Some(33.0);
-        task.avoid = vec![(region.clone(), 0.75)];
+        let avoided = |region: &str, clearance| vec![Avoided { region: region.into(), clearance, weight: 2.5 }];
+        task.avoid = avoided(&region, 0.75);
         if let Way::Block { entry, angle, heading, depth } = &mut task.way {
             (*entry, *angle, *heading, *depth) = ([1.0, -2.0], 10.0, 90.0, 6.0);
             task.aim = Aim::Target { name: "spot".into(), at: [1.0, -0.5, -6.0], tolerance: 0.8 };
@@ -277,8 +283,17 @@ fn a_task_of_ones_own_is_a_scene_that_loads() {
         let scene = Scene::load(&file, &[]).unwrap();
         let made = scene.task.as_ref().unwrap();
         assert_eq!((made.name.as_str(), made.time_limit), ("my \"own\" task", Some(33.0)));
-        let avoided = |g: &Goal| matches!(g, Goal::Avoid { clearance, .. } if (clearance - 0.75e-3).abs() < 1e-12);
-        assert!(made.goals.iter().any(avoided));
+        let at = |wanted: &dyn Fn(&Goal) -> bool| made.goals.iter().position(wanted);
+        let avoids = |g: &Goal| matches!(g, Goal::Avoid { clearance, .. } if (clearance - 0.75e-3).abs() < 1e-12);
+        let region_at = at(&avoids).expect("the region to stay away from");
+        assert_eq!(made.weights[region_at], 2.5);
+        // What the form does not change is there: bounds of figures, shapes, the limit of the force.
+        let kept =
+            |g: &&Goal| matches!(g, Goal::Figure { .. } | Goal::Avoid { obstacle: Obstacle::Cylinder { .. }, .. });
+        let all = |task: &Task| task.goals.iter().filter(kept).cloned().collect::<Vec<_>>();
+        let had = before.task.as_ref().unwrap();
+        assert!(!all(had).is_empty() && all(made) == all(had), "{:?} instead of {:?}", all(made), all(had));
+        assert!(made.force_limit.is_some() && made.force_limit == had.force_limit);
         if matches!(task.way, Way::Block { .. }) {
             assert!((scene.motion.deepest() - 6e-3).abs() < 1e-12 && (scene.motion.entry.x - 1e-3).abs() < 1e-12);
             assert!((scene.motion.direction.y - 10f64.to_radians().sin()).abs() < 1e-9);
@@ -287,10 +302,60 @@ fn a_task_of_ones_own_is_a_scene_that_loads() {
         assert_eq!(OwnTask::from_scene(&file).unwrap().way, task.way, "the form reads what it wrote");
         let error = task.save(&file).unwrap_err().to_string();
         assert!(error.contains("there already"), "{error}");
-        task.avoid = vec![("no such region".into(), 1.0)];
+        task.avoid = avoided("no such region", 1.0);
         let refused = place.path().join(format!("refused_{n}.toml"));
         assert!(task.save(&refused).is_err() && !refused.exists());
     }
+}
+
+/// What is not kept is switched off; a second target, a core and weights come over as they are written.
+#[test]
+fn a_task_of_ones_own_keeps_what_it_is_told_to_keep() {
+    let place = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(root().join("scenes/training/hit_target.toml")).unwrap();
+    let more = "\n[[target]]\nname = \"second\"\nposition_mm = [2.0, 0.0, -5.0]\nradius_mm = 1.0\n\n[[task.goal]]\nkind = \"hit_target\"\n\
+                target = \"second\"\nweight = 0.5\n";
+    let base = place.path().join("base.toml");
+    fs::write(&base, text.replacen("tolerance_mm = 0.75", "tolerance_mm = 0.75\nweight = 3", 1) + more).unwrap();
+    let mut task = OwnTask::from_scene(&base).unwrap();
+    assert_eq!((task.weight, task.kept.len()), (3.0, 2));
+    task.aim = Aim::Target { name: "spot".into(), at: [0.0, 0.0, -7.0], tolerance: 0.8 };
+    let figure = task.kept.iter_mut().find(|kept| matches!(kept.goal, Goal::Figure { .. })).unwrap();
+    figure.on = false;
+    let file = place.path().join("own.toml");
+    task.save(&file).unwrap_or_else(|e| panic!("{e}"));
+    let scene = Scene::load(&file, &[]).unwrap();
+    let names: Vec<&str> = scene.targets.iter().map(|target| target.name.as_str()).collect();
+    assert_eq!(names, ["spot", "second"]);
+    let made = scene.task.unwrap();
+    assert_eq!((made.goals.len(), made.weights.as_slice()), (2, &[3.0, 0.5][..]));
+    assert!(matches!(made.goals[1], Goal::HitTarget { target: 1, .. }));
+    for wrong in ["0", "-1", "nan", "1e9"] {
+        fs::write(&base, text.replacen("tolerance_mm = 0.75", &format!("tolerance_mm = 0.75\nweight = {wrong}"), 1))
+            .unwrap();
+        let error = Scene::load(&base, &[]).unwrap_err().to_string();
+        assert!(error.contains("task.goal.0.weight") || error.contains("weight"), "{error}");
+        assert!(error.contains("base.toml"), "{error}");
+    }
+}
+
+/// The share is that of the weights; passed is who has met all, whatever they weigh.
+#[test]
+fn a_share_is_weighted_and_a_verdict_is_not() {
+    let mut some = score("t", 1, [1.0; 4]);
+    assert_eq!((some.share(), some.passed()), (Some(0.5), Some(false)));
+    some.goals[0].weight = 3.0;
+    assert_eq!((some.share(), some.passed()), (Some(0.75), Some(false)));
+    let mut all = score("t", 2, [1.0; 4]);
+    all.goals[1].weight = 0.25;
+    assert_eq!((all.share(), all.passed()), (Some(1.0), Some(true)));
+    all.fail("stopped");
+    assert_eq!(all.share(), None);
+    // An attempt from before there were weights has those of 1.
+    let json = some.json().replace("\"weight\": 3.0", "\"old\": 0").replace("\"weight\": 1.0", "\"old\": 0");
+    assert!(!json.contains("weight"));
+    let read: Score = serde_json::from_str(&json).unwrap();
+    assert_eq!(read.share(), Some(0.5));
 }
 
 #[test]

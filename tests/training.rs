@@ -486,12 +486,12 @@ fn a_target_is_hit_at_the_end_of_the_way_in() {
         Score::of(&scene, &samples, &records, None).unwrap()
     };
     let hit = judged(&[5.0, 3.0, 0.74]);
-    assert_eq!((met(&hit), hit.passed()), (vec![Some(true); 3], Some(true)));
+    assert_eq!((met(&hit), hit.passed()), (vec![Some(true); 4], Some(true)));
     near(hit.goals[0].measured.unwrap(), 0.74, 1e-9);
     near(hit.value("target_distance.lesion").unwrap(), 0.74, 1e-9);
     near(hit.value("target_displacement.lesion").unwrap(), 0.3, 1e-9);
     let missed = judged(&[5.0, 3.0, 0.76]);
-    assert_eq!((met(&missed), missed.passed()), (vec![Some(false), Some(true), Some(true)], Some(false)));
+    assert_eq!((met(&missed), missed.passed()), (vec![Some(false), Some(true), Some(true), Some(true)], Some(false)));
     // Through the target and out behind it is no hit.
     assert_eq!(judged(&[5.0, 0.1, 2.0]).passed(), Some(false));
 }
@@ -504,11 +504,28 @@ fn the_time_limit_is_a_goal() {
         Score::of(&scene, &samples, &records, None).unwrap()
     };
     // From the first sample at 0.1 s to the last at 0.3 s.
-    assert_eq!(met(&judged("time_limit_s = 0.21")), [Some(true); 3]);
+    assert_eq!(met(&judged("time_limit_s = 0.21")), [Some(true); 4]);
     let late = judged("time_limit_s = 0.19");
-    assert_eq!(met(&late), [Some(true), Some(true), Some(false)]);
-    near(late.goals[2].measured.unwrap(), 0.2, 1e-9);
-    assert_eq!(met(&judged("")).len(), 2);
+    assert_eq!(met(&late), [Some(true), Some(true), Some(true), Some(false)]);
+    near(late.goals[3].measured.unwrap(), 0.2, 1e-9);
+    assert_eq!(met(&judged("")).len(), 3);
+}
+
+/// Told once while it is over the limit, and judged by its largest value.
+#[test]
+fn the_force_limit_is_a_goal_and_an_event() {
+    let scene = scene("thin_layer_stop.toml");
+    let judged = |forces: [f64; 3]| {
+        let (samples, mut records) = run(&[(1.0, 0.0), (6.5, 6.0), (6.5, 6.0)]);
+        records.iter_mut().zip(forces).for_each(|(record, force)| record.force.axial = force);
+        let events = stylet::training::events::of_run(&scene, &samples, &records);
+        let told = events.iter().filter(|e| e.kind == stylet::training::events::Kind::ForceLimit).count();
+        let score = Score::of(&scene, &samples, &records, None).unwrap();
+        let goal = score.goals.iter().find(|goal| goal.key == "force_limit").unwrap().clone();
+        (goal.measured.unwrap(), goal.met, told)
+    };
+    assert_eq!(judged([0.5, 1.5, 1.0]), (1.5, Some(true), 0));
+    assert_eq!(judged([0.5, 1.51, 1.6]), (1.6, Some(false), 1));
 }
 
 #[test]
@@ -769,6 +786,11 @@ fn wrong_tasks_are_refused_at_their_line() {
         (hit, "name = \"hit a lesion at depth\"", "name = \"a\\nb\"", "name = \"a", "is empty or holds"),
         (hit, "time_limit_s = 30.0", "time_limit_s = 0", "time_limit_s = 0", "greater than 0"),
         (hit, "time_limit_s = 30.0", "time_limit = 30", "time_limit = 30", "did you mean `time_limit_s`?"),
+        (hit, "force_limit_n = 2.0", "force_limit_n = 0", "force_limit_n = 0", "greater than 0"),
+        (hit, "force_limit_n = 2.0", "force_limit_n = 11", "force_limit_n = 11", "10"),
+        (hit, "force_limit_n = 2.0", "force_limit_mn = 2", "force_limit_mn = 2", "did you mean `force_limit_n`?"),
+        (hit, "tolerance_mm = 0.75", "weight = -1", "weight = -1", "greater than 0"),
+        (hit, "tolerance_mm = 0.75", "weight = inf", "weight = inf", "not a finite number"),
         (hit, all_goals.as_str(), "", "[task]", "has no goal"),
         (hit, goal, "kind = \"hit\"", "kind = \"hit\"", "use one of: hit_target, avoid"),
         (hit, goal, "target = \"lesion\"", "[[task.goal]]", "missing field `kind`"),

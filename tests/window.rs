@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 
 use stylet::session::{SESSION, Session};
 
+use crate::{common, debriefing, layout};
+
 /// Two windows at once would share the cores, and keys and clicks would come before what they are meant for.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
@@ -49,7 +51,8 @@ impl Display {
         let file = std::fs::File::create(&numbers).unwrap();
         let server = Command::new("Xvfb")
             // A server begins anew when its last client goes, and meanwhile refuses others: here xdotool goes before the window has come.
-            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset"])
+            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset", "-fbdir"])
+            .arg(place.path())
             .stdout(file)
             .stderr(Stdio::null())
             .spawn()
@@ -68,6 +71,34 @@ impl Display {
 
     fn path(&self, name: &str) -> PathBuf {
         self.place.path().join(name)
+    }
+
+    /// Keeps what the display shows as a PNG in the folder that the variable STYLET_PICTURES names, for people who look at the steps.
+    fn keep_picture(&self, name: &str) {
+        let Some(folder) = std::env::var_os("STYLET_PICTURES") else { return };
+        // What came last has to be drawn.
+        std::thread::sleep(Duration::from_millis(700));
+        // The server keeps its picture as X window dump: a head of 32-bit numbers, a map of colours of 12 bytes each, lines of B, G, R, 0.
+        let dump = std::fs::read(self.path("Xvfb_screen0")).unwrap();
+        let number = |n: usize| u32::from_be_bytes(dump[4 * n..4 * n + 4].try_into().unwrap()) as usize;
+        let (head, width, height, line, colours) = (number(0), number(4), number(5), number(12), number(19));
+        let begin = head + 12 * colours;
+        let mut pixels = Vec::with_capacity(4 * width * height);
+        for row in dump[begin..].chunks_exact(line).take(height) {
+            for pixel in row[..4 * width].chunks_exact(4) {
+                pixels.extend([pixel[2], pixel[1], pixel[0], 255]);
+            }
+        }
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = Path::new(&folder).join(format!("{name}.png"));
+        stylet::render::write_png(&path, &pixels, width as u32, height as u32).unwrap();
+    }
+
+    /// A click at a place of the window [points, and pixels here].
+    fn click(&self, at: egui::Pos2) {
+        let [x, y] = [at.x, at.y].map(|x| format!("{x:.0}"));
+        // The pointer rests first: a button is pressed where the pointer has been seen.
+        self.xdotool(&["mousemove", &x, &y, "sleep", "0.3", "click", "1"]);
     }
 
     fn view(&self, arguments: &[&str]) -> Command {
@@ -527,6 +558,126 @@ fn the_first_ten_minutes_from_the_start_screen_to_a_second_task() {
     assert_eq!(passed.len(), 2, "{passed:?}");
     assert!(passed.iter().any(|(_, passed)| *passed == Some(true)), "{passed:?}");
     assert!(kept().contains("hit_target.toml") && kept().contains("core_biopsy.toml"), "recent files: {}", kept());
+}
+
+/// The same person with a mouse alone: no key is pressed before the end. Places to click on are those of the same panels, drawn without a window.
+#[test]
+fn the_first_ten_minutes_by_mouse_alone() {
+    let Some(display) = Display::open() else { return };
+    let Some(gpu) = common::gpu() else { return };
+    let english = layout::english();
+    let (out, history, settings) = (display.path("attempt"), display.path("history"), display.path("settings.toml"));
+    std::fs::write(&settings, "version = 1\nlanguage = \"en\"\n").unwrap();
+    let start = layout::StartPlaces::of(&history);
+    let (finish, drags) = layout::places_of_a_task("scenes/training/hit_target.toml", &gpu);
+    let next_task = debriefing::place_of_next_task();
+    drop(english);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .current_dir(display.place.path())
+        .env("DISPLAY", &display.name)
+        .env_remove("WAYLAND_DISPLAY")
+        .args(["view", "--settings", "settings.toml", "--out", "attempt"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    display.wait(&mut child);
+    let titled = |title: &str| {
+        let name = format!("^{title}");
+        until(90, || display.xdotool(&["search", "--name", &name]).status.success())
+    };
+    // A trainee with the name that is suggested.
+    let kept = || std::fs::read_to_string(&settings).unwrap_or_default();
+    let mut pictured = false;
+    let made = until(60, || {
+        display.click(start.new_trainee);
+        std::thread::sleep(Duration::from_millis(600));
+        if !std::mem::replace(&mut pictured, true) {
+            display.keep_picture("1_trainee");
+        }
+        display.click(start.create);
+        until(3, || kept().contains("Trainee 1"))
+    });
+    assert!(made, "no trainee: {}", kept());
+    display.keep_picture("2_start");
+    assert!(
+        until(30, || {
+            display.click(start.hit_a_lesion);
+            until(5, || display.xdotool(&["search", "--name", "^Stylet - Training: hit a lesion"]).status.success())
+        }),
+        "the card does not open the task"
+    );
+    let wheel = |out: &Path, button: &str, wanted: &dyn Fn(f64) -> bool| {
+        display.xdotool(&["mousemove", "600", "620"]);
+        let there = until(150, || {
+            let before = depth(out);
+            display.xdotool(&["click", button]);
+            // Two notches of 0.25 mm: winit tells press and release of a wheel that is a button only. The next waits until they are done.
+            until(2, || (depth(out) - before).abs() > 4.5e-4);
+            wanted(depth(out))
+        });
+        assert!(there, "stuck at {} m", depth(out));
+    };
+    // The wheel begins the run. A needle 3 mm deep is tilted by a drag, and back.
+    wheel(&out, "5", &|depth| depth > 3e-3);
+    display.keep_picture("3_led");
+    // None while a line of the session is being written.
+    let leans = || Session::read(&out.join(SESSION)).ok()?.poses.last().map(|pose| pose.direction.x);
+    let drag = |x: &str, step: [&str; 2]| {
+        display.xdotool(&["mousemove", x, "160", "sleep", "0.2", "mousedown", "1"]);
+        for _ in 0..8 {
+            display.xdotool(&["mousemove_relative", "--", step[0], step[1]]);
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        display.xdotool(&["mouseup", "1"]);
+    };
+    display.click(drags.tilts);
+    drag("610", ["4", "0"]);
+    assert!(until(20, || leans().is_some_and(|x| x < -0.02)), "the drag does not tilt: {:?}", leans());
+    display.keep_picture("4_tilted");
+    // The hub stands a little aside by now.
+    drag("616", ["-4", "0"]);
+    assert!(until(20, || leans().is_some_and(|x| x.abs() < 0.02)), "the drag does not tilt back: {:?}", leans());
+    // The rest of the way: a drag of the needle, then the wheel.
+    display.click(drags.pushes);
+    let before = depth(&out);
+    drag("610", ["0", "4"]);
+    assert!(until(20, || depth(&out) > before + 0.7e-3), "the drag does not push: {}", depth(&out));
+    wheel(&out, "5", &|depth| depth > 9.3e-3);
+    display.keep_picture("5_there");
+    let scored = until(40, || {
+        display.click(finish);
+        until(3, || out.join("score.json").is_file())
+    });
+    assert!(scored, "no scores");
+    display.keep_picture("6_debriefing");
+    assert!(
+        until(30, || {
+            display.click(next_task);
+            until(5, || display.xdotool(&["search", "--name", "^Stylet - Training: stop in a thin"]).status.success())
+        }),
+        "the next task does not open"
+    );
+    assert!(titled("Stylet - Training: stop in a thin layer"));
+    let second = display.path("attempt_2");
+    wheel(&second, "5", &|depth| depth > 1e-3);
+    display.keep_picture("7_second_task");
+    // A wheel turned the other way draws it back.
+    let deep = depth(&second);
+    wheel(&second, "4", &|depth| depth < deep - 4e-4);
+    // The button that closes a window is the window manager's, and there is none.
+    display.xdotool(&["key", "ctrl+q"]);
+    let ended = until(20, || child.try_wait().unwrap().is_some());
+    if !ended {
+        let _ = child.kill();
+    }
+    let output = child.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(ended && output.status.success(), "{told}");
+    assert!(told.contains("Passed"), "{told}");
+    let attempts = stylet::training::history::History::new(&history).attempts("Trainee 1").unwrap().attempts;
+    assert_eq!(attempts.len(), 1, "kept for the trainee");
+    assert_eq!(attempts[0].score.passed(), Some(true));
 }
 
 /// A scene that is edited while its window is open: broken text is told and changes nothing, good text begins anew.

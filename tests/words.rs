@@ -2,13 +2,19 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use fluent_syntax::ast::{Entry, Expression, InlineExpression, Pattern, PatternElement};
 use fluent_syntax::parser;
+use stylet::scene::Scene;
+use stylet::training::scene_words;
 use stylet::words::{LANGUAGES, Language, Value, choose, say, say_of, say_with};
 
+/// The language is that of the whole program.
+static LANGUAGE: Mutex<()> = Mutex::new(());
+
 /// Keys that are put together where they are used: `say_of(&format!("figure-{key}"))`.
-const PUT_TOGETHER: [&str; 5] = ["figure-", "task-", "field-", "force-", "seen-from-"];
+const PUT_TOGETHER: [&str; 6] = ["figure-", "task-", "field-", "force-", "seen-from-", "name-"];
 
 fn places(pattern: &Pattern<&str>, found: &mut BTreeSet<String>) {
     for element in &pattern.elements {
@@ -33,10 +39,18 @@ fn place(inline: &InlineExpression<&str>, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Places of every text of a language.
+/// What the program's own scenes say: English stands in the scenes.
+const OF_SCENES: &str = "tasks";
+
+/// Places of every text of a language, without those of the scenes.
 fn texts(language: &Language) -> BTreeMap<String, BTreeSet<String>> {
+    places_in(language, |file| file != OF_SCENES)
+}
+
+/// The same of chosen files.
+fn places_in(language: &Language, wanted: impl Fn(&str) -> bool) -> BTreeMap<String, BTreeSet<String>> {
     let mut found = BTreeMap::new();
-    for (file, text) in language.files {
+    for (file, text) in language.files.iter().filter(|(file, _)| wanted(file)) {
         let resource =
             parser::parse(*text).unwrap_or_else(|(_, errors)| panic!("{}/{file}: {errors:?}", language.code));
         for entry in &resource.body {
@@ -76,6 +90,71 @@ fn all_languages_have_the_same_texts_and_places() {
     }
 }
 
+/// Title, briefing and every name of every training scene has its words in every other language, and there are no words for what is in none.
+#[test]
+fn every_training_scene_is_told_in_every_language() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut expected = BTreeMap::new();
+    let mut scenes = 0;
+    for folder in ["scenes/training", "scenes/anatomy"] {
+        for entry in std::fs::read_dir(root.join(folder)).expect("the scenes are there") {
+            let path = entry.expect("an entry").path();
+            let scene = Scene::load(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+            assert!(scene.task.is_some(), "{} has no task", path.display());
+            expected.extend(scene_words::keys(&scene));
+            scenes += 1;
+        }
+    }
+    assert_eq!(scenes, 9);
+    let others = BTreeSet::from_iter(expected.keys().filter(|key| !key.starts_with("task-")).cloned());
+    assert!(expected.len() - others.len() == scenes && others.len() > 60, "{} texts", others.len());
+    for language in &LANGUAGES[1..] {
+        let found = places_in(language, |file| file == OF_SCENES);
+        let placed: Vec<&String> = found.iter().filter(|(_, places)| !places.is_empty()).map(|(key, _)| key).collect();
+        assert!(placed.is_empty(), "{}: a text of a scene has a place: {placed:?}", language.code);
+        let found: BTreeSet<String> = found.into_keys().collect();
+        let missing: Vec<&String> = others.difference(&found).collect();
+        assert!(missing.is_empty(), "{}/{OF_SCENES} lacks {missing:?}", language.code);
+        let extra: Vec<&String> = found.difference(&others).collect();
+        assert!(extra.is_empty(), "{}/{OF_SCENES} has what no training scene says: {extra:?}", language.code);
+    }
+    assert!(LANGUAGES[0].files.iter().all(|(file, _)| *file != OF_SCENES));
+    // The way there: from the text of the scene to that of the language, and back to the scene where it is another's.
+    let _alone = LANGUAGE.lock().unwrap_or_else(PoisonError::into_inner);
+    let hit = Scene::load(&root.join("scenes/training/hit_target.toml"), &[]).unwrap_or_else(|error| panic!("{error}"));
+    let task = hit.task.expect("a task");
+    let all = || {
+        [
+            scene_words::title(&hit.title),
+            scene_words::briefing(&task.briefing),
+            scene_words::task(&task.name),
+            scene_words::name(&hit.targets[0].name),
+        ]
+    };
+    let mine = "Bring the tip to my lesson's lesion.";
+    assert_eq!(all(), [&hit.title, &task.briefing, "Hit a lesion", "lesion"]);
+    assert!(choose("de"));
+    assert_eq!(all()[2..], ["Läsion treffen", "Läsion"]);
+    assert!(all()[0].starts_with("Training: eine Läsion") && all()[1].starts_with("Eine feste Läsion"), "{:?}", all());
+    assert_eq!([scene_words::title(mine), scene_words::briefing(mine), scene_words::task(mine)], [mine; 3]);
+    assert_eq!(scene_words::name("left adrenal gland"), "left adrenal gland");
+    assert!(choose("en"));
+}
+
+/// What is to be done stands in the strip over the view, which has two lines where it is narrow; a third would move the view.
+#[test]
+fn a_step_is_said_in_two_lines() {
+    for language in &LANGUAGES {
+        let lines = language.files.iter().flat_map(|(_, text)| text.lines());
+        let steps = lines
+            .filter_map(|line| line.split_once(" = "))
+            .filter(|(key, _)| key.starts_with("step-") && key.ends_with("-text"));
+        let lengths: Vec<(&str, usize)> = steps.map(|(key, text)| (key, text.chars().count())).collect();
+        assert_eq!(lengths.len(), 6, "{lengths:?}");
+        assert!(lengths.iter().all(|(_, length)| *length <= 80), "{}: {lengths:?}", language.code);
+    }
+}
+
 #[test]
 fn every_text_that_is_said_exists_and_every_text_is_said() {
     let english = texts(&LANGUAGES[0]);
@@ -99,6 +178,7 @@ fn every_text_that_is_said_exists_and_every_text_is_said() {
 
 #[test]
 fn a_language_is_chosen_by_its_code_and_english_stands_in() {
+    let _alone = LANGUAGE.lock().unwrap_or_else(PoisonError::into_inner);
     assert_eq!(say("language"), "language");
     assert!(choose("de_AT.UTF-8"));
     assert_eq!(say("language"), "Sprache");

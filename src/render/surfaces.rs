@@ -17,7 +17,7 @@ use crate::anatomy::colours::{self, Rgb};
 use crate::anatomy::{Case, LabelMap, surface_nets};
 use crate::mesh::{BlockMesh, CORNERS};
 use crate::needle::lateral_axes;
-use crate::scene::Scene;
+use crate::scene::{RegionShape, Scene};
 
 /// Edge of the blocks of voxels that count as one, of large parts [m]; of small ones every voxel counts.
 const EDGE: f64 = 1.1e-3;
@@ -25,8 +25,12 @@ const EDGE: f64 = 1.1e-3;
 const SMALL: usize = 30_000;
 /// Triangles of all surfaces; of more, blocks are larger.
 const MOST_TRIANGLES: usize = 60_000;
-/// Distance between points at which a part is asked for on a plane face [m].
+/// Distance between points at which a part is asked for on a cut, and where the block ends [m].
 const STEP: f64 = 0.7e-3;
+const BORDER_STEP: f64 = 1.1e-3;
+/// Least edge of what is drawn as one where the block ends beside the tissue [m]: far from the needle little moves there, and a software
+/// adapter pays for every triangle.
+const BORDER_EDGE: f64 = 2.4e-3;
 /// What fills the room around the parts that are looked for.
 const FILLERS: [&str; 4] = ["fat", "muscle", "skin", "tissue"];
 /// What other parts lie in.
@@ -99,7 +103,10 @@ pub fn surfaces(scene: &Scene, block: &BlockMesh, anatomy: &Anatomy) -> Vec<Tria
         };
         for (label, (count, _)) in near.volumes() {
             let part = &anatomy.parts()[part_of(label)];
-            if !is_of(part, &FILLERS) {
+            // The borders and the cut show layers as far as they go.
+            let region = part.material.checked_sub(1).and_then(|region| scene.regions.get(region));
+            let is_layer = region.is_some_and(|region| matches!(region.shape, RegionShape::Layer { .. }));
+            if !is_of(part, &FILLERS) && !is_layer {
                 let layer = if is_of(part, &ORGANS) { Layer::Organ } else { Layer::Solid };
                 let cell = if count < SMALL { coarser } else { edge };
                 add(&near, label, cell, part.colour, layer);
@@ -268,14 +275,21 @@ impl Pieces for Flat<'_> {
     fn boundary(&mut self, _: [usize; 2], _: [Place; 2]) {}
 }
 
-/// A flat triangle at rest in the colours of its parts.
-fn flat(corners: [DVec3; 3], normal: DVec3, layer: (Layer, bool), anatomy: &Anatomy, out: &mut Vec<Triangle>) {
+/// A flat triangle at rest in the colours of its parts, asked for at points `step` apart [m].
+fn flat(
+    corners: [DVec3; 3],
+    normal: DVec3,
+    layer: (Layer, bool),
+    step: f64,
+    anatomy: &Anatomy,
+    out: &mut Vec<Triangle>,
+) {
     let longest = (0..3).map(|n| corners[n].distance(corners[(n + 1) % 3])).fold(0.0, f64::max);
     let [a, b, c] = corners;
     let part_at = |p: Place| anatomy.part_at(a * p.x + b * p.y + c * p.z);
     let (layer, is_glassy) = layer;
     let mut flat = Flat { corners, normal, layer, is_glassy, anatomy, out };
-    contour::split((longest / STEP).ceil() as usize, part_at, &mut flat);
+    contour::split((longest / step).ceil() as usize, part_at, &mut flat);
 }
 
 /// Edges of a cell, in the order of its nodes.
@@ -309,9 +323,22 @@ pub fn face(
         let angle = |x: &DVec3| (*x - centre).dot(second).atan2((*x - centre).dot(first));
         polygon.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
         for n in 2..polygon.len() {
-            flat([polygon[0], polygon[n - 1], polygon[n]], normal, (Layer::Solid, is_glassy), anatomy, out);
+            flat([polygon[0], polygon[n - 1], polygon[n]], normal, (Layer::Solid, is_glassy), STEP, anatomy, out);
         }
     }
+}
+
+/// Grid lines at least [`BORDER_EDGE`] apart, the first and the last among them.
+fn thinned(lines: &[f64]) -> Vec<f64> {
+    let (first, last) = (lines[0], lines[lines.len() - 1]);
+    let mut kept = vec![first];
+    for line in lines {
+        if *line - kept[kept.len() - 1] >= BORDER_EDGE && last - *line >= BORDER_EDGE {
+            kept.push(*line);
+        }
+    }
+    kept.push(last);
+    kept
 }
 
 /// What is seen where the block ends and not the tissue.
@@ -326,8 +353,10 @@ pub fn border(block: &BlockMesh, anatomy: &Anatomy, is_whole: bool) -> Vec<Trian
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         for (at, sign) in [(low[axis], -1.0), (high[axis], 1.0)] {
             let layer = if is_whole && axis == 2 && sign > 0.0 { Layer::Skin } else { Layer::Organ };
-            for i in block.lines[u].windows(2).filter(|w| w[1] > w[0]) {
-                for j in block.lines[v].windows(2).filter(|w| w[1] > w[0]) {
+            let lines = |a: usize| if layer == Layer::Skin { block.lines[a].clone() } else { thinned(&block.lines[a]) };
+            let (across, along) = (lines(u), lines(v));
+            for i in across.windows(2).filter(|w| w[1] > w[0]) {
+                for j in along.windows(2).filter(|w| w[1] > w[0]) {
                     let corner = |a: f64, b: f64| {
                         let mut x = DVec3::ZERO;
                         (x[axis], x[u], x[v]) = (at, a.clamp(low[u], high[u]), b.clamp(low[v], high[v]));
@@ -338,8 +367,8 @@ pub fn border(block: &BlockMesh, anatomy: &Anatomy, is_whole: bool) -> Vec<Trian
                         quad.reverse();
                     }
                     let normal = DVec3::AXES[axis] * sign;
-                    flat([quad[0], quad[1], quad[2]], normal, (layer, false), anatomy, &mut out);
-                    flat([quad[0], quad[2], quad[3]], normal, (layer, false), anatomy, &mut out);
+                    flat([quad[0], quad[1], quad[2]], normal, (layer, false), BORDER_STEP, anatomy, &mut out);
+                    flat([quad[0], quad[2], quad[3]], normal, (layer, false), BORDER_STEP, anatomy, &mut out);
                 }
             }
         }
@@ -391,5 +420,45 @@ impl<'a> Embedding<'a> {
         let (nodes, weights) = self.of(x);
         let own = |node: usize| displacement.get(node).copied().unwrap_or_default();
         x + nodes.into_iter().zip(weights).map(|(node, weight)| own(node) * weight).sum::<DVec3>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_are_counterclockwise_from_outside() {
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/anatomy/neck_vein.toml");
+        let scene = Scene::load(&file, &[]).unwrap();
+        let crate::mesh::Mesh::Block(block) = crate::mesh::Mesh::of_scene(&scene) else { panic!("no block") };
+        let anatomy = Anatomy::of_any(&scene).unwrap();
+        let mut all = surfaces(&scene, &block, &anatomy);
+        all.extend(border(&block, &anatomy, false));
+        let whole = all.len();
+        for normal in DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
+            let mut drawn = cut(&all, normal, -1e-3);
+            face(&block, (normal, -1e-3), false, &anatomy, &mut drawn);
+            assert!(drawn.len() > whole / 8, "{} of {whole}", drawn.len());
+            // Slivers have no side; a smoothed normal may turn away from a small triangle in a fold.
+            let side = |t: &Triangle| {
+                let [a, b, c] = t.corners.map(|c| c.place);
+                let area = 0.5 * (b - a).cross(c - a);
+                area.dot(t.corners.iter().map(|c| c.normal).sum())
+            };
+            let (right, wrong): (Vec<f64>, Vec<f64>) = drawn.iter().map(side).partition(|side| *side > 0.0);
+            let sum = |sides: &[f64]| sides.iter().map(|side| side.abs()).sum::<f64>();
+            assert!(sum(&wrong) < 1e-3 * sum(&right), "{normal}: {} of {}", sum(&wrong), sum(&right));
+        }
+    }
+
+    #[test]
+    fn thinned_lines_keep_both_ends_and_their_distance() {
+        let lines: Vec<f64> = (0..40).map(|n| 1e-3 * f64::from(n)).collect();
+        let kept = thinned(&lines);
+        assert_eq!((kept[0], kept[kept.len() - 1]), (0.0, lines[39]));
+        assert!(kept.windows(2).all(|w| w[1] - w[0] >= BORDER_EDGE && lines.contains(&w[0])), "{kept:?}");
+        // A block smaller than that has its two ends.
+        assert_eq!(thinned(&lines[..2]), [0.0, 1e-3]);
     }
 }

@@ -30,7 +30,7 @@ use glam::DVec3;
 
 pub use document::closest;
 pub use file::OnTrouble;
-pub use task::{Goal, Obstacle, TASK_FIGURES, Task, TaskFigure};
+pub use task::{Goal, LARGEST_FORCE_LIMIT, Obstacle, TASK_FIGURES, Task, TaskFigure};
 
 use crate::anatomy::Case;
 use crate::effects::own::OwnEffect;

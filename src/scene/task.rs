@@ -4,6 +4,9 @@ use glam::DVec3;
 
 use crate::units::{self, Unit};
 
+/// Force at which a hand or a drive stops pushing [N]: choice of this project, and the largest limit of a task.
+pub const LARGEST_FORCE_LIMIT: f64 = 10.0;
+
 /// A task with its goals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
@@ -13,8 +16,12 @@ pub struct Task {
     pub briefing: String,
     /// The attempt must not take longer than this [s].
     pub time_limit: Option<f64>,
+    /// The axial force must not exceed this [N]; `None`: it is no goal.
+    pub force_limit: Option<f64>,
     /// At least one.
     pub goals: Vec<Goal>,
+    /// Weight of each goal in the share of the score, more than 0; time and force limit weigh 1.
+    pub weights: Vec<f64>,
 }
 
 /// One thing that must be done, or must not happen.

@@ -95,10 +95,10 @@ impl Standing {
         self.attempts.iter().filter(|a| a.score.passed().is_some()).count()
     }
 
-    /// The attempt with the most goals met, the first of equal ones; `None` where none is scored.
+    /// The attempt with the largest share of the goals met, the first of equal ones; `None` where none is scored.
     pub fn best(&self) -> Option<&Attempt> {
-        let scored = self.attempts.iter().filter_map(|a| Some((goals_met(a)?.0, a)));
-        scored.rev().max_by_key(|(met, _)| *met).map(|(_, attempt)| attempt)
+        let scored = self.attempts.iter().filter_map(|a| Some((a.score.share()?, a)));
+        scored.rev().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, attempt)| attempt)
     }
 
     pub fn last(&self) -> Option<&Attempt> {

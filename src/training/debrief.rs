@@ -4,6 +4,7 @@ use super::events::{self, Event, Kind, Watcher};
 use super::history::{Attempt, progress};
 use super::key_figures;
 use super::kinematic::Sample;
+use super::scene_words;
 use super::score::{Row, Score};
 use super::task::GoalResult;
 use super::texts::Better;
@@ -76,12 +77,14 @@ impl Finding {
             ("core", ..) => "goal-core-missed",
             ("figure", Some(true), _) => "goal-figure-met",
             ("figure", ..) => "goal-figure-missed",
+            ("force_limit", Some(true), _) => "goal-force-met",
+            ("force_limit", ..) => "goal-force-missed",
             (_, Some(true), _) => "goal-time-met",
             _ => "goal-time-missed",
         };
         let name = match goal.key.as_str() {
             "figure" => say_of(&format!("figure-{}", self.name)).unwrap_or(&self.name),
-            _ => &self.name,
+            _ => scene_words::name(&self.name),
         };
         // A count has none.
         let unit = if goal.unit.is_empty() { String::new() } else { format!(" {}", goal.unit) };
@@ -211,7 +214,7 @@ pub fn spoken(value: f64) -> String {
 pub fn figure_name(row: &Row) -> String {
     let (key, name) = row.key.split_once('.').unwrap_or((&row.key, ""));
     let said = say_of(&format!("figure-{key}")).unwrap_or(&row.label);
-    if name.is_empty() { said.to_string() } else { format!("{said}: {name}") }
+    if name.is_empty() { said.to_string() } else { format!("{said}: {}", scene_words::name(name)) }
 }
 
 /// Which way a figure gets better, in the present language.
@@ -247,6 +250,7 @@ fn findings(
             // Named by its key, which has a word in every language.
             Some(Goal::Figure { figure, .. }) => (figure.key, moment_of(figure.key, events, records)),
             Some(Goal::CoreMass { .. } | Goal::CoreVolume { .. }) => ("", records.last().map(|r| r.time)),
+            None if result.key == "force_limit" => ("", moment_of("peak_axial_force", events, records)),
             // The time limit: when it was over.
             None => {
                 let limit = scene.task.as_ref().and_then(|task| task.time_limit);

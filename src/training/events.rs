@@ -8,7 +8,7 @@
 //! bone                 bone pushes back
 //! target               tip within the tolerance of the target as it lies now; cut within the layer to stop in; enough of a core
 //! passed               the target lies behind the tip by more than the tolerance; the cut is below the layer
-//! force limit          axial force above what a hand or a drive stops pushing at ([`crate::model::rigid::LARGEST_FORCE`])
+//! force limit          axial force above the limit of the task; without one above what a drive stops pushing at ([`crate::model::rigid::LARGEST_FORCE`])
 //! withdrawn, pass      the tip is out again; it went in once more ([`super::kinematic::PASS_DEPTH`])
 //! redirection          the needle turned inside the tissue by [`super::kinematic::REDIRECTION`]
 //! ```
@@ -20,6 +20,7 @@ use super::body::SceneBody;
 use super::clearance::Clearance;
 use super::kinematic::{Body, PASS_DEPTH, REDIRECTION, Sample};
 use super::physical::{Track, axis_of, cut_end, layer_at};
+use super::scene_words;
 use crate::model::rigid::LARGEST_FORCE;
 use crate::observables::FrameRecord;
 use crate::scene::{Goal, Scene};
@@ -56,6 +57,7 @@ pub enum Kind {
     BoneMet,
     TargetReached,
     TargetPassed,
+    CoreTaken,
     ForceLimit,
     Withdrawn,
     AnotherPass,
@@ -75,6 +77,7 @@ impl Kind {
             Kind::BoneMet => "event-bone",
             Kind::TargetReached => "event-target",
             Kind::TargetPassed => "event-passed",
+            Kind::CoreTaken => "event-core",
             Kind::ForceLimit => "event-force",
             Kind::Withdrawn => "event-withdrawn",
             Kind::AnotherPass => "event-pass",
@@ -85,7 +88,7 @@ impl Kind {
     /// What it means for the attempt.
     pub fn gravity(self) -> Gravity {
         match self {
-            Kind::TargetReached => Gravity::Good,
+            Kind::TargetReached | Kind::CoreTaken => Gravity::Good,
             Kind::Near | Kind::Touched | Kind::BoneMet | Kind::TargetPassed | Kind::ForceLimit => Gravity::Bad,
             _ => Gravity::Note,
         }
@@ -120,7 +123,7 @@ impl Event {
 
     /// In the present language.
     pub fn text(&self) -> String {
-        say_with(self.kind.word(), &[("name", self.name.as_str().into())])
+        say_with(self.kind.word(), &[("name", scene_words::name(&self.name).into())])
     }
 }
 
@@ -250,7 +253,8 @@ impl Watcher {
         self.through_layers(scene, sample, record, &mut tell);
         self.past_obstacles(sample, &mut tell);
         self.in_and_out(sample, &mut tell);
-        self.against_limits(record, &mut tell);
+        let limit = scene.task.as_ref().and_then(|task| task.force_limit).unwrap_or(LARGEST_FORCE);
+        self.against_limits(record, limit, &mut tell);
         self.at_goals(scene, sample, record, &mut tell);
         self.attempt.last = Some(*sample);
     }
@@ -332,7 +336,8 @@ impl Watcher {
         }
     }
 
-    fn against_limits(&mut self, record: &FrameRecord, tell: &mut impl FnMut(Kind, &str)) {
+    /// `limit`: of the axial force [N].
+    fn against_limits(&mut self, record: &FrameRecord, limit: f64, tell: &mut impl FnMut(Kind, &str)) {
         if record.force.bone > 0.0 {
             if self.attempt.bone.is_none() {
                 tell(Kind::BoneMet, "");
@@ -341,11 +346,11 @@ impl Watcher {
         } else if self.attempt.bone.is_some_and(|depth| depth - record.depth > BACK) {
             self.attempt.bone = None;
         }
-        if record.force.axial > LARGEST_FORCE && !self.attempt.over {
+        if record.force.axial > limit && !self.attempt.over {
             self.attempt.over = true;
             tell(Kind::ForceLimit, "");
         }
-        self.attempt.over &= record.force.axial > BACK_PART * LARGEST_FORCE;
+        self.attempt.over &= record.force.axial > BACK_PART * limit;
     }
 
     fn at_goals(&mut self, scene: &Scene, sample: &Sample, record: &FrameRecord, tell: &mut impl FnMut(Kind, &str)) {
@@ -371,7 +376,9 @@ impl Watcher {
             };
             if reached && !known[0] {
                 known[0] = true;
-                tell(Kind::TargetReached, name);
+                // A core has no place, and no name.
+                let is_core = matches!(goal, Goal::CoreMass { .. } | Goal::CoreVolume { .. });
+                tell(if is_core { Kind::CoreTaken } else { Kind::TargetReached }, name);
             }
             if passed && !known[1] {
                 known[1] = true;

@@ -15,6 +15,7 @@ use std::collections::VecDeque;
 use super::events::Watcher;
 use super::kinematic::Sample;
 use super::physical::{STANDSTILL, axis_of};
+use super::scene_words;
 use crate::needle::Phase;
 use crate::observables::FrameRecord;
 use crate::scene::{Goal, Scene};
@@ -120,11 +121,12 @@ impl Hint {
     pub fn text(&self) -> String {
         match self {
             Hint::OnBone => say("hint-bone").into(),
-            Hint::Touching(name) => say_with("hint-touching", &[("name", name.as_str().into())]),
+            Hint::Touching(name) => say_with("hint-touching", &[("name", scene_words::name(name).into())]),
             Hint::Past => say("hint-past").into(),
             Hint::BoneAhead => say("hint-bone-ahead").into(),
             Hint::Near(name, distance) => {
-                let places = [("name", name.as_str().into()), ("distance", format!("{:.1}", distance * 1e3).into())];
+                let distance = format!("{:.1}", distance * 1e3);
+                let places = [("name", scene_words::name(name).into()), ("distance", distance.into())];
                 say_with("hint-near", &places)
             }
             Hint::OffEntry => say("hint-entry").into(),

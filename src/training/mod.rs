@@ -4,7 +4,8 @@
 //! tissue felt) -> [`task`] (goals met or not) -> [`score`] (rows, goals, trust; CSV, TSV, JSON, text) -> [`history`] (attempts
 //! of a trainee as files), [`trainees`] (who they are). Beside it, from frame to frame: [`events`] (what happens, [`clearance`] from what is to be avoided) and [`guide`]
 //! (which step is due, hints). When it is over: [`debrief`] (verdict, why, when), with the [`key_figures`] of the task. [`texts`] holds the
-//! labels of tables, which are English; what a trainee reads in the window comes from [`crate::words`]. Pure functions; no window, no engine.
+//! labels of tables, which are English; what a trainee reads in the window comes from [`crate::words`], the texts of the
+//! program's own scenes through [`scene_words`]. Pure functions; no window, no engine.
 
 pub mod body;
 pub mod class;
@@ -19,6 +20,7 @@ pub mod notes;
 pub mod own_task;
 pub mod physical;
 pub mod report;
+pub mod scene_words;
 pub mod score;
 pub mod skill;
 pub mod skill_evidence;

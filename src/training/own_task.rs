@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, value};
 
+use super::scene_words;
 use crate::reading;
 use crate::scene::{Goal, Obstacle, Scene};
 use crate::whole_file;
@@ -28,6 +29,26 @@ pub enum Way {
     Patient { entry: [f64; 3], target: [f64; 3] },
 }
 
+/// A region to stay away from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Avoided {
+    pub region: String,
+    /// [mm]
+    pub clearance: f64,
+    /// Among the goals.
+    pub weight: f64,
+}
+
+/// A goal that the form does not change: a bound of a figure, a core, a shape to stay away from, a second target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Kept {
+    pub goal: Goal,
+    /// It is one of the own task too.
+    pub on: bool,
+    /// As it is written.
+    table: String,
+}
+
 /// The form as it is filled in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnTask {
@@ -37,10 +58,18 @@ pub struct OwnTask {
     pub briefing: String,
     pub way: Way,
     pub aim: Aim,
+    /// Weight of the aim among the goals.
+    pub weight: f64,
     /// [s]; `None`: no limit.
     pub time_limit: Option<f64>,
-    /// Regions to stay away from, with the clearance [mm].
-    pub avoid: Vec<(String, f64)>,
+    /// Of the axial force [N]; `None`: no limit.
+    pub force_limit: Option<f64>,
+    /// Regions to stay away from.
+    pub avoid: Vec<Avoided>,
+    /// The other goals of the scene that it is made from.
+    pub kept: Vec<Kept>,
+    /// Number of the target in the scene that it is made from whose place the aim takes.
+    replaced: Option<usize>,
     /// Names of the regions of the scene, to choose from.
     pub regions: Vec<String>,
 }
@@ -100,20 +129,40 @@ impl OwnTask {
             at: end.to_array().map(|x| shown(1e3 * x)),
             tolerance: 1.0,
         });
-        let region = |goal: &Goal| match goal {
-            Goal::Avoid { obstacle: Obstacle::Region(index), clearance, .. } => {
-                Some((scene.regions.get(*index)?.name.clone(), shown(1e3 * clearance)))
-            }
+        let aimed = goals.iter().position(|goal| hit(goal).is_some());
+        let replaced = aimed.and_then(|n| match goals[n] {
+            Goal::HitTarget { target, .. } => Some(target),
             _ => None,
-        };
+        });
+        let weight = |n: usize| task.and_then(|task| task.weights.get(n)).copied().unwrap_or(1.0);
+        let written = document.get("task").and_then(|t| t.get("goal")).and_then(Item::as_array_of_tables);
+        let (mut avoid, mut kept) = (Vec::new(), Vec::new());
+        for (n, goal) in goals.iter().enumerate().filter(|(n, _)| Some(*n) != aimed) {
+            if let Goal::Avoid { obstacle: Obstacle::Region(index), clearance, .. } = goal
+                && let Some(region) = scene.regions.get(*index)
+            {
+                avoid.push(Avoided {
+                    region: region.name.clone(),
+                    clearance: shown(1e3 * clearance),
+                    weight: weight(n),
+                });
+            } else if let Some(table) = written.and_then(|all| all.get(n)) {
+                kept.push(Kept { goal: goal.clone(), on: true, table: table.to_string() });
+            }
+        }
         Ok(OwnTask {
             base: path.to_path_buf(),
             name: task.map_or_else(|| scene.title.clone(), |task| task.name.clone()),
-            briefing: task.map_or_else(String::new, |task| task.briefing.trim().into()),
+            // In the language in which the teacher works.
+            briefing: task.map_or_else(String::new, |task| scene_words::briefing(task.briefing.trim()).into()),
             way,
             aim,
+            weight: aimed.map_or(1.0, weight),
             time_limit: task.and_then(|task| task.time_limit),
-            avoid: goals.iter().filter_map(region).collect(),
+            force_limit: task.and_then(|task| task.force_limit),
+            avoid,
+            kept,
+            replaced,
             regions: scene.regions.iter().map(|region| region.name.clone()).collect(),
         })
     }
@@ -204,8 +253,12 @@ impl OwnTask {
                 target["name"] = value(name);
                 target[key] = list(at);
                 target["radius_mm"] = value(*tolerance);
+                // Other targets stay: a goal that is kept may be about one.
                 let mut targets = ArrayOfTables::new();
                 targets.push(target);
+                let before = document.get("target").and_then(Item::as_array_of_tables);
+                let others = before.into_iter().flatten().enumerate().filter(|(n, _)| Some(*n) != self.replaced);
+                others.for_each(|(_, other)| targets.push(other.clone()));
                 document["target"] = Item::ArrayOfTables(targets);
                 goal["kind"] = value("hit_target");
                 goal["target"] = value(name);
@@ -217,12 +270,20 @@ impl OwnTask {
                 goal["depth_mm"] = list(&[*from, *to]);
             }
         }
+        weigh(&mut goal, self.weight);
         goals.push(goal);
-        for (region, clearance) in &self.avoid {
+        for Avoided { region, clearance, weight } in &self.avoid {
             let mut goal = Table::new();
             goal["kind"] = value("avoid");
             goal["region"] = value(region);
             goal["clearance_mm"] = value(*clearance);
+            weigh(&mut goal, *weight);
+            goals.push(goal);
+        }
+        for kept in self.kept.iter().filter(|kept| kept.on) {
+            let table = kept.table.parse::<DocumentMut>().expect("it was written by the same library");
+            let mut goal = Table::new();
+            table.iter().for_each(|(key, item)| _ = goal.insert(key, item.clone()));
             goals.push(goal);
         }
         let mut task = Table::new();
@@ -231,8 +292,18 @@ impl OwnTask {
         if let Some(limit) = self.time_limit {
             task["time_limit_s"] = value(limit);
         }
+        if let Some(limit) = self.force_limit {
+            task["force_limit_n"] = value(limit);
+        }
         task.insert("goal", Item::ArrayOfTables(goals));
         document["task"] = Item::Table(task);
+    }
+}
+
+/// The weight of a goal, where it is not that which a goal has anyway.
+fn weigh(goal: &mut Table, weight: f64) {
+    if weight != 1.0 {
+        goal["weight"] = value(weight);
     }
 }
 

@@ -200,6 +200,15 @@ impl Score {
         met.filter(|met| !met.is_empty() && self.trust.is_good()).map(|met| met.into_iter().all(|m| m))
     }
 
+    /// Weight of the goals that are met over that of all, 0 to 1; `None` without a goal, or where the run is not scored. Who passes has 1.
+    pub fn share(&self) -> Option<f64> {
+        self.passed()?;
+        let weight = |met: bool| -> f64 {
+            self.goals.iter().filter(|goal| !met || goal.met == Some(true)).map(|goal| goal.weight).sum()
+        };
+        Some(weight(true) / weight(false))
+    }
+
     /// Writes `score.json`, `score.csv` and `score.tsv` into the folder of an attempt.
     ///
     /// # Errors
@@ -313,6 +322,9 @@ impl Score {
             let bounds = texts::bounds(goal.least, goal.most, &goal.unit);
             text += &cut(&format!("  {verdict:<10} {}: {measured}{bounds}", cut(&goal.text, 28)), TEXT_WIDTH);
             text.push('\n');
+        }
+        if let Some(share) = self.share() {
+            text += &format!("  {}\n", texts::share(share));
         }
         let [label, unit, value, reference, better] = texts::HEADINGS;
         text.push('\n');

@@ -7,6 +7,7 @@
 //! stop in layer  deepest point below the top face that the tip has cut to, in the material at rest             [m]
 //! core           mass or rest volume in the bore at the end                                              [kg], [m^3]
 //! figure         a figure of the score; at most its bound
+//! force limit    largest axial force                                                                           [N]
 //! time limit     elapsed time                                                                                  [s]
 //! ```
 //! The obstacle is a place, it does not move with the tissue; the shaft is straight. What the tip has cut to, not where it is, tells
@@ -21,12 +22,12 @@ use super::kinematic::{KinematicFigures, Sample};
 use super::physical::PhysicalFigures;
 use super::texts;
 use crate::scene::Scene;
-use crate::units::{CUBIC_MILLIMETRE, MILLIGRAM, MILLIMETRE, SECOND, Unit};
+use crate::units::{CUBIC_MILLIMETRE, MILLIGRAM, MILLIMETRE, NEWTON, SECOND, Unit};
 
 /// One goal and what was measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GoalResult {
-    /// Kind of the goal, as in the scene file, or `time_limit`.
+    /// Kind of the goal, as in the scene file, or `force_limit`, `time_limit`.
     pub key: String,
     /// What was to be done.
     pub text: String,
@@ -39,6 +40,13 @@ pub struct GoalResult {
     pub most: Option<f64>,
     /// `None` where the run is not scored.
     pub met: Option<bool>,
+    /// Weight in the share of the score; 1 in attempts from before there were weights.
+    #[serde(default = "one")]
+    pub weight: f64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 impl GoalResult {
@@ -60,11 +68,12 @@ impl GoalResult {
             least: least.map(|x| unit.show(x)),
             most: most.map(|x| unit.show(x)),
             met: Some(measured.is_some_and(|x| x.is_finite() && within(x))),
+            weight: 1.0,
         }
     }
 }
 
-/// The goals of a task in its order, the time limit behind them.
+/// The goals of a task in its order, behind them the limits of force and time.
 pub fn judge(
     task: &Task,
     scene: &Scene,
@@ -103,11 +112,16 @@ pub fn judge(
             GoalResult::of("core", texts::CORE.into(), CUBIC_MILLIMETRE, volume, Some(*least), None)
         }
     });
-    let limit = task.time_limit.map(|limit| {
+    let goals = goals.zip(&task.weights).map(|(result, weight)| GoalResult { weight: *weight, ..result });
+    let force = task.force_limit.map(|limit| {
+        let (text, peak) = (texts::FORCE_LIMIT.into(), physical.peak_axial_force);
+        GoalResult::of("force_limit", text, NEWTON, Some(peak), None, Some(limit))
+    });
+    let time = task.time_limit.map(|limit| {
         let text = texts::TIME_LIMIT.into();
         GoalResult::of("time_limit", text, SECOND, Some(kinematic.elapsed_time), None, Some(limit))
     });
-    goals.chain(limit).collect()
+    goals.chain(force).chain(time).collect()
 }
 
 /// Least distance of the outside of the needle from an obstacle [m], negative inside it; `None` without a needle or a sample.

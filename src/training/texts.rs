@@ -97,6 +97,12 @@ pub const OWN_MATERIAL: &str = "tissue";
 // Headings of the tables.
 pub const HEADINGS: [&str; 5] = ["Figure", "Unit", "Value", "Reference", "Better"];
 pub const GOALS: &str = "Goals";
+
+/// The share of the goals that were met, by their weights, 0 to 1.
+pub fn share(share: f64) -> String {
+    format!("Share of the goals by their weights: {:.0} %", 100.0 * share)
+}
+
 pub const TRUST: &str = "Trust in the numbers";
 pub const MET: &str = "met";
 pub const MISSED: &str = "missed";
@@ -146,6 +152,7 @@ pub fn figure_bound(label: &str) -> String {
 }
 
 pub const CORE: &str = "bring out enough of a core";
+pub const FORCE_LIMIT: &str = "keep the force limit";
 pub const TIME_LIMIT: &str = "keep the time limit";
 
 /// The bounds of a goal in words.

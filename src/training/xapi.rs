@@ -5,12 +5,12 @@
 //! actor     account of the trainee's name on a home page that the caller names
 //! verb      passed, failed; attempted where the attempt is not scored
 //! object    the task, an activity of the type simulation
-//! result    goals met of all (raw, min, max, scaled), success, completion, simulated duration, figures as an extension
+//! result    weights of the goals met and of all (raw, max), their share (scaled), success, completion, simulated duration, figures as an extension
 //! ```
 
 use serde_json::{Value, json};
 
-use super::class::{goals_met, iso_8601};
+use super::class::iso_8601;
 use super::history::{Attempt, file_name};
 use crate::hash::fnv1a;
 use crate::{Error, Result};
@@ -88,8 +88,9 @@ fn result(attempt: &Attempt, home: &str) -> Value {
     if let Some(passed) = attempt.score.passed() {
         result["success"] = json!(passed);
     }
-    if let Some((met, of)) = goals_met(attempt).filter(|(_, of)| *of > 0) {
-        result["score"] = json!({ "scaled": met as f64 / of as f64, "raw": met, "min": 0, "max": of });
+    if let Some(share) = attempt.score.share() {
+        let all: f64 = attempt.score.goals.iter().map(|goal| goal.weight).sum();
+        result["score"] = json!({ "scaled": share, "raw": share * all, "min": 0, "max": all });
     }
     if let Some(time) = attempt.score.value("elapsed_time").filter(|time| *time >= 0.0) {
         // A store may cut what is finer than a hundredth of a second.

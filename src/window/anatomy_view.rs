@@ -141,11 +141,19 @@ impl AnatomyView {
     }
 }
 
+/// Name and colour of the only part of a block whose faces may part: these are not drawn as surfaces in cells, and in more parts there is
+/// no colour of the whole.
+pub fn only_part(model: &Model) -> Option<Entry> {
+    let anatomy = Anatomy::of_any(&model.scene)?;
+    let [_, part] = anatomy.parts() else { return None };
+    (!model.separation.pairs.is_empty()).then(|| (part.name.clone(), part.colour))
+}
+
 /// Parts that lie in the block, for the legend.
 pub fn legend(model: &Model) -> Vec<Entry> {
     let (Some(anatomy), Mesh::Block(block)) = (Anatomy::of_any(&model.scene), &model.mesh) else { return Vec::new() };
     if !model.separation.pairs.is_empty() {
-        return Vec::new();
+        return only_part(model).into_iter().collect();
     }
     let mut seen = vec![false; anatomy.parts().len()];
     for cell in 0..block.cell_count() {
@@ -239,6 +247,8 @@ fn pipeline(
     fragment: &str,
     format: wgpu::TextureFormat,
 ) -> wgpu::RenderPipeline {
+    // The faces of a cut close what it opens: no inside of a solid part is ever seen. Through the skin the far walls are.
+    let cull = (fragment == STAGES[0]).then_some(wgpu::Face::Back);
     let attributes = wgpu::vertex_attr_array![
         0 => Float32x3, 1 => Uint32, 2 => Unorm8x4, 3 => Unorm8x4, 4 => Snorm8x4, 5 => Unorm8x4
     ];
@@ -262,8 +272,7 @@ fn pipeline(
             compilation_options: Default::default(),
             targets: &[Some(format.into())],
         }),
-        // A vessel that is cut open is seen from inside.
-        primitive: Default::default(),
+        primitive: wgpu::PrimitiveState { cull_mode: cull, ..Default::default() },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH,
             depth_write_enabled: Some(true),

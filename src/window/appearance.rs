@@ -2,6 +2,7 @@
 
 use super::probe::Probe;
 use super::slider::named;
+use crate::training::scene_words;
 use crate::words::say;
 
 /// Perceptually uniform colours from dark to bright, whose order the colour-blind see too.
@@ -111,7 +112,7 @@ pub fn parts(ui: &mut egui::Ui, look: &mut Look, parts: &[(String, [u8; 3])]) {
                 ui.horizontal(|ui| {
                     let (square, _) = ui.allocate_exact_size(egui::Vec2::splat(11.0), egui::Sense::hover());
                     ui.painter().rect_filled(square, 1.0, colour);
-                    ui.small(name);
+                    ui.small(scene_words::name(name));
                 });
             }
         });

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec2, Vec3};
 
 use super::camera::Camera;
-use super::hand::Desk;
+use super::hand::{Desk, Drag};
 
 /// How near the pointer is to the needle when it takes hold of it [points].
 const NEAR: f32 = 12.0;
@@ -40,14 +40,18 @@ pub struct Modifiers {
 }
 
 impl Grip {
-    /// What a drag that begins now will do.
-    pub fn begin(modifiers: Modifiers, on_needle: bool) -> Grip {
+    /// What a drag that begins now will do; `drag`: one of the needle without a key.
+    pub fn begin(modifiers: Modifiers, on_needle: bool, drag: Drag) -> Grip {
         match modifiers {
             Modifiers { alt: true, .. } => Grip::Tilt,
             Modifiers { shift: true, control: true, .. } => Grip::Shift,
             Modifiers { shift: true, .. } => Grip::Along,
             Modifiers { control: true, .. } => Grip::Camera,
-            _ if on_needle => Grip::Along,
+            _ if on_needle => match drag {
+                Drag::Along => Grip::Along,
+                Drag::Tilt => Grip::Tilt,
+                Drag::Shift => Grip::Shift,
+            },
             _ => Grip::Camera,
         }
     }
@@ -229,11 +233,17 @@ mod tests {
     #[test]
     fn keys_say_what_a_drag_does() {
         let none = Modifiers::default();
-        assert_eq!(Grip::begin(none, false), Grip::Camera);
-        assert_eq!(Grip::begin(none, true), Grip::Along);
-        assert_eq!(Grip::begin(Modifiers { shift: true, ..none }, false), Grip::Along);
-        assert_eq!(Grip::begin(Modifiers { alt: true, ..none }, true), Grip::Tilt);
-        assert_eq!(Grip::begin(Modifiers { shift: true, control: true, ..none }, false), Grip::Shift);
+        let begin = |held, on_needle| Grip::begin(held, on_needle, Drag::Along);
+        assert_eq!(begin(none, false), Grip::Camera);
+        assert_eq!(begin(none, true), Grip::Along);
+        assert_eq!(begin(Modifiers { shift: true, ..none }, false), Grip::Along);
+        assert_eq!(begin(Modifiers { alt: true, ..none }, true), Grip::Tilt);
+        assert_eq!(begin(Modifiers { shift: true, control: true, ..none }, false), Grip::Shift);
+        // What is chosen holds for the needle alone, and a key goes before it.
+        assert_eq!(Grip::begin(none, true, Drag::Tilt), Grip::Tilt);
+        assert_eq!(Grip::begin(none, true, Drag::Shift), Grip::Shift);
+        assert_eq!(Grip::begin(none, false, Drag::Tilt), Grip::Camera);
+        assert_eq!(Grip::begin(Modifiers { shift: true, ..none }, true, Drag::Tilt), Grip::Along);
         let camera = camera();
         let sight = Sight { camera: &camera, size: SIZE, needle: (DVec3::ZERO, DVec3::NEG_Z) };
         let mut desk = Desk::new(1.0);

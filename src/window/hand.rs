@@ -40,6 +40,24 @@ pub enum Key {
     Towards,
 }
 
+/// What a drag of the needle does where no key is held, so that one who has a mouse alone can do everything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Drag {
+    /// Moves it along its axis.
+    #[default]
+    Along,
+    /// Tilts it about its point of entry.
+    Tilt,
+    /// Moves the point of entry.
+    Shift,
+}
+
+impl Drag {
+    /// All, with the keys of their names.
+    pub const ALL: [(Drag, &'static str); 3] =
+        [(Drag::Along, "drag-along"), (Drag::Tilt, "drag-tilt"), (Drag::Shift, "drag-shift")];
+}
+
 /// Speed of a tilt by keys, and the largest of one by the mouse [rad/s].
 const TILT_SPEED: f64 = 0.35;
 
@@ -50,6 +68,8 @@ const TILT_SPEED: f64 = 0.35;
 pub struct Desk {
     /// Speed of a key that is held [m/s].
     pub speed: f64,
+    /// What a drag of the needle does.
+    pub drag: Drag,
     /// To the right on the screen and away from the viewer, horizontal unit vectors.
     view: [DVec3; 2],
     held: [bool; 6],
@@ -69,6 +89,7 @@ impl Desk {
     pub fn new(speed: f64) -> Self {
         Desk {
             speed,
+            drag: Drag::default(),
             view: [DVec3::X, DVec3::Y],
             held: [false; 6],
             shifting: false,
@@ -130,7 +151,7 @@ impl Desk {
 
     /// Lets go of everything: the window has lost the keyboard.
     pub fn let_go(&mut self) {
-        *self = Desk { view: self.view, fresh: self.fresh, ..Desk::new(self.speed) };
+        *self = Desk { drag: self.drag, view: self.view, fresh: self.fresh, ..Desk::new(self.speed) };
     }
 
     /// What two opposite keys ask for, -1 to 1.

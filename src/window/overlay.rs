@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 
 use super::camera::Camera;
 use crate::anatomy::Frame;
+use crate::training::scene_words;
 use crate::words::say;
 
 /// Length of the ruler on the screen, at least and at most [points].
@@ -100,6 +101,7 @@ impl Overlay<'_> {
         order.sort_by(|a, b| a.1.distance(eye).total_cmp(&b.1.distance(eye)));
         let mut taken: Vec<Rect> = Vec::new();
         for (name, x) in order {
+            let name = scene_words::name(name);
             let Some(at) = self.seen(*x) else { continue };
             let size = Vec2::new(7.0 * name.chars().count() as f32, 16.0);
             let room = Rect::from_center_size(at, size);

@@ -8,7 +8,7 @@ use super::anatomy_view::Entry;
 use super::appearance::{self, ColourMap, Look};
 use super::camera::{Camera, Preset};
 use super::debriefing::Answer;
-use super::hand::Desk;
+use super::hand::{Desk, Drag};
 use super::practice::{Leader, Practice, State};
 use super::preferences;
 use super::scene_view::Scale;
@@ -20,7 +20,8 @@ use crate::haptic::LoopTiming;
 use crate::observables::field::{Field, Range, VON_MISES};
 use crate::observables::{ForceParts, FrameRecord};
 use crate::output::curve::frames_on_the_way_in;
-use crate::scene::Scene;
+use crate::training::debrief::spoken;
+use crate::training::scene_words;
 use crate::words::{say, say_of, say_with};
 
 /// What the user has chosen.
@@ -115,7 +116,7 @@ pub fn bar(ui: &mut egui::Ui, title: &str, settings: &mut Settings, wishes: &mut
                 }
             }
             ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                ui.add(egui::Label::new(egui::RichText::new(title).strong()).truncate());
+                ui.add(egui::Label::new(egui::RichText::new(scene_words::title(title)).strong()).truncate());
             });
         });
     });
@@ -134,8 +135,15 @@ pub fn controls(
     if let Some(task) = &practice.scene().task {
         ui.group(|ui| {
             ui.set_width(ui.available_width());
-            ui.strong(task_name(practice.scene(), &task.name));
-            ui.label(&task.briefing);
+            ui.strong(scene_words::task(&task.name));
+            ui.label(scene_words::briefing(&task.briefing));
+            for (key, place, limit) in
+                [("limit-force", "newtons", task.force_limit), ("limit-time", "seconds", task.time_limit)]
+            {
+                if let Some(limit) = limit {
+                    ui.label(say_with(key, &[(place, spoken(limit).into())]));
+                }
+            }
         });
     }
     run_buttons(ui, practice, &mut wishes);
@@ -153,12 +161,6 @@ pub fn controls(
     let fold = egui::CollapsingHeader::new(say("engineer")).id_salt(("engineer", engineer)).default_open(engineer);
     fold.show(ui, |ui| engineering(ui, practice, choices, &mut wishes));
     wishes
-}
-
-/// Name of a task in the language of the window.
-fn task_name<'a>(scene: &'a Scene, name: &'a str) -> &'a str {
-    let stem = scene.path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default().replace('_', "-");
-    say_of(&format!("task-{stem}")).unwrap_or(name)
 }
 
 /// Run, pause, begin anew and finish.
@@ -194,7 +196,14 @@ fn hand(ui: &mut egui::Ui, practice: &Practice, desk: &mut Desk) {
         desk.speed = speed * 1e-3;
     }
     ui.small(say("keys-lead"));
-    if !practice.path_is_free() {
+    if practice.path_is_free() {
+        ui.horizontal_wrapped(|ui| {
+            ui.label(say("drag"));
+            for (drag, name) in Drag::ALL {
+                ui.radio_value(&mut desk.drag, drag, say(name)).on_hover_text(say("drag-about"));
+            }
+        });
+    } else {
         ui.small(say("planned-path"));
     }
     ui.small(say("keys-more"));
@@ -240,7 +249,8 @@ fn engineering(ui: &mut egui::Ui, practice: &mut Practice, choices: &mut Choices
         appearance::colours(ui, &mut choices.look);
         let regions = &practice.scene().regions;
         if !regions.is_empty() {
-            let names = std::iter::once(say("remainder")).chain(regions.iter().map(|region| region.name.as_str()));
+            let names =
+                std::iter::once(say("remainder")).chain(regions.iter().map(|region| scene_words::name(&region.name)));
             wishes.recut |= appearance::layers(ui, &mut choices.look, names);
         }
     }

@@ -69,9 +69,11 @@ impl Scan {
     pub fn panel(&self, ui: &mut egui::Ui, probe: &mut Probe, scene: &Scene, mesh: &Mesh) -> bool {
         let before = *probe;
         ui.horizontal_top(|ui| {
-            let room = ui.available_size() - egui::vec2(SETTINGS_WIDTH + SCALE_WIDTH, 0.0);
+            // In a narrow view the settings have no more than half of it, and scroll.
+            let beside = SETTINGS_WIDTH.min(0.5 * ui.available_width());
+            let room = ui.available_size() - egui::vec2(beside + SCALE_WIDTH, 0.0);
             let size = egui::vec2(SIZE[0] as f32, SIZE[1] as f32);
-            let size = size * (room.x / size.x).min(room.y / size.y).max(0.2);
+            let size = size * (room.x / size.x).min(room.y / size.y).max(0.1);
             let (rect, _) = ui.allocate_exact_size(size + egui::vec2(SCALE_WIDTH, 0.0), egui::Sense::hover());
             let picture = egui::Rect::from_min_size(rect.min, size);
             ui.painter().rect_filled(picture, 0.0, egui::Color32::BLACK);
@@ -81,7 +83,8 @@ impl Scan {
             }
             let plane = ProbePlane::new(&scene.motion, probe, scene.tissue.cell_size);
             depth_scale(ui.painter(), picture, &Window::of(&plane, mesh.bounds()));
-            ui.vertical(|ui| settings(ui, probe, scene, mesh));
+            let scroll = egui::ScrollArea::vertical().id_salt("probe");
+            scroll.show(ui, |ui| ui.vertical(|ui| settings(ui, probe, scene, mesh)));
         });
         *probe != before
     }
@@ -106,9 +109,9 @@ fn depth_scale(painter: &egui::Painter, picture: egui::Rect, window: &Window) {
 }
 
 fn settings(ui: &mut egui::Ui, probe: &mut Probe, scene: &Scene, mesh: &Mesh) {
-    ui.spacing_mut().slider_width = 90.0;
+    ui.spacing_mut().slider_width = (0.4 * ui.available_width()).clamp(40.0, 90.0);
     ui.strong(say("ultrasound"));
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         for (orientation, name) in [(Orientation::Along, say("along")), (Orientation::Across, say("across"))] {
             if ui.radio(probe.orientation == orientation, name).clicked() {
                 (probe.orientation, probe.offset) = (orientation, 0.0);

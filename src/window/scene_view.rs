@@ -9,6 +9,7 @@ use super::appearance::{ColourMap, Look};
 use super::camera::Camera;
 use super::section::{self, Outline, RestPlane, TissueCorner};
 use super::tool_shape::ToolCorner;
+use crate::anatomy::colours::Rgb;
 use crate::gpu::{Bound, Gpu, GpuEngine};
 use crate::model::Model;
 use crate::observables::field::Field;
@@ -64,7 +65,9 @@ pub struct SceneView {
     /// Other copies of every node, where faces may separate.
     copies: Option<wgpu::Buffer>,
     /// What the table holds.
-    map: ColourMap,
+    colours: Colours,
+    /// Natural colour of a block of one part whose faces may part.
+    plain: Option<Rgb>,
     corners: wgpu::Buffer,
     /// The corners of the triangles, and how many.
     triangles: (wgpu::Buffer, u32),
@@ -80,10 +83,23 @@ pub struct SceneView {
     anatomy: Option<AnatomyView>,
 }
 
+/// What colours the tissue.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Colours {
+    /// A field.
+    Map(ColourMap),
+    /// Nothing: it has one colour.
+    Plain(Rgb),
+}
+
 /// Colours of the scale from 0 to 1, sRGB.
-fn colour_table(map: ColourMap) -> Vec<[f32; 4]> {
+fn colour_table(colours: Colours) -> Vec<[f32; 4]> {
     let part = |byte: u8| f32::from(byte) / 255.0;
-    (0..256).map(|n| map.colour(f64::from(n) / 255.0)).map(|[r, g, b]| [part(r), part(g), part(b), 1.0]).collect()
+    let colour = |n: i32| match colours {
+        Colours::Map(map) => map.colour(f64::from(n) / 255.0),
+        Colours::Plain(colour) => colour,
+    };
+    (0..256).map(colour).map(|[r, g, b]| [part(r), part(g), part(b), 1.0]).collect()
 }
 
 impl SceneView {
@@ -161,8 +177,8 @@ impl SceneView {
         };
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let view = filled("view", bytemuck::bytes_of(&View::zeroed()), uniform);
-        let map = ColourMap::default();
-        let table = filled("colour_table", bytemuck::cast_slice(&colour_table(map)), uniform);
+        let colours = Colours::Map(ColourMap::default());
+        let table = filled("colour_table", bytemuck::cast_slice(&colour_table(colours)), uniform);
         let (rest, copies) = mesh_buffers(device, model);
         let drawn = drawn_arrays(engine)?;
         let resources = tissue_resources(&view, &table, &drawn, &rest, copies.as_ref());
@@ -209,7 +225,8 @@ impl SceneView {
             table,
             rest,
             copies,
-            map,
+            colours,
+            plain: anatomy_view::only_part(model).map(|(_, colour)| colour),
         };
         drawing.cut(gpu, model, None, 0);
         if let Some(error) = pollster::block_on(scope.pop()) {
@@ -228,6 +245,7 @@ impl SceneView {
             return Ok(false);
         }
         (self.rest, self.copies) = mesh_buffers(&gpu.device, model);
+        self.plain = anatomy_view::only_part(model).map(|(_, colour)| colour);
         self.outline = Outline::of(&model.mesh, |_| false);
         self.through = 0;
         self.take_buffers(gpu, engine)?;
@@ -267,6 +285,11 @@ impl SceneView {
         }
     }
 
+    /// True where the tissue has natural colours.
+    pub fn has_natural(&self) -> bool {
+        self.anatomy.is_some() || self.plain.is_some()
+    }
+
     /// Names of parts in natural colours, and where they are written, at rest [m].
     pub fn anchors(&self) -> &[(String, DVec3)] {
         self.anatomy.as_ref().map_or(&[], AnatomyView::anchors)
@@ -302,7 +325,13 @@ impl SceneView {
         let Some((_, depth)) = &self.depth else { return };
         let anatomy = self.anatomy.as_ref().filter(|_| look.natural);
         let [row, layer] = self.anatomy.as_ref().map_or([0.0; 2], AnatomyView::strides);
-        let opacity = if anatomy.is_some() { look.skin } else { look.opacity };
+        let plain = self.plain.filter(|_| look.natural);
+        let opacity = match (anatomy, plain) {
+            (Some(_), _) => look.skin,
+            // As much as where any other block ends.
+            (None, Some(_)) => 0.5 + 0.5 * look.skin,
+            (None, None) => look.opacity,
+        };
         let towards = (camera.eye() - camera.centre).normalize_or_zero();
         let view = View {
             view_projection: camera.view_projection(area.width / area.height.max(1.0)).to_cols_array_2d(),
@@ -316,9 +345,10 @@ impl SceneView {
             surface: [opacity, look.veil, row, layer],
         };
         gpu.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
-        if self.map != look.map {
-            gpu.queue.write_buffer(&self.table, 0, bytemuck::cast_slice(&colour_table(look.map)));
-            self.map = look.map;
+        let colours = plain.map_or(Colours::Map(look.map), Colours::Plain);
+        if self.colours != colours {
+            gpu.queue.write_buffer(&self.table, 0, bytemuck::cast_slice(&colour_table(colours)));
+            self.colours = colours;
         }
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("tissue"),
@@ -347,7 +377,7 @@ impl SceneView {
         pass.draw(0..3, 0..1);
         match anatomy {
             Some(anatomy) => anatomy.draw(&mut pass),
-            None => self.draw_field(&mut pass, look),
+            None => self.draw_field(&mut pass, opacity),
         }
         let (corners, count) = &self.tool_corners;
         if *count > 0 {
@@ -359,9 +389,9 @@ impl SceneView {
     }
 
     /// Draws the tissue in the colours of its field.
-    fn draw_field(&self, pass: &mut wgpu::RenderPass, look: &Look) {
+    fn draw_field(&self, pass: &mut wgpu::RenderPass, opacity: f32) {
         // Discarding pixels keeps an adapter from leaving out hidden ones early: only where the surface is seen through.
-        let whole = look.opacity >= 1.0;
+        let whole = opacity >= 1.0;
         let (surface, surface_bindings) =
             if whole { (&self.tissue, &self.tissue_bindings) } else { (&self.veil, &self.veil_bindings) };
         let (triangles, count) = &self.triangles;

@@ -25,6 +25,7 @@ start-trainee = Übende
 start-nobody = niemand
 start-new-trainee = Neu ...
 start-name = Name
+start-suggestion = Person { $n }
 start-create = Anlegen
 start-cancel = Abbrechen
 start-hide = Verbergen

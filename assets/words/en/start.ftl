@@ -25,6 +25,7 @@ start-trainee = Trainee
 start-nobody = nobody
 start-new-trainee = New ...
 start-name = name
+start-suggestion = Trainee { $n }
 start-create = Create
 start-cancel = Cancel
 start-hide = Hide

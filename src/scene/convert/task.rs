@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::file::{CylinderTable, GoalKind, GoalTable, SceneFile, SphereShapeTable, TaskTable};
-use super::super::{Goal, Obstacle, TASK_FIGURES, Target, Task};
+use super::super::{Goal, LARGEST_FORCE_LIMIT, Obstacle, TASK_FIGURES, Target, Task};
 use super::{Check, MM, Within};
 use crate::needle::Tool;
 use crate::units;
@@ -101,9 +101,19 @@ impl Check<'_> {
         }
         let time_limit =
             table.time_limit_s.map(|limit| self.number("task.time_limit_s", limit, Within::Positive(3600.0)));
-        let goals = table.goal.iter().enumerate();
-        let goals = goals.filter_map(|(index, goal)| self.goal(index, goal, file, bored, targets)).collect();
-        Task { name: table.name.clone(), briefing: table.briefing.clone(), time_limit, goals }
+        let force_limit = table
+            .force_limit_n
+            .map(|limit| self.number("task.force_limit_n", limit, Within::Positive(LARGEST_FORCE_LIMIT)));
+        let (mut goals, mut weights) = (Vec::new(), Vec::new());
+        for (index, goal) in table.goal.iter().enumerate() {
+            let path = format!("task.goal.{index}.weight");
+            let weight = goal.weight.map_or(1.0, |weight| self.number(&path, weight, Within::Positive(1000.0)));
+            if let Some(goal) = self.goal(index, goal, file, bored, targets) {
+                goals.push(goal);
+                weights.push(weight);
+            }
+        }
+        Task { name: table.name.clone(), briefing: table.briefing.clone(), time_limit, force_limit, goals, weights }
     }
 
     /// A name is one line that is not empty.

@@ -15,6 +15,8 @@ pub struct TaskTable {
     pub briefing: String,
     /// The attempt must not take longer than this [s]; default: no limit.
     pub time_limit_s: Option<f64>,
+    /// The axial force on the needle must not exceed this [N]; default: that is no goal, and a force above 10 N is an event.
+    pub force_limit_n: Option<f64>,
     /// What must be reached, at least one, at most 16.
     #[serde(default)]
     pub goal: Vec<GoalTable>,
@@ -25,6 +27,8 @@ pub struct TaskTable {
 #[serde(deny_unknown_fields)]
 pub struct GoalTable {
     pub kind: GoalKind,
+    /// Its weight in the share of the score, beside 1 of the time limit and of the force limit; all goals must be met to pass; default 1.
+    pub weight: Option<f64>,
     /// Name for messages; for avoid and stop_in_layer; default: that of the kind or the region.
     pub name: Option<String>,
     /// Name of a [[target]]; for hit_target; default: the first.

@@ -137,7 +137,10 @@ impl PracticeScreen {
         panels: Option<Panels>,
     ) -> Result<()> {
         let place = self.place_tool(stage);
-        if let Some(engine) = self.practice.simulation.on_device() {
+        // Stress is computed where it is looked at.
+        let fields = self.shows_fields();
+        self.practice.simulation.show(fields)?;
+        if fields && let Some(engine) = self.practice.simulation.on_device() {
             engine.encode_fields(encoder);
         }
         let (size, view) = (stage.canvas.size(), stage.canvas.create_view(&Default::default()));
@@ -161,6 +164,11 @@ impl PracticeScreen {
         self.scan.draw(&stage.gpu, &mut stage.painter, encoder, &mut self.practice, probe)?;
         stage.paint(encoder, panels, wgpu::LoadOp::Load);
         Ok(())
+    }
+
+    /// True where the view shows a field of the tissue: in natural colours it does not, where there are any.
+    pub(super) fn shows_fields(&self) -> bool {
+        !(self.choices.look.natural && self.view.has_natural())
     }
 
     /// Puts tool, targets and the frame of the slice to their places; the tool's place is returned.

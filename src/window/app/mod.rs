@@ -48,6 +48,7 @@ use crate::ending;
 use crate::gpu::compose::read_sources;
 use crate::scene::Scene;
 use crate::session::Session;
+use crate::training::scene_words;
 use crate::words::say;
 use crate::{Error, Result};
 
@@ -343,7 +344,7 @@ impl App {
                     let reference = self.reference.clone();
                     let options = &self.options;
                     settings.opened(&prepared.practice.tuning.source.path);
-                    let title = format!("{} - {}", say("title"), prepared.practice.scene().title);
+                    let title = format!("{} - {}", say("title"), scene_words::title(&prepared.practice.scene().title));
                     open.stage.window.set_title(&title);
                     let screen = PracticeScreen::new(&mut open.stage, *prepared, options, recorded, reference, devices);
                     open.screen = Screen::Practice(Box::new(screen));

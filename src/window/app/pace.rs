@@ -76,7 +76,10 @@ impl PracticeScreen {
             self.practice.drawn();
         }
         stage.gpu.check()?;
-        if self.choices.automatic && self.ranged.is_none_or(|at| at.elapsed().as_secs_f64() >= LOOK_AT_RANGE) {
+        if self.choices.automatic
+            && self.shows_fields()
+            && self.ranged.is_none_or(|at| at.elapsed().as_secs_f64() >= LOOK_AT_RANGE)
+        {
             self.ranged = Some(begin);
             self.follow_range(&stage.gpu)?;
         }

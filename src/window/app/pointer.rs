@@ -64,7 +64,7 @@ fn take_hold(response: &egui::Response, ui: &egui::Ui, sight: &Sight, (desk, gri
     });
     if response.drag_started_by(egui::PointerButton::Primary) {
         // A drag is one some points after the button went down.
-        *grip = Grip::begin(held, pressed_at.is_some_and(|at| sight.is_on_needle(place(at))));
+        *grip = Grip::begin(held, pressed_at.is_some_and(|at| sight.is_on_needle(place(at))), desk.drag);
     }
     if *grip == Grip::Camera && response.hover_pos().is_some_and(|at| sight.is_on_needle(place(at))) {
         ui.ctx().set_cursor_icon(egui::CursorIcon::Grab);

@@ -10,6 +10,7 @@ use super::stage::Stage;
 use crate::gpu::Gpu;
 use crate::scene::Scene;
 use crate::training::Watcher;
+use crate::training::scene_words;
 use crate::window::anatomy_view::{Entry, legend};
 use crate::window::help;
 use crate::window::practice::{Leader, Practice};
@@ -71,7 +72,7 @@ impl Preparing {
     /// Begins. `format`: that of the pictures.
     pub fn begin(gpu: Gpu, format: wgpu::TextureFormat, order: Order) -> Self {
         let name = match &order.scene {
-            Wanted::Read(read) => read.1.title.clone(),
+            Wanted::Read(read) => scene_words::title(&read.1.title).to_string(),
             Wanted::File(path) => path.display().to_string(),
         };
         let (sender, made) = channel();

@@ -15,6 +15,7 @@ use super::lesson;
 use crate::scene::Scene;
 use crate::training::debrief::{Debrief, Verdict};
 use crate::training::events::{Gravity, Watcher};
+use crate::training::scene_words;
 use crate::words::{say, say_with};
 
 use path::Orbit;
@@ -130,7 +131,11 @@ impl Debriefing {
             let colour = lesson::colour(gravity, ui);
             lesson::sign(ui, gravity.into(), colour);
             ui.label(egui::RichText::new(debrief.verdict.text()).heading().strong().color(colour));
-            ui.label(debrief.score.task.as_deref().unwrap_or(&debrief.score.scene));
+            ui.label(debrief.score.task.as_deref().map_or(debrief.score.scene.as_str(), scene_words::task));
+            if let Some(share) = debrief.score.share() {
+                let percent = format!("{:.0}", 100.0 * share);
+                ui.label(say_with("debrief-share", &[("percent", percent.into())]));
+            }
             let number = |value: f64| format!("{value:.1}").into();
             let times = [("simulated", number(debrief.simulated)), ("wall", number(debrief.wall))];
             ui.weak(say_with("debrief-times", &times));

@@ -1,10 +1,12 @@
 //! Trainees: choosing, making, hiding them.
 
+use egui::text::{CCursor, CCursorRange};
+
 use super::progress::Progress;
 use crate::training::history::History;
 use crate::training::trainees::{self, Trainee};
 use crate::window::settings::Settings;
-use crate::words::say;
+use crate::words::{say, say_with};
 
 /// Longest name in the list [characters]; a longer one is cut in it.
 const SHOWN: usize = 24;
@@ -15,6 +17,8 @@ pub struct People {
     all: Vec<Trainee>,
     /// A name that is being written; `None`: nobody is being made.
     new: Option<String>,
+    /// It was suggested just now: the field takes the keyboard, and what is typed replaces the name.
+    suggested: bool,
     hidden_shown: bool,
     pub progress: Progress,
     /// What went wrong.
@@ -29,6 +33,7 @@ impl People {
             history,
             all: Vec::new(),
             new: None,
+            suggested: false,
             hidden_shown: false,
             progress: Progress::default(),
             messages: Vec::new(),
@@ -68,20 +73,33 @@ impl People {
         });
         list.response.labelled_by(label);
         if self.new.is_none() && ui.button(say("start-new-trainee")).clicked() {
-            self.new = Some(String::new());
+            (self.new, self.suggested) = (Some(self.suggestion()), true);
         }
         self.being_made(ui, settings);
         self.hiding(ui, settings);
     }
 
+    /// A name that nobody has: a trainee can be made with a mouse alone.
+    fn suggestion(&self) -> String {
+        let numbered = |n: usize| say_with("start-suggestion", &[("n", n.into())]);
+        let is_free = |name: &String| self.all.iter().all(|trainee| trainee.name != *name);
+        (1..).map(numbered).find(is_free).unwrap_or_default()
+    }
+
     /// The field for the name of a new trainee.
     fn being_made(&mut self, ui: &mut egui::Ui, settings: &mut Settings) {
         let Some(name) = &mut self.new else { return };
-        let field = egui::TextEdit::singleline(name).hint_text(say("start-name")).desired_width(140.0);
-        let field = ui.add(field);
-        if name.is_empty() && !field.has_focus() && !field.lost_focus() {
-            field.request_focus();
+        // A name of its own: the button before it, whose place would number it, goes with the first picture.
+        let field = egui::TextEdit::singleline(name).id_salt("new trainee");
+        let field = field.hint_text(say("start-name")).desired_width(140.0);
+        let mut field = field.show(ui);
+        if std::mem::take(&mut self.suggested) {
+            let whole = CCursorRange::two(CCursor::new(0), CCursor::new(name.chars().count()));
+            field.state.cursor.set_char_range(Some(whole));
+            field.state.store(ui.ctx(), field.response.id);
+            field.response.request_focus();
         }
+        let field = field.response;
         let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         let made = ui.add_enabled(!name.trim().is_empty(), egui::Button::new(say("start-create"))).clicked();
         let left = ui.button(say("start-cancel")).clicked() || ui.input(|i| i.key_pressed(egui::Key::Escape));

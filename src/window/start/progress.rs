@@ -85,6 +85,7 @@ mod tests {
             least: None,
             most: None,
             met,
+            weight: 1.0,
         };
         Score { scene: "s".into(), task: Some("t".into()), rows: vec![row], goals: vec![goal], trust: Trust::default() }
     }

@@ -48,7 +48,10 @@ fn table(ui: &mut egui::Ui, class: &Class, chosen: &mut Option<usize>) {
         for head in heads {
             ui.strong(crate::words::say_of(head).unwrap_or(head));
         }
-        ui.strong(say("teacher-trend"));
+        ui.vertical(|ui| {
+            in_the_rest(ui);
+            ui.strong(say("teacher-trend"));
+        });
         ui.end_row();
         let mut before = "";
         for (n, s) in class.standings.iter().enumerate() {
@@ -64,6 +67,7 @@ fn table(ui: &mut egui::Ui, class: &Class, chosen: &mut Option<usize>) {
             ui.label(met(s.best().and_then(goals_met)));
             ui.label(met(s.last().and_then(goals_met)));
             ui.vertical(|ui| {
+                in_the_rest(ui);
                 for key in s.key_figures() {
                     ui.label(egui::RichText::new(trend(s, &key)).weak());
                 }
@@ -71,6 +75,12 @@ fn table(ui: &mut egui::Ui, class: &Class, chosen: &mut Option<usize>) {
             ui.end_row();
         }
     });
+}
+
+/// The last column has the rest of the page, where its texts wrap: what lies beyond is found by nobody who does not scroll sideways.
+fn in_the_rest(ui: &mut egui::Ui) {
+    let rest = ui.clip_rect().right() - ui.cursor().left() - 12.0;
+    ui.set_max_width(rest.max(160.0));
 }
 
 /// `Passes through the surface: 1 (getting better)`.

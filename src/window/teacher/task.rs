@@ -4,9 +4,12 @@ use std::path::PathBuf;
 
 use super::{Teacher, path_of};
 use crate::reading;
-use crate::training::own_task::{Aim, OwnTask, Way};
+use crate::scene::Goal;
+use crate::training::debrief::spoken;
+use crate::training::own_task::{Aim, Avoided, Kept, OwnTask, Way};
+use crate::training::scene_words;
 use crate::window::screens::Next;
-use crate::words::{say, say_with};
+use crate::words::{say, say_of, say_with};
 
 /// Folders of the built-in scenes with tasks.
 const FOLDERS: [&str; 2] = ["scenes/training/", "scenes/anatomy/"];
@@ -134,20 +137,61 @@ fn fields(ui: &mut egui::Ui, task: &mut OwnTask) {
             ui.add(egui::DragValue::new(limit).range(1.0..=3600.0).max_decimals(1).suffix(" s")).labelled_by(switch.id);
         }
     });
+    ui.horizontal_wrapped(|ui| {
+        let mut limited = task.force_limit.is_some();
+        let switch = ui.checkbox(&mut limited, say("own-force-limit"));
+        if switch.changed() {
+            task.force_limit = limited.then_some(2.0);
+        }
+        if let Some(limit) = &mut task.force_limit {
+            let value = egui::DragValue::new(limit).range(0.1..=10.0).speed(0.05).max_decimals(2).suffix(" N");
+            ui.add(value).labelled_by(switch.id);
+        }
+    });
     for region in &task.regions {
-        let index = task.avoid.iter().position(|(name, _)| name == region);
+        let index = task.avoid.iter().position(|avoided| avoided.region == *region);
         ui.horizontal_wrapped(|ui| {
             let mut avoided = index.is_some();
-            if ui.checkbox(&mut avoided, say_with("own-avoid", &[("region", region.as_str().into())])).changed() {
+            if ui
+                .checkbox(&mut avoided, say_with("own-avoid", &[("region", scene_words::name(region).into())]))
+                .changed()
+            {
                 match index {
                     Some(index) => drop(task.avoid.remove(index)),
-                    None => task.avoid.push((region.clone(), 0.5)),
+                    None => task.avoid.push(Avoided { region: region.clone(), clearance: 0.5, weight: 1.0 }),
                 }
             } else if let Some(index) = index {
-                number(ui, say("own-clearance"), &mut task.avoid[index].1, "mm", 0.0..=50.0);
+                number(ui, say("own-clearance"), &mut task.avoid[index].clearance, "mm", 0.0..=50.0);
+                weight(ui, &mut task.avoid[index].weight);
             }
         });
     }
+    for kept in &mut task.kept {
+        let text = told(kept);
+        ui.checkbox(&mut kept.on, text);
+    }
+}
+
+/// A goal of the scene that the form does not change, in a few words.
+fn told(kept: &Kept) -> String {
+    let named = |key: &str, name: &str| say_with(key, &[("region", scene_words::name(name).into())]);
+    match &kept.goal {
+        Goal::Figure { figure, most } => {
+            let name = say_of(&format!("figure-{}", figure.key)).unwrap_or(figure.key);
+            let most = format!("{} {}", spoken(figure.unit.show(*most)), figure.unit.name);
+            say_with("own-kept-figure", &[("name", name.into()), ("most", most.trim().into())])
+        }
+        Goal::Avoid { name, .. } => named("own-kept-avoid", name),
+        Goal::StopInLayer { name, .. } => named("own-kept-stop", name),
+        Goal::HitTarget { .. } => say("own-kept-target").into(),
+        Goal::CoreMass { .. } | Goal::CoreVolume { .. } => say("own-kept-core").into(),
+    }
+}
+
+/// Its weight among the goals.
+fn weight(ui: &mut egui::Ui, weight: &mut f64) {
+    let id = ui.label(say("own-weight")).on_hover_text(say("own-weight-about")).id;
+    ui.add(egui::DragValue::new(weight).speed(0.1).range(0.1..=100.0).max_decimals(1)).labelled_by(id);
 }
 
 fn aim(ui: &mut egui::Ui, task: &mut OwnTask) {
@@ -178,4 +222,5 @@ fn aim(ui: &mut egui::Ui, task: &mut OwnTask) {
             number(ui, say("own-to"), to, "mm", 0.0..=300.0);
         }
     });
+    ui.horizontal_wrapped(|ui| weight(ui, &mut task.weight));
 }
