@@ -9,7 +9,7 @@ use super::slit_contact::SlitContact;
 use super::{ContactSums, CpuEngine};
 use crate::effects::friction::stick_or_slide;
 use crate::engine::{ContactState, State};
-use crate::model::{ANCHOR_COUNT, ContactNode, Model, PuncturePlan};
+use crate::model::{ANCHOR_COUNT, Model, PuncturePlan};
 use crate::needle::gap::Profile;
 use crate::needle::{ToolPose, swing};
 
@@ -18,8 +18,7 @@ const NO_CONTACT: u32 = u32::MAX;
 
 /// Which contact nodes of a free path are looked at in a step. Most are far away from the needle, and nothing of theirs changes.
 pub(super) struct NearNodes {
-    /// Node and its place at rest [m], of every contact node; contact node of every node.
-    places: Vec<(u32, DVec3)>,
+    /// Contact node of every node.
     of_node: Vec<u32>,
     /// Numbers of those that the needle touches or has passed.
     busy: Vec<u32>,
@@ -31,13 +30,11 @@ impl NearNodes {
     /// For a model with a free path, whose contact nodes are all nodes beside it.
     pub fn of(model: &Model) -> Option<Self> {
         model.puncture.as_ref()?.free.as_ref()?;
-        let place = |contact: &ContactNode| (contact.node, model.mesh.rest_position(contact.node as usize));
         let mut of_node = vec![NO_CONTACT; model.mesh.node_count()];
         for (index, contact) in model.contact_nodes.iter().enumerate() {
             of_node[contact.node as usize] = index as u32;
         }
-        let places = model.contact_nodes.iter().map(place).collect();
-        Some(NearNodes { places, of_node, busy: Vec::new(), is_stale: true })
+        Some(NearNodes { of_node, busy: Vec::new(), is_stale: true })
     }
 
     /// Keeps those of `looked_at` that must be looked at again wherever they are.
@@ -143,8 +140,9 @@ impl CpuEngine {
         }
         let displacement = &self.state.displacement;
         let is_near = |index: &usize| {
-            let (node, rest) = near.places[*index];
-            !needle.is_far_from(rest, rest + displacement[node as usize] - needle.pose.tip)
+            let node = needle.model.contact_nodes[*index].node as usize;
+            let rest = self.rest[node];
+            !needle.is_far_from(rest, rest + displacement[node] - needle.pose.tip)
         };
         let found =
             self.in_ranges(count, |range| range.filter(is_near).map(|index| index as u32).collect::<Vec<u32>>());

@@ -25,17 +25,22 @@ struct Known {
     tasks: HashMap<String, String>,
 }
 
-/// What of a scene is looked for.
+/// What a card or a word needs of a scene file: a patient takes seconds to load.
 #[derive(Deserialize)]
-struct Head {
-    title: Option<String>,
-    task: Option<TaskHead>,
+pub struct Head {
+    /// `title`, where the file has one.
+    pub title: Option<String>,
+    /// `[task]`, where the file has one.
+    pub task: Option<TaskHead>,
 }
 
+/// The texts of a task.
 #[derive(Deserialize)]
-struct TaskHead {
-    name: String,
-    briefing: String,
+pub struct TaskHead {
+    /// As on its card.
+    pub name: String,
+    /// What a trainee reads before the start.
+    pub briefing: String,
 }
 
 /// A file's name as a part of a key.

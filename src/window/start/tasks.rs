@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-
 use crate::reading;
+use crate::training::scene_words::Head;
 use crate::words::say_of;
 
 /// Tasks of the program from easy to hard, with their difficulty from 1 to 3.
@@ -37,19 +36,6 @@ pub struct Task {
 pub struct BuiltIn {
     pub path: PathBuf,
     pub title: String,
-}
-
-/// What of a scene file is read for its card: a patient takes seconds to load.
-#[derive(Deserialize)]
-struct Head {
-    title: Option<String>,
-    task: Option<TaskHead>,
-}
-
-#[derive(Deserialize)]
-struct TaskHead {
-    name: String,
-    briefing: String,
 }
 
 fn head(path: &Path) -> Option<Head> {
