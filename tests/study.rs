@@ -347,23 +347,37 @@ fn a_study_is_one_page_and_a_rerun_computes_nothing() {
     let page = std::fs::read(place.path("out/study.html")).unwrap();
     let output = place.study("out", &[]);
     succeeded(&output);
-    assert!(errors(&output).contains(&format!("{0} of ", runs.len())) && errors(&output).contains("finished already"));
+    let finished = format!("{0} of ", runs.len());
+    let told = errors(&output);
+    assert!(told.contains(&finished) && told.contains("finished already"), "{told}");
     assert_eq!(place.runs("out"), runs);
     assert_eq!(std::fs::read(place.path("out/study.html")).unwrap(), page);
     let names: Vec<&String> = runs.keys().collect();
     std::fs::remove_file(place.path("out/runs").join(names[0])).unwrap();
     std::fs::write(place.path("out/runs").join(names[1]), "{").unwrap();
-    succeeded(&place.study("out", &[]));
+    let output = place.study("out", &[]);
+    succeeded(&output);
     let after = place.runs("out");
-    let same = runs.iter().filter(|(name, bytes)| after.get(*name) == Some(*bytes)).count();
-    assert_eq!(same, runs.len() - 2);
-    assert!(runs.keys().all(|name| after.contains_key(name)));
+    for (name, bytes) in &runs {
+        // On a machine that has become slower the budget may have no room for a run any more; that is told.
+        let id = name.trim_end_matches(".json");
+        let is_left_out = errors(&output).contains(&format!("{id}: left out, the budget"));
+        let is_broken = names[..2].contains(&name);
+        match after.get(name).filter(|after| *after != b"{") {
+            Some(again) => assert!(is_broken || again == bytes, "{name} was made again"),
+            None => assert!(is_broken && is_left_out, "{name} is missing: {}", errors(&output)),
+        }
+    }
 
     // A changed scene makes all of them again.
     std::fs::write(place.path("tiny.toml"), TINY.replace("depth_mm = 3.0", "depth_mm = 2.5")).unwrap();
     let output = place.study("out", &["--axes", "mass"]);
     succeeded(&output);
-    assert!(errors(&output).contains("have changed") && !errors(&output).contains("finished already"));
+    assert!(
+        errors(&output).contains("have changed") && !errors(&output).contains("finished already"),
+        "{}",
+        errors(&output)
+    );
 
     // What the study has found is what advise goes by, as long as the scene is the same.
     let advice = place.call(&["advise", "tiny.toml", "--real-time", "--engine", "cpu", "--study", "out"]);

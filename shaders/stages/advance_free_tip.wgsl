@@ -157,12 +157,8 @@ fn look_for_surface() {
     let away = step_input.tip.xyz - place.position - (X - near);
     let next = X + pulled_back(place.fx, place.fy, place.fz, away);
     let skin = skin_at(next);
-#ifdef EMPTY_CELLS
-    // Heights of a lattice: see the CPU engine.
+    // Where the tip is, not at the height: see the CPU engine.
     let on_top = vec3<f32>(next.xy, min(next.z, skin));
-#else
-    let on_top = vec3<f32>(next.xy, skin);
-#endif
     let over = has_skin(skin) && all(within_block(on_top) == on_top);
     // Nearer than a tenth of a millimetre: far from the solution a step may end anywhere.
     let enters = over && next.z <= skin + 1e-9 && dot(away, away) < 1e-8;

@@ -138,11 +138,10 @@ fn look_for_surface((mesh, free): (&BlockMesh, &FreePlan), u: &[DVec3], tip: &mu
     let over = within_block(mesh, tip.place.with_z(skin)) == tip.place.with_z(skin);
     // Nearer than a tenth of a millimetre: far from the solution a step may end anywhere.
     if over && tip.place.z <= skin + 1e-9 && away.length() < 1e-4 {
-        // The heights are those of a lattice: a tip that begins on the true skin may be some hundredths of a millimetre behind them, and
-        // springs that were tight at once would be work of nobody.
-        let height = if mesh.empty.is_empty() { skin } else { tip.place.z.min(skin) };
+        // Where the tip is, not at the height: it may be a part of a step behind the skin, or some hundredths of a millimetre behind the
+        // lattice of heights, and springs that were tight at once would be work of nobody.
         *tip = FreeTip {
-            place: tip.place.with_z(height),
+            place: tip.place.with_z(tip.place.z.min(skin)),
             along: pose.direction,
             across: lateral_axes(pose.direction).0,
             inside: true,
