@@ -63,3 +63,24 @@ fn opening_damage(normal: f32, shear: f32) -> f32 {
     let lambda = sqrt(square);
     return clamp(end * (lambda - onset) / (max(lambda, onset) * (end - onset)), 0.0, 1.0);
 }
+
+// Contact of torn faces per K A: U [m^2], and dU/dg over the normal and over the shear opening.
+struct TornContact {
+    stored: f32,
+    normal: f32,
+    slip: f32,
+}
+
+// Of the squares of overlap and slip [m^2], or their products at two times.
+fn torn_contact(overlap_square: f32, slip_square: f32) -> TornContact {
+    let square = cohesive.torn_reach * cohesive.torn_reach;
+    let left = 1.0 - clamp(overlap_square / square, 0.0, 1.0);
+    let facing = 1.0 - clamp(slip_square / square, 0.0, 1.0);
+    // 1 - left^3 without the difference of two numbers that are nearly one.
+    let held = (1.0 - left) * (1.0 + left + left * left);
+    return TornContact(
+        square / 6.0 * held * facing * facing,
+        left * left * facing * facing,
+        -2.0 / 3.0 * held * facing,
+    );
+}

@@ -235,6 +235,13 @@ fn slit_face(lever: vec3<f32>, d: vec3<f32>, s: f32, side: vec3<f32>, less: vec2
 }
 #endif
 #ifdef BORE
+#const CORE_TEARS
+
+// Whether the tip of a hollow needle has gone back from where it has cut to, `gap` beyond it [m], so far that the core tears off there.
+fn core_tears(coordinate: f32, gap: f32) -> bool {
+    return coordinate > 0.0 && gap < -CORE_TEARS * puncture.bore_radius;
+}
+
 // Overlap of the tissue around a hollow needle with its outer wall (`outside` 1) or of the core with its bore (-1).
 fn tube_wall(lever: vec3<f32>, d: vec3<f32>, s: f32, outside: f32, less: vec2<f32>) -> Overlap {
     let rho = lever - d * s;

@@ -40,24 +40,24 @@ fn cohesive_forces(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #ifdef PUNCTURE
     damage = max(damage, clamp((tip_state.coordinate - pair.second_way_and_start.w) * cohesive.inverse_ramp, 0.0, 1.0));
 #ifdef BORE
-    // The core tears off as a whole when the motion turns back: no bond is left above its base.
-    let backward = dot(step_input.velocity.xyz, step_input.direction.xyz) < 0.0;
+    // The core tears off as a whole: no bond is left above its base.
     let above = pair.second_way_and_start.w < tip_state.coordinate;
-    damage = max(damage, select(0.0, 1.0, backward && above));
+    damage = max(damage, select(0.0, 1.0, above && core_tears(tip_state.coordinate, tip_state.gap)));
 #endif
     // Where both copies lie on the full shaft the bond is gone.
     damage = max(damage, contact_records[pair.contacts.x].touch.w * contact_records[pair.contacts.y].touch.w);
 #endif
     let k = cohesive.penalty * pair.first_way_and_area.w;
-    let closed = normal_opening < 0.0;
-    // A closed face keeps its normal stiffness, so that damage takes from its shear only.
-    let taken = dot(opening, before) - select(0.0, normal_opening * dot(before, n), closed);
-    state.dissipation += 0.5 * k * (damage - state.damage) * taken;
+    // A closed face keeps the normal stiffness that damage takes, as far as the faces still meet.
+    let closed = select(0.0, 1.0, normal_opening < 0.0);
+    let across = normal_opening * dot(before, n);
+    let met = torn_contact(across, dot(opening, before) - across);
+    state.dissipation += k * (damage - state.damage) * (0.5 * dot(opening, before) - closed * met.stored);
     state.damage = damage;
-    let near = -normal_opening < cohesive.torn_reach && length(shear) < cohesive.torn_reach;
-    let contact = select(0.0, damage * normal_opening, closed && (damage < 1.0 || near));
-    let force = opening * (k * (1.0 - damage)) + n * (k * contact);
-    state.stored = 0.5 * k * ((1.0 - damage) * dot(opening, opening) + contact * normal_opening);
+    let contact = torn_contact(normal_opening * normal_opening, dot(shear, shear));
+    let pull = n * (normal_opening * contact.normal) + shear * contact.slip;
+    let force = k * (opening * (1.0 - damage) + pull * (closed * damage));
+    state.stored = k * (0.5 * (1.0 - damage) * dot(opening, opening) + closed * damage * contact.stored);
     pair_states[index] = state;
     corner_force[pair.nodes.z] += vec4<f32>(force, 2.0 * k);
     corner_force[pair.nodes.w] += vec4<f32>(-force, 2.0 * k);

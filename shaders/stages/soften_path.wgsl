@@ -2,9 +2,6 @@
 // it loses is booked. One thread per path cell.
 #import shared/params
 #import shared/thread_index
-#ifdef BORE
-#import shared/step_input
-#endif
 #import shared/displacement
 #import shared/material_point
 #ifdef TETRAHEDRA
@@ -30,9 +27,9 @@ fn soften_path(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
     let ramp = clamp((tip_state.coordinate - path.axial_start) / max(path.axial_end - path.axial_start, 1e-9), 0.0, 1.0);
     let old = cell_stiffness[path.cell];
 #ifdef BORE
-    // The core tears off where the tip stands when the needle begins to go back.
+    // The core tears off where the tip has cut to.
     let here = tip_state.coordinate >= path.axial_start && tip_state.coordinate < path.axial_end;
-    let remaining = select(old, 0.0, here && dot(step_input.velocity.xyz, step_input.direction.xyz) < 0.0);
+    let remaining = select(old, 0.0, here && core_tears(tip_state.coordinate, tip_state.gap));
 #else
     let remaining = 1.0 - ramp * (1.0 - path.left);
 #endif

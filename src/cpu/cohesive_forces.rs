@@ -3,8 +3,7 @@
 use glam::DVec3;
 
 use super::CpuEngine;
-use crate::effects::cohesive::{Law, TORN_REACH};
-use crate::needle::ToolPose;
+use crate::effects::cohesive::{Law, TORN_REACH, TornContact};
 use crate::separation::FacePair;
 
 /// Pairs from which on another thread joins before they are done.
@@ -22,10 +21,10 @@ struct Torn {
 
 impl CpuEngine {
     /// Traction of every pair on its two copies, damage by opening, by the tip and by the shaft.
-    pub(super) fn cohesive_forces(&mut self, pose: Option<&ToolPose>) {
+    pub(super) fn cohesive_forces(&mut self) {
         let model = self.model.clone();
         let Some(law) = model.cohesion else { return };
-        let turned_back = model.has_bore() && pose.is_some_and(|p| p.velocity.dot(p.direction) < 0.0);
+        let turned_back = model.puncture.as_ref().is_some_and(|plan| self.core_tears(plan));
         let pairs = &model.separation.pairs;
         // Every pair by itself, on all threads where they are many; sums in the order of the pairs.
         let tear = |i: usize| self.tear(&law, &pairs[i], self.state.pairs[i], turned_back);
@@ -48,7 +47,7 @@ impl CpuEngine {
         self.sums.energy.cohesive_stored = stored;
     }
 
-    /// One pair with the damage `old`; `turned_back`: a hollow needle goes back.
+    /// One pair with the damage `old`; `turned_back`: a hollow needle has gone back so far that its core tears.
     fn tear(&self, law: &Law, pair: &FacePair, old: f64, turned_back: bool) -> Torn {
         let (model, state) = (&self.model, &self.state);
         let h = model.scene.tissue.cell_size;
@@ -65,7 +64,7 @@ impl CpuEngine {
             damage = damage.max(law.damage(normal_opening, shear.length()));
             if let Some(s0) = pair.tip_driven {
                 damage = damage.max(((state.tip_coordinate - s0) / h).clamp(0.0, 1.0));
-                // The core tears off as a whole when the needle turns back: no bond is left above its base.
+                // The core tears off as a whole: no bond is left above its base.
                 if turned_back && s0 < state.tip_coordinate {
                     damage = 1.0;
                 }
@@ -80,18 +79,22 @@ impl CpuEngine {
             }
         }
         let k = law.penalty * pair.area;
-        let closed = normal_opening < 0.0;
-        // A closed face keeps its normal stiffness, so that damage takes from its shear only.
-        let taken = opening.dot(before) - if closed { normal_opening * before.dot(n) } else { 0.0 };
-        let touches = closed && (damage < 1.0 || (-normal_opening < TORN_REACH * h && shear.length() < TORN_REACH * h));
-        let kept = 1.0 - damage;
-        let contact = if touches { damage * normal_opening } else { 0.0 };
-        Torn {
-            damage,
-            dissipated: 0.5 * k * (damage - old) * taken,
-            stored: 0.5 * k * (kept * opening.length_squared() + contact * normal_opening),
-            force: opening * (k * kept) + n * (k * contact),
+        let (kept, grown) = (1.0 - damage, damage - old);
+        // A closed face keeps the normal stiffness that damage takes, as far as the faces still meet.
+        let (mut taken, mut stored, mut pull) =
+            (0.5 * opening.dot(before), 0.5 * opening.length_squared(), DVec3::ZERO);
+        stored *= kept;
+        if normal_opening < 0.0 && damage > 0.0 {
+            let reach = TORN_REACH * h;
+            let normal_before = before.dot(n);
+            let across = normal_opening * normal_before;
+            taken -= TornContact::new(across, opening.dot(before) - across, reach).stored();
+            let contact = TornContact::new(normal_opening * normal_opening, shear.length_squared(), reach);
+            stored += damage * contact.stored();
+            let (normal, slip) = contact.slopes();
+            pull = (n * (normal_opening * normal) + shear * slip) * damage;
         }
+        Torn { damage, dissipated: k * grown * taken, stored: k * stored, force: (opening * kept + pull) * k }
     }
 }
 

@@ -225,7 +225,7 @@ impl CpuEngine {
             match &plan.free {
                 None => {
                     self.advance_tip(plan, &pose);
-                    self.soften_path(plan, &pose);
+                    self.soften_path(plan);
                 }
                 Some(free) => {
                     self.advance_free_tip(plan, free, &pose);
@@ -235,7 +235,7 @@ impl CpuEngine {
         }
         self.element_forces(input);
         self.added_bound.fill(0.0);
-        self.cohesive_forces(input.pose.as_ref());
+        self.cohesive_forces();
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             self.needle_contact(plan, &pose, input.step);
             if let Some(opening) = &plan.opening {

@@ -217,22 +217,29 @@ impl CpuEngine {
     }
 
     /// Stage `soften_path`: factor `1 - ramp(a) (1 - left)`; the energy that a cell loses is dissipated.
-    pub(super) fn soften_path(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
+    pub(super) fn soften_path(&mut self, plan: &PuncturePlan) {
+        let tears = self.core_tears(plan);
         let a = self.state.tip_coordinate;
         for path_cell in &plan.cells {
             let cell = path_cell.cell as usize;
             let length = path_cell.axial_end - path_cell.axial_start;
             let ramp = ((a - path_cell.axial_start) / length.max(1e-9)).clamp(0.0, 1.0);
             let factor = match plan.needle.bore {
-                // The core tears off where the tip stands when the needle begins to go back.
+                // The core tears off where the tip has cut to.
                 Some(_) => {
                     let here = (path_cell.axial_start..path_cell.axial_end).contains(&a);
-                    if here && pose.velocity.dot(pose.direction) < 0.0 { 0.0 } else { 1.0 }
+                    if here && tears { 0.0 } else { 1.0 }
                 }
                 None => 1.0 - ramp * (1.0 - path_cell.left),
             };
             self.soften_cell(cell, factor);
         }
+    }
+
+    /// Whether the tip of a hollow needle has gone back from where it has cut to so far that the core tears off there.
+    pub(super) fn core_tears(&self, plan: &PuncturePlan) -> bool {
+        let bore = plan.needle.bore.map_or(f64::INFINITY, |bore| bore.radius);
+        self.state.tip_coordinate > 0.0 && self.state.bond.gap < -puncture::CORE_TEARS * bore
     }
 
     /// Leaves a cell the part `factor` of its stiffness, if that is less than it has, and books the energy that it loses.

@@ -68,8 +68,14 @@ pub const MOST_STRETCH: f64 = 3.0;
 /// third of the needle's diameter with the 0.3 of other scenes, and finer cells turned inside out.
 pub const FLAT_UNDER_NEEDLE: f64 = 0.75;
 
+/// The core of a hollow needle tears off at its base where the tip has gone back from it by so much, in radii of the bore: the neck of the
+/// core, about a radius long, is then stretched by half, about what muscle bears. A choice of this project. A trembling hand goes back by
+/// less; where any way back counted, a hand that trembled above the skin had torn a core off before it touched.
+pub const CORE_TEARS: f64 = 0.5;
+
 /// What the shaders have of this file.
-pub const SHADER_CONSTANTS: [(&str, f64); 7] = [
+pub const SHADER_CONSTANTS: [(&str, f64); 8] = [
+    ("CORE_TEARS", CORE_TEARS),
     ("FIRST_ADVANCE", FIRST_ADVANCE),
     ("LARGEST_ADVANCE", LARGEST_ADVANCE),
     ("LEAST_TRAVELS", LEAST_TRAVELS),

@@ -8,7 +8,7 @@
 //! approach           above the skin, then one insertion at a speed of its own that wanders (Ornstein-Uhlenbeck, 0.3 s)
 //! corrections        a Poisson number of tilts under way, each with a new error of the angle, smaller than the last
 //! stopping           at the wanted depth with a normal error, and a reaction time later; where a layer is to be found, a reaction time
-//!                    after the resistance was lost
+//!                    after a resistance was lost as deep as it lies
 //! tremor             three sines between 8 and 12 Hz per axis, along the needle and as a tilt about the entry
 //! passes             with some probability it withdraws and tries again, with smaller errors
 //! ```
@@ -185,8 +185,6 @@ const TILT_RATE: f64 = 0.35;
 /// Part of the largest force of the last [`FEELING`] s that must be lost for a layer to have given way.
 const LOSS: f64 = 0.2;
 const FEELING: f64 = 0.3;
-/// A layer that is to be found is not looked for before this part of the way.
-const LISTENING: f64 = 0.6;
 
 /// The reference attempt that a trainee means to repeat.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -201,8 +199,9 @@ pub struct Aim {
     pub speed: f64,
     /// The needle is taken out at the end.
     pub withdrawn: bool,
-    /// The end of the way is told by what is felt.
-    pub by_feel: bool,
+    /// The end of the way is told by a layer that gives way. No loss is a sign of it before the tip would be as deep as what lies behind
+    /// the layer does at rest [m]: skin and ligaments give way too, and tissue that is pushed lies deeper.
+    pub by_feel: Option<f64>,
 }
 
 impl Aim {
@@ -234,7 +233,10 @@ impl Aim {
             depth: scene.motion.deepest(),
             speed,
             withdrawn: matches!(scene.motion.phases.last(), Some(Phase::Withdraw { .. })),
-            by_feel: task.goals.iter().any(|goal| matches!(goal, Goal::StopInLayer { .. })),
+            by_feel: task.goals.iter().find_map(|goal| match goal {
+                Goal::StopInLayer { from, .. } => Some(*from),
+                _ => None,
+            }),
         })
     }
 
@@ -418,7 +420,7 @@ impl Trainee {
                         .map(|_| ANGLE.at(self.level).to_radians() * LEARNT / plane_mean() * self.numbers.normal());
                     self.direction = self.tilted();
                 }
-                if self.depth >= self.stop || (self.aim.by_feel && self.gave_way()) {
+                if self.depth >= self.stop || self.gave_way() {
                     self.doing = Doing::Stopping { at: self.time + REACTION.at(self.level) * 1e-3 };
                 }
             }
@@ -475,13 +477,13 @@ impl Trainee {
     /// A layer has given way under the needle just now.
     fn gave_way(&self) -> bool {
         let largest = self.felt.iter().map(|(_, force)| *force).fold(0.0, f64::max);
-        let last = self.felt.last().map_or(0.0, |(_, force)| *force);
-        self.depth > LISTENING * self.aim.depth && last < (1.0 - LOSS) * largest
+        self.felt.last().is_some_and(|(_, force)| *force < (1.0 - LOSS) * largest)
     }
 
     /// Is told what the needle felt in the last frame.
     pub fn feel(&mut self, record: &FrameRecord) {
         self.felt.push((record.time, record.force.axial));
-        self.felt.retain(|(time, _)| *time > record.time - FEELING);
+        let listens = self.aim.by_feel.is_some_and(|from| self.depth > from);
+        self.felt.retain(|(time, _)| listens && *time > record.time - FEELING);
     }
 }
