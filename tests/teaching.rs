@@ -406,6 +406,17 @@ fn an_attempt_is_that_of_its_seed_and_its_session_is_the_same_run() {
     assert_eq!(first.value("peak_axial_force").map(f64::to_bits), Some(largest.to_bits()));
 }
 
+/// A hand that trembles above the skin and in the tissue, with the hollow needle: its core is in the bore, and no energy is created where torn
+/// faces meet again. The first such attempts created half of their work, and none had a core.
+#[test]
+fn a_trembling_hand_brings_out_a_core() {
+    let path = root().join("scenes/training/core_biopsy.toml");
+    let scene = Scene::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
+    let (outcome, _) = attempt(&scene, &[], (Level::Novice, 1, 1), &AtomicBool::new(false)).unwrap().unwrap();
+    assert_eq!((outcome.stopped.as_deref(), &outcome.reasons[..]), (None, &[][..]));
+    assert!(outcome.value("core_mass").is_some_and(|mass| mass > 6.0), "{outcome:?}");
+}
+
 #[test]
 fn the_report_goes_on_where_it_was_and_keeps_its_evidence() {
     let (path, overrides, _) = small();

@@ -10,7 +10,7 @@ use super::anatomy::Anatomy;
 use super::picture::encode_srgb;
 use super::slice::Plane;
 use super::stroke_font;
-use super::surfaces::{self, Corner, Embedding, Layer, Triangle};
+use super::surfaces::{self, Corner, Detail, Embedding, Layer, Triangle};
 use crate::anatomy::Frame;
 use crate::anatomy::colours::Rgb;
 use crate::mesh::{BlockMesh, Mesh};
@@ -71,8 +71,8 @@ fn moved(
 ) -> Vec<Triangle> {
     // The half towards the viewer is taken away; a little behind the axis, so that the needle stands before the cut.
     let offset = plane.normal.dot(plane.origin) - 1e-6;
-    let mut all = surfaces::cut(&surfaces::surfaces(scene, block, anatomy), plane.normal, offset);
-    surfaces::face(block, (plane.normal, offset), true, anatomy, &mut all);
+    let mut all = surfaces::cut(&surfaces::surfaces(scene, block, anatomy, &Detail::FULL), plane.normal, offset);
+    surfaces::face(block, (plane.normal, offset), (true, &Detail::FULL), anatomy, &mut all);
     let embedding = Embedding::new(block, anatomy);
     for corner in all.iter_mut().flat_map(|triangle| &mut triangle.corners) {
         corner.place = embedding.moved(corner.place, &snapshot.displacement);

@@ -12,6 +12,9 @@ pub type Place = DVec3;
 /// Triangles are drawn so much larger than they are: where corners of one lie on the edge of another, rounding leaves pinholes.
 const OVERLAP: f64 = 1.002;
 
+/// The corners of a triangle that is one piece.
+const WHOLE: [Place; 3] = [DVec3::X, DVec3::Y, DVec3::Z];
+
 /// Where a place of a triangle is drawn, a little farther from its middle.
 pub fn overlapping(place: Place) -> Place {
     let middle = DVec3::splat(1.0 / 3.0);
@@ -40,6 +43,10 @@ pub fn split(steps: usize, part_at: impl Fn(Place) -> usize, pieces: &mut impl P
     let mut parts = Vec::with_capacity((n + 1) * (n + 2) / 2);
     for j in 0..=n {
         parts.extend((0..=n - j).map(|i| part_at(Lattice::corner(n, i, j))));
+    }
+    if parts.iter().all(|part| *part == parts[0]) {
+        pieces.piece(parts[0], WHOLE);
+        return;
     }
     let lattice = Lattice { n, parts };
     let side = 1 << n.trailing_zeros();
@@ -196,6 +203,7 @@ mod tests {
     fn what_is_one_part_stays_whole_and_three_may_meet() {
         let mut sums = Sums::default();
         split(10, |_| 1, &mut sums);
+        assert_eq!(sums.pieces, 1);
         assert!((sums.area[1] - 0.5).abs() < 1e-12 && sums.length == 0.0, "{:?}, {}", sums.area, sums.length);
         let mut sums = Sums::default();
         let largest = |p: Place| {

@@ -23,14 +23,25 @@ use crate::scene::{RegionShape, Scene};
 const EDGE: f64 = 1.1e-3;
 /// Voxels of a part that is small.
 const SMALL: usize = 30_000;
-/// Triangles of all surfaces; of more, blocks are larger.
-const MOST_TRIANGLES: usize = 60_000;
-/// Distance between points at which a part is asked for on a cut, and where the block ends [m].
-const STEP: f64 = 0.7e-3;
-const BORDER_STEP: f64 = 1.1e-3;
-/// Least edge of what is drawn as one where the block ends beside the tissue [m]: far from the needle little moves there, and a software
-/// adapter pays for every triangle.
-const BORDER_EDGE: f64 = 2.4e-3;
+/// How fine is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Detail {
+    /// Triangles of all surfaces; of more, blocks of voxels are larger.
+    pub most_triangles: usize,
+    /// Distance between points at which a part is asked for on a cut, and where the block ends [m].
+    pub step: f64,
+    /// See `step`.
+    pub border_step: f64,
+    /// Least edge of what is drawn as one where the block ends beside the tissue [m]: far from the needle little moves there.
+    pub border_edge: f64,
+}
+
+impl Detail {
+    /// For adapters of hardware, and pictures that are drawn once.
+    pub const FULL: Detail = Detail { most_triangles: 60_000, step: 0.7e-3, border_step: 1.1e-3, border_edge: 2.4e-3 };
+    /// For software adapters, which pay for every corner on one thread: 0.3 ms of a picture for a thousand on llvmpipe.
+    pub const LOW: Detail = Detail { most_triangles: 16_000, step: 1.0e-3, border_step: 1.6e-3, border_edge: 4.0e-3 };
+}
 /// What fills the room around the parts that are looked for.
 const FILLERS: [&str; 4] = ["fat", "muscle", "skin", "tissue"];
 /// What other parts lie in.
@@ -65,7 +76,7 @@ pub struct Triangle {
 }
 
 /// Surfaces of the parts of a scene, as far as they lie in the block.
-pub fn surfaces(scene: &Scene, block: &BlockMesh, anatomy: &Anatomy) -> Vec<Triangle> {
+pub fn surfaces(scene: &Scene, block: &BlockMesh, anatomy: &Anatomy, detail: &Detail) -> Vec<Triangle> {
     let (low, high) = bounds(block);
     let case = scene.case.as_deref();
     if case.is_none() && scene.regions.is_empty() {
@@ -119,7 +130,7 @@ pub fn surfaces(scene: &Scene, block: &BlockMesh, anatomy: &Anatomy) -> Vec<Tria
         if case.is_some() {
             add(&skin, 1, edge, colour, Layer::Skin);
         }
-        if found.len() <= MOST_TRIANGLES || coarser >= 8 {
+        if found.len() <= detail.most_triangles || coarser >= 8 {
             return found;
         }
         coarser *= 2;
@@ -301,7 +312,7 @@ const EDGES: [[usize; 2]; 12] =
 pub fn face(
     block: &BlockMesh,
     (normal, offset): (DVec3, f64),
-    is_glassy: bool,
+    (is_glassy, detail): (bool, &Detail),
     anatomy: &Anatomy,
     out: &mut Vec<Triangle>,
 ) {
@@ -323,17 +334,24 @@ pub fn face(
         let angle = |x: &DVec3| (*x - centre).dot(second).atan2((*x - centre).dot(first));
         polygon.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
         for n in 2..polygon.len() {
-            flat([polygon[0], polygon[n - 1], polygon[n]], normal, (Layer::Solid, is_glassy), STEP, anatomy, out);
+            flat(
+                [polygon[0], polygon[n - 1], polygon[n]],
+                normal,
+                (Layer::Solid, is_glassy),
+                detail.step,
+                anatomy,
+                out,
+            );
         }
     }
 }
 
-/// Grid lines at least [`BORDER_EDGE`] apart, the first and the last among them.
-fn thinned(lines: &[f64]) -> Vec<f64> {
+/// Grid lines at least `edge` apart [m], the first and the last among them.
+fn thinned(lines: &[f64], edge: f64) -> Vec<f64> {
     let (first, last) = (lines[0], lines[lines.len() - 1]);
     let mut kept = vec![first];
     for line in lines {
-        if *line - kept[kept.len() - 1] >= BORDER_EDGE && last - *line >= BORDER_EDGE {
+        if *line - kept[kept.len() - 1] >= edge && last - *line >= edge {
             kept.push(*line);
         }
     }
@@ -343,7 +361,7 @@ fn thinned(lines: &[f64]) -> Vec<f64> {
 
 /// What is seen where the block ends and not the tissue.
 /// Without a label map (`is_whole`) the top face is the skin.
-pub fn border(block: &BlockMesh, anatomy: &Anatomy, is_whole: bool) -> Vec<Triangle> {
+pub fn border(block: &BlockMesh, anatomy: &Anatomy, is_whole: bool, detail: &Detail) -> Vec<Triangle> {
     let mut out = Vec::new();
     // Just inside: on the face itself rounding decides.
     let (low, high) = bounds(block);
@@ -353,7 +371,9 @@ pub fn border(block: &BlockMesh, anatomy: &Anatomy, is_whole: bool) -> Vec<Trian
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         for (at, sign) in [(low[axis], -1.0), (high[axis], 1.0)] {
             let layer = if is_whole && axis == 2 && sign > 0.0 { Layer::Skin } else { Layer::Organ };
-            let lines = |a: usize| if layer == Layer::Skin { block.lines[a].clone() } else { thinned(&block.lines[a]) };
+            let lines = |a: usize| {
+                if layer == Layer::Skin { block.lines[a].clone() } else { thinned(&block.lines[a], detail.border_edge) }
+            };
             let (across, along) = (lines(u), lines(v));
             for i in across.windows(2).filter(|w| w[1] > w[0]) {
                 for j in along.windows(2).filter(|w| w[1] > w[0]) {
@@ -367,8 +387,8 @@ pub fn border(block: &BlockMesh, anatomy: &Anatomy, is_whole: bool) -> Vec<Trian
                         quad.reverse();
                     }
                     let normal = DVec3::AXES[axis] * sign;
-                    flat([quad[0], quad[1], quad[2]], normal, (layer, false), BORDER_STEP, anatomy, &mut out);
-                    flat([quad[0], quad[2], quad[3]], normal, (layer, false), BORDER_STEP, anatomy, &mut out);
+                    flat([quad[0], quad[1], quad[2]], normal, (layer, false), detail.border_step, anatomy, &mut out);
+                    flat([quad[0], quad[2], quad[3]], normal, (layer, false), detail.border_step, anatomy, &mut out);
                 }
             }
         }
@@ -433,12 +453,22 @@ mod tests {
         let scene = Scene::load(&file, &[]).unwrap();
         let crate::mesh::Mesh::Block(block) = crate::mesh::Mesh::of_scene(&scene) else { panic!("no block") };
         let anatomy = Anatomy::of_any(&scene).unwrap();
-        let mut all = surfaces(&scene, &block, &anatomy);
-        all.extend(border(&block, &anatomy, false));
+        let mut count = usize::MAX;
+        for detail in [&Detail::FULL, &Detail::LOW] {
+            let drawn = are_outwards(&scene, &block, &anatomy, detail);
+            assert!(drawn < count / 2, "{drawn} of {count}");
+            count = drawn;
+        }
+    }
+
+    /// Triangles of the whole.
+    fn are_outwards(scene: &Scene, block: &BlockMesh, anatomy: &Anatomy, detail: &Detail) -> usize {
+        let mut all = surfaces(scene, block, anatomy, detail);
+        all.extend(border(block, anatomy, false, detail));
         let whole = all.len();
         for normal in DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
             let mut drawn = cut(&all, normal, -1e-3);
-            face(&block, (normal, -1e-3), false, &anatomy, &mut drawn);
+            face(block, (normal, -1e-3), (false, detail), anatomy, &mut drawn);
             assert!(drawn.len() > whole / 8, "{} of {whole}", drawn.len());
             // Slivers have no side; a smoothed normal may turn away from a small triangle in a fold.
             let side = |t: &Triangle| {
@@ -450,15 +480,17 @@ mod tests {
             let sum = |sides: &[f64]| sides.iter().map(|side| side.abs()).sum::<f64>();
             assert!(sum(&wrong) < 1e-3 * sum(&right), "{normal}: {} of {}", sum(&wrong), sum(&right));
         }
+        whole
     }
 
     #[test]
     fn thinned_lines_keep_both_ends_and_their_distance() {
         let lines: Vec<f64> = (0..40).map(|n| 1e-3 * f64::from(n)).collect();
-        let kept = thinned(&lines);
+        let edge = Detail::FULL.border_edge;
+        let kept = thinned(&lines, edge);
         assert_eq!((kept[0], kept[kept.len() - 1]), (0.0, lines[39]));
-        assert!(kept.windows(2).all(|w| w[1] - w[0] >= BORDER_EDGE && lines.contains(&w[0])), "{kept:?}");
+        assert!(kept.windows(2).all(|w| w[1] - w[0] >= edge && lines.contains(&w[0])), "{kept:?}");
         // A block smaller than that has its two ends.
-        assert_eq!(thinned(&lines[..2]), [0.0, 1e-3]);
+        assert_eq!(thinned(&lines[..2], edge), [0.0, 1e-3]);
     }
 }

@@ -4,6 +4,7 @@
 use super::class::{Standing, Trend, goals_met, iso_8601, key_figures};
 use super::history::Attempt;
 use super::notes::Note;
+use super::scene_words;
 use super::score::{Row, Score};
 use super::skill_evidence::text_of;
 use super::task::GoalResult;
@@ -111,7 +112,7 @@ pub fn of_trainee(trainee: &str, standings: &[&Standing]) -> Result<String> {
     let title = say_with("report-of-trainee", &[("trainee", trainee.into())]);
     let mut body = format!("<h1>{}</h1>\n", escape(&title));
     for standing in standings {
-        body += &format!("<section><h2>{}</h2>\n", escape(&standing.task));
+        body += &format!("<section><h2>{}</h2>\n", escape(scene_words::task(&standing.task)));
         body += &format!(
             "<p>{}</p>\n",
             escape(&say_with(
@@ -182,7 +183,7 @@ fn chart(standing: &Standing, row: &Row) -> Result<Option<String>> {
 pub fn of_attempt(attempt: &Attempt, notes: &[Note]) -> String {
     let places = [
         ("trainee", attempt.trainee.as_str().into()),
-        ("task", attempt.task.as_str().into()),
+        ("task", scene_words::task(&attempt.task).into()),
         ("number", attempt.number.into()),
     ];
     let title = say_with("report-of-attempt", &places);
@@ -258,7 +259,8 @@ pub fn of_two(first: &Attempt, second: &Attempt) -> String {
     let title = say_with("report-of-two", &[("first", names[0].as_str().into()), ("second", names[1].as_str().into())]);
     let mut body = format!("<h1>{}</h1>\n", escape(&title));
     if first.task != second.task {
-        let places = [("first", first.task.as_str().into()), ("second", second.task.as_str().into())];
+        let [a, b] = [first, second].map(|attempt| scene_words::task(&attempt.task).into());
+        let places = [("first", a), ("second", b)];
         body += &format!("<p class=\"notice\">{}</p>\n", escape(&say_with("report-other-task", &places)));
     }
     for (name, attempt) in names.iter().zip([first, second]) {

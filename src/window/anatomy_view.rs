@@ -15,7 +15,7 @@ use crate::gpu::{Bound, Gpu};
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::render::anatomy::Anatomy;
-use crate::render::surfaces::{self, Embedding, Layer, Triangle};
+use crate::render::surfaces::{self, Detail, Embedding, Layer, Triangle};
 
 /// What comes to the shader of the tissue.
 pub const SHADER: &str = include_str!("../../shaders/render/anatomy.wgsl");
@@ -48,6 +48,7 @@ pub struct AnatomyView {
     bindings: [wgpu::BindGroup; 3],
     /// At rest, as a whole.
     whole: Vec<Triangle>,
+    detail: Detail,
     corners: wgpu::Buffer,
     triangles: wgpu::Buffer,
     /// Where the triangles of every layer end.
@@ -75,12 +76,14 @@ impl AnatomyView {
         let pipelines = STAGES.map(|stage| pipeline(&gpu.device, module, stage, format));
         let bindings = bindings(gpu, &pipelines, view, displacement);
         let nodes = block.nodes();
-        let mut whole = surfaces::surfaces(&model.scene, block, &anatomy);
-        whole.extend(surfaces::border(block, &anatomy, model.scene.case.is_none()));
+        let detail = if gpu.is_software() { Detail::LOW } else { Detail::FULL };
+        let mut whole = surfaces::surfaces(&model.scene, block, &anatomy, &detail);
+        whole.extend(surfaces::border(block, &anatomy, model.scene.case.is_none(), &detail));
         Some(AnatomyView {
             pipelines,
             bindings,
             whole,
+            detail,
             corners: vertices(gpu, &[] as &[PartCorner]).0,
             triangles: filled(gpu, &[] as &[u32], wgpu::BufferUsages::INDEX).0,
             ends: [0; 3],
@@ -114,7 +117,7 @@ impl AnatomyView {
             None => self.whole.clone(),
         };
         if let Some(plane) = plane {
-            surfaces::face(block, (plane.normal, plane.offset), false, &anatomy, &mut drawn);
+            surfaces::face(block, (plane.normal, plane.offset), (false, &self.detail), &anatomy, &mut drawn);
         }
         self.anchors = anchors(&drawn, plane, &anatomy);
         drawn.sort_by_key(|triangle| triangle.layer);

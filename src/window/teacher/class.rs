@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Teacher, path_of};
 use crate::training::class::{Class, Standing, goals_met};
 use crate::training::report::{self, day, label_of, trend_in_words};
+use crate::training::scene_words;
 use crate::training::texts::short;
 use crate::training::xapi;
 use crate::words::{say, say_with};
@@ -58,7 +59,7 @@ fn table(ui: &mut egui::Ui, class: &Class, chosen: &mut Option<usize>) {
             let name = if s.trainee == before { "" } else { &s.trainee };
             before = &s.trainee;
             ui.strong(name);
-            if ui.selectable_label(*chosen == Some(n), &s.task).clicked() {
+            if ui.selectable_label(*chosen == Some(n), scene_words::task(&s.task)).clicked() {
                 *chosen = Some(n);
             }
             ui.label(s.attempts.len().to_string());
@@ -94,7 +95,7 @@ fn trend(standing: &Standing, key: &str) -> String {
 
 /// Attempts of one trainee at one task.
 fn attempts(ui: &mut egui::Ui, standing: &Standing) {
-    ui.strong(format!("{} - {}", standing.trainee, standing.task));
+    ui.strong(format!("{} - {}", standing.trainee, scene_words::task(&standing.task)));
     let keys = standing.key_figures();
     egui::Grid::new("attempts").striped(true).spacing([16.0, 4.0]).show(ui, |ui| {
         ui.strong(say("report-attempt"));

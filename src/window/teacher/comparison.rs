@@ -3,6 +3,7 @@
 use super::{Teacher, choose_attempt};
 use crate::training::history::{Attempt, file_name};
 use crate::training::report::{Side, name_of, of_two, pairs, verdict};
+use crate::training::scene_words;
 use crate::training::texts::short;
 use crate::words::{say, say_with};
 use crate::{Error, whole_file};
@@ -35,7 +36,8 @@ pub fn show(ui: &mut egui::Ui, teacher: &mut Teacher) {
         Ok(say_with("teacher-written", &[("file", path.display().to_string().into())]))
     });
     if first.task != second.task {
-        let places = [("first", first.task.as_str().into()), ("second", second.task.as_str().into())];
+        let [a, b] = [first, second].map(|attempt| scene_words::task(&attempt.task).into());
+        let places = [("first", a), ("second", b)];
         ui.colored_label(ui.visuals().warn_fg_color, say_with("report-other-task", &places));
     }
     for attempt in [first, second] {

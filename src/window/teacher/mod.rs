@@ -14,6 +14,7 @@ use super::screens::Next;
 use crate::training::class::Class;
 use crate::training::history::Attempt;
 use crate::training::report::{day, name_of};
+use crate::training::scene_words;
 use crate::words::say;
 use crate::{Error, Result};
 
@@ -137,7 +138,9 @@ impl Teacher {
 fn choose_attempt(ui: &mut egui::Ui, class: &Class, label: &str, chosen: &mut Option<usize>) -> bool {
     let attempts: Vec<&Attempt> = class.attempts().collect();
     let before = *chosen;
-    let name = |attempt: &Attempt| format!("{} - {} ({})", name_of(attempt), attempt.task, day(attempt.finished));
+    let name = |attempt: &Attempt| {
+        format!("{} - {} ({})", name_of(attempt), scene_words::task(&attempt.task), day(attempt.finished))
+    };
     let shown = chosen.and_then(|n| attempts.get(n)).map_or_else(|| say("teacher-choose").to_string(), |a| name(a));
     let id = ui.label(label).id;
     let list = egui::ComboBox::from_id_salt(label).selected_text(shown).width(320.0).truncate().show_ui(ui, |ui| {
