@@ -126,7 +126,7 @@ fn debriefing(scene: &Scene) -> Debriefing {
     Debriefing::new(debrief, scene, &watcher, true)
 }
 
-fn through_the_vessel() -> Scene {
+pub fn through_the_vessel() -> Scene {
     let overrides = [
         "tissue.cell_size_mm=1.4",
         "tissue.growth=1.8",

@@ -2,13 +2,13 @@
 #![cfg(feature = "window")]
 
 use std::path::Path;
-use std::sync::{PoisonError, RwLock, RwLockReadGuard};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use egui::accesskit::Role;
 use egui::epaint::text::PlacedRow;
 use egui::epaint::{ClippedShape, Shape, TextShape};
-use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use egui_kittest::{Harness, HarnessBuilder};
 use stylet::training::history::History;
 use stylet::training::scene_words;
 use stylet::training::trainees;
@@ -39,17 +39,24 @@ pub fn english() -> RwLockReadGuard<'static, ()> {
     LANGUAGE.read().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Nobody else chooses a language until this is dropped, and then it is English again, however the test ends.
+pub struct AnyLanguage(#[expect(dead_code, reason = "kept locked")] RwLockWriteGuard<'static, ()>);
+
+impl AnyLanguage {
+    pub fn begin() -> Self {
+        AnyLanguage(LANGUAGE.write().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Drop for AnyLanguage {
+    fn drop(&mut self) {
+        words::choose("en");
+    }
+}
+
 /// Does something in every language, window and size of texts: size in points, and words for messages.
 pub fn everywhere(mut draw: impl FnMut([f32; 2], &str)) {
-    /// However the test ends.
-    struct Back;
-    impl Drop for Back {
-        fn drop(&mut self) {
-            words::choose("en");
-        }
-    }
-    let _alone = LANGUAGE.write().unwrap_or_else(PoisonError::into_inner);
-    let _back = Back;
+    let _alone = AnyLanguage::begin();
     for language in &words::LANGUAGES {
         assert!(words::choose(language.code));
         for [width, height] in WINDOWS {
@@ -146,10 +153,19 @@ fn the_check_finds_what_is_wrong() {
 pub fn in_a_window<S>(
     size: [f32; 2],
     state: S,
+    draw: impl FnMut(&mut egui::Ui, &mut S) + 'static,
+) -> Harness<'static, S> {
+    set_up(Harness::builder().with_size(size), state, draw)
+}
+
+/// Draws with the looks of the program, until nothing moves.
+pub fn set_up<S>(
+    window: HarnessBuilder<S>,
+    state: S,
     mut draw: impl FnMut(&mut egui::Ui, &mut S) + 'static,
 ) -> Harness<'static, S> {
     let mut first = true;
-    let mut harness = Harness::builder().with_size(size).build_ui_state(
+    let mut harness = window.build_ui_state(
         move |ui, state: &mut S| {
             if std::mem::take(&mut first) {
                 theme::set_up(ui.ctx());
@@ -326,8 +342,8 @@ pub fn places_of_a_task(scene: &str, gpu: &stylet::gpu::Gpu) -> (egui::Pos2, Dra
 }
 
 /// An attempt with some frames, and what its panels need.
-struct Bench {
-    practice: Practice,
+pub struct Bench {
+    pub practice: Practice,
     choices: Choices,
     camera: Camera,
     desk: Desk,
@@ -337,7 +353,7 @@ struct Bench {
     scan: Scan,
 }
 
-fn bench(scene: &str, gpu: &stylet::gpu::Gpu) -> Bench {
+pub fn bench(scene: &str, gpu: &stylet::gpu::Gpu) -> Bench {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(scene);
     let coarse = vec!["tissue.cell_size_mm=1.6".to_string()];
     let (source, scene) = Source::read(path, coarse).unwrap_or_else(|e| panic!("{e}"));
@@ -366,7 +382,7 @@ fn bench(scene: &str, gpu: &stylet::gpu::Gpu) -> Bench {
     }
 }
 
-fn panels(ui: &mut egui::Ui, bench: &mut Bench) {
+pub fn panels(ui: &mut egui::Ui, bench: &mut Bench) {
     let Bench { practice, choices, camera, desk, settings, wishes, help, scan } = bench;
     theme::apply(ui.ctx(), settings);
     egui::Panel::top("bar").show(ui, |ui| panels::bar(ui, &practice.scene().title, settings, wishes, help));

@@ -8,6 +8,10 @@ mod debriefing;
 mod layout;
 #[path = "../panels.rs"]
 mod panels;
+#[path = "../pictures.rs"]
+mod pictures;
+#[path = "../pixels.rs"]
+mod pixels;
 #[path = "../practice.rs"]
 mod practice;
 #[path = "../teacher_screen.rs"]
