@@ -358,17 +358,23 @@ fn colour_bar(ui: &mut egui::Ui, scale: &Scale, map: ColourMap) {
     }
 }
 
-/// Lines of the depth axis: 1, 2 or 5 times a power of ten apart, with room for a number at each.
-fn depth_marks(input: GridInput) -> Vec<GridMark> {
-    let least = 3.0 * input.base_step_size;
+/// Room for a number at a line of an axis, in the steps that the plot proposes for lines without numbers.
+pub(super) const ACROSS: f64 = 3.0;
+/// The same beside an axis that stands.
+pub(super) const UPRIGHT: f64 = 4.0;
+
+/// Lines of an axis: 1, 2 or 5 times a power of ten apart, with `room` for a number at each. Powers of ten alone would leave a plot of some
+/// millimetres, or of half a newton, without a number.
+pub(super) fn axis_marks(input: GridInput, room: f64) -> Vec<GridMark> {
+    let least = room * input.base_step_size;
     let power = 10f64.powf(least.log10().floor());
     let step_size = [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|s| *s >= least).unwrap_or(10.0 * power);
     let (from, to) = ((input.bounds.0 / step_size).ceil() as i64, (input.bounds.1 / step_size).floor() as i64);
     (from..=to).map(|n| GridMark { value: n as f64 * step_size, step_size }).collect()
 }
 
-/// The number at a line of the depth axis, with the decimals that steps like 0.5 need.
-fn depth_label(mark: GridMark) -> String {
+/// The number at a line of an axis, with the decimals that steps like 0.5 need.
+pub(super) fn axis_label(mark: GridMark) -> String {
     let decimals = (-mark.step_size.log10().floor()).max(0.0) as usize;
     format!("{:.decimals$}", mark.value)
 }
@@ -429,25 +435,30 @@ fn force_plot(ui: &mut egui::Ui, practice: &Practice, show_parts: bool, referenc
     };
     let colours: Vec<egui::Color32> = ForceParts::PARTS.iter().map(|part| theme::line(ui, part.colour)).collect();
     let (main, beside) = (theme::line(ui, Tint::Main.bytes(ui)), Tint::Beside.of(ui));
-    Plot::new("force")
-        .height((0.4 * ui.available_height()).max(140.0))
-        // Powers of ten would leave a narrow plot of some millimetres without a number.
-        .x_grid_spacer(depth_marks)
+    let bands = band(&practice.records);
+    let mut plot = Plot::new("force");
+    // One curve needs no name, which would lie over it.
+    if show_parts || !reference.is_empty() || !bands.is_empty() {
+        plot = plot.legend(Legend::default().position(Corner::LeftTop));
+    }
+    plot.height((0.4 * ui.available_height()).max(140.0))
+        .x_grid_spacer(|input| axis_marks(input, ACROSS))
+        .y_grid_spacer(|input| axis_marks(input, UPRIGHT))
         .custom_x_axes(vec![
             AxisHints::new_x()
                 .label(say("depth-axis"))
                 .label_spacing(egui::Rangef::new(16.0, 28.0))
-                .formatter(|mark, _| depth_label(mark)),
+                .formatter(|mark, _| axis_label(mark)),
         ])
         .y_axis_label(say("force-axis"))
+        .y_axis_formatter(|mark, _| axis_label(mark))
         // Room for the numbers in the corner.
         .set_margin_fraction(egui::vec2(0.06, 0.14))
-        .legend(Legend::default().position(Corner::LeftTop))
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
         .show(ui, |plot| {
-            for [depths, lower, upper] in band(&practice.records) {
+            for [depths, lower, upper] in bands {
                 let area = FilledArea::new(say("band"), &depths, &lower, &upper);
                 plot.add(area.fill_color(egui::Color32::from_rgba_unmultiplied(0, 114, 178, 90)));
             }
@@ -559,9 +570,9 @@ mod tests {
     #[test]
     fn every_line_of_the_depth_axis_has_its_own_number() {
         let labels = |to: f64| -> Vec<String> {
-            depth_marks(GridInput { bounds: (0.0, to), base_step_size: to / 10.0 })
+            axis_marks(GridInput { bounds: (0.0, to), base_step_size: to / 10.0 }, ACROSS)
                 .into_iter()
-                .map(depth_label)
+                .map(axis_label)
                 .collect()
         };
         assert_eq!(labels(1.5), ["0.0", "0.5", "1.0", "1.5"]);

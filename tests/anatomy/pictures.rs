@@ -106,7 +106,7 @@ fn surfaces_move_with_their_cells() {
     let model = model(LUMBAR);
     let Mesh::Block(block) = &model.mesh else { panic!("labels lie in a block") };
     let anatomy = Anatomy::of_scene(&model.scene).unwrap();
-    let triangles = surfaces::surfaces(&model.scene, block, &anatomy);
+    let triangles = surfaces::surfaces(&model.scene, block, &anatomy, &surfaces::Detail::FULL);
     let of_bone = triangles.iter().filter(|t| t.layer == Layer::Solid).count();
     assert!(of_bone > 1000 && triangles.len() < 100_000, "{of_bone} of {}", triangles.len());
     let embedding = Embedding::new(block, &anatomy);

@@ -5,6 +5,7 @@ use egui_plot::{Line, MarkerShape, Plot, PlotPoints, Points, VLine};
 use crate::training::debrief::{Debrief, Moment};
 use crate::training::events::Gravity;
 use crate::window::lesson;
+use crate::window::panels::{ACROSS, UPRIGHT, axis_label, axis_marks};
 use crate::words::say;
 
 /// Part of the height that the force has; the rest is the depth.
@@ -32,7 +33,11 @@ fn one(ui: &mut egui::Ui, debrief: &Debrief, now: f64, (key, height, of): Curve<
         .include_x(0.0)
         .include_x(debrief.simulated)
         .include_y(0.0)
+        .x_grid_spacer(|input| axis_marks(input, ACROSS))
+        .x_axis_formatter(|mark, _| axis_label(mark))
         .y_axis_label(say(key))
+        .y_grid_spacer(|input| axis_marks(input, UPRIGHT))
+        .y_axis_formatter(|mark, _| axis_label(mark))
         .y_axis_min_width(2.6 * ui.text_style_height(&egui::TextStyle::Body))
         .allow_drag(false)
         .allow_zoom(false)

@@ -9,7 +9,7 @@ use super::tasks::Task;
 use crate::window::theme::Tint;
 use crate::words::{say, say_with};
 
-/// Narrowest and widest card, height of its texts, room within it and beside it [points].
+/// Narrowest and widest card, height of its texts with a task told in two rows, room within it and beside it [points].
 const NARROWEST: f32 = 205.0;
 const WIDEST: f32 = 320.0;
 const TEXTS: f32 = 118.0;
@@ -60,13 +60,14 @@ pub fn cards(
     let room = ui.available_width();
     let columns = ((room + GAP) / (NARROWEST + GAP)).floor().clamp(1.0, 9.0);
     let width = ((room - (columns - 1.0) * GAP) / columns).floor().min(WIDEST);
+    let texts = TEXTS + more_rows(ui, tasks, width - 2.0 * MARGIN);
     for (row, in_row) in tasks.chunks(columns as usize).enumerate() {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = GAP;
             for (column, task) in in_row.iter().enumerate() {
                 let number = row * columns as usize + column;
                 let picture = pictures.of(ui.ctx(), task);
-                if card(ui, width, (number, task), standings.map(|all| &all[number]), picture) {
+                if card(ui, vec2(width, texts), (number, task), standings.map(|all| &all[number]), picture) {
                     chosen = Some(number);
                 }
             }
@@ -76,15 +77,26 @@ pub fn cards(
     chosen
 }
 
+/// Height of the rows beyond two that the longest line of all tasks takes in a card of this width: cards of a row are of one height.
+fn more_rows(ui: &egui::Ui, tasks: &[Task], width: f32) -> f32 {
+    let font = egui::TextStyle::Body.resolve(ui.style());
+    let height = |task: &Task| {
+        let text = ui.painter().layout(task.line().to_string(), font.clone(), Color32::WHITE, width);
+        (text.rows.len().saturating_sub(2)) as f32 * ui.text_style_height(&egui::TextStyle::Body)
+    };
+    tasks.iter().map(height).fold(0.0, f32::max)
+}
+
+/// A card; `size`: its width, and the height of its texts.
 fn card(
     ui: &mut egui::Ui,
-    width: f32,
+    size: Vec2,
     (number, task): (usize, &Task),
     standing: Option<&Standing>,
     picture: Option<TextureHandle>,
 ) -> bool {
-    let picture_size = vec2(width, (PICTURE * width).round());
-    let (rect, response) = ui.allocate_exact_size(picture_size + vec2(0.0, TEXTS), Sense::click());
+    let picture_size = vec2(size.x, (PICTURE * size.x).round());
+    let (rect, response) = ui.allocate_exact_size(picture_size + vec2(0.0, size.y), Sense::click());
     let told = format!("{}: {}. {}", task.name(), task.line(), difficulty(task.difficulty));
     response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &told));
     if response.has_focus() {
