@@ -446,7 +446,7 @@ fn every_gate_of_trust_shuts() {
             texts::HOURGLASS_TO_INTERNAL,
         ),
         // Told by the table of bounds.
-        (&|r| r.health.clamped_nodes = 1_000_000, "ran into the speed limit"),
+        (&|r| r.health.clamped_nodes = 2_000_000, "ran into the speed limit"),
         (&|r| r.force.axial = f64::NAN, texts::NOT_A_NUMBER),
         (&|r| r.energy.friction = f64::NAN, LOST_OR_CREATED),
     ] {

@@ -243,8 +243,11 @@ fn findings(
                 (scene.targets.get(*target).map_or("", |t| t.name.as_str()), deepest.map(|r| r.time))
             }
             Some(Goal::Avoid { name, .. }) => {
+                // A touch is when it began; the needle may be deeper in later.
+                let first = |kind: Kind| events.iter().find(|e| e.kind == kind && e.name == *name).map(|e| e.time);
                 let nearest = obstacles.next().and_then(|(_, obstacle)| obstacle.nearest(samples));
-                (name.as_str(), nearest.map(|(index, _)| samples[index].time))
+                let nearest = nearest.map(|(index, _)| samples[index].time);
+                (name.as_str(), first(Kind::Touched).or_else(|| first(Kind::Near)).or(nearest))
             }
             Some(Goal::StopInLayer { name, .. }) => (name.as_str(), deepest_cut(samples, records)),
             // Named by its key, which has a word in every language.

@@ -359,7 +359,7 @@ fn colour_bar(ui: &mut egui::Ui, scale: &Scale, map: ColourMap) {
 }
 
 /// Room for a number at a line of an axis, in the steps that the plot proposes for lines without numbers.
-pub(super) const ACROSS: f64 = 3.0;
+const ACROSS: f64 = 3.0;
 /// The same beside an axis that stands.
 pub(super) const UPRIGHT: f64 = 4.0;
 
@@ -369,7 +369,10 @@ pub(super) fn axis_marks(input: GridInput, room: f64) -> Vec<GridMark> {
     let least = room * input.base_step_size;
     let power = 10f64.powf(least.log10().floor());
     let step_size = [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|s| *s >= least).unwrap_or(10.0 * power);
-    let (from, to) = ((input.bounds.0 / step_size).ceil() as i64, (input.bounds.1 / step_size).floor() as i64);
+    // A number that stands half beyond the upper end of an upright axis lies over what is there.
+    let inside = if room == UPRIGHT { input.base_step_size } else { 0.0 };
+    let from = (input.bounds.0 / step_size).ceil() as i64;
+    let to = ((input.bounds.1 - inside) / step_size).floor() as i64;
     (from..=to).map(|n| GridMark { value: n as f64 * step_size, step_size }).collect()
 }
 
@@ -430,7 +433,7 @@ pub fn readings(
 fn force_plot(ui: &mut egui::Ui, practice: &Practice, show_parts: bool, reference: &[ReferenceCurve]) {
     let curve = |of: &dyn Fn(&ForceParts) -> f64| -> PlotPoints<'static> {
         // A trainee's minutes are thousands of frames; the plot is some hundred pixels wide.
-        let every = practice.records.len().div_ceil(1500).max(1);
+        let every = practice.records.len().div_ceil(500).max(1);
         practice.records.iter().step_by(every).map(|r| [r.depth * 1e3, of(&r.force)]).collect()
     };
     let colours: Vec<egui::Color32> = ForceParts::PARTS.iter().map(|part| theme::line(ui, part.colour)).collect();
@@ -466,7 +469,8 @@ fn force_plot(ui: &mut egui::Ui, practice: &Practice, show_parts: bool, referenc
                 let line = Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone()));
                 plot.line(line.color(beside).width(1.5));
             }
-            plot.line(Line::new(say("axial"), curve(&|f| f.axial)).width(2.0).color(main));
+            // Bands of points that share a pixel are thin, broken lines where the curve is steep.
+            plot.line(Line::new(say("axial"), curve(&|f| f.axial)).width(2.0).color(main).allow_band(false));
             if show_parts {
                 for (part, colour) in ForceParts::PARTS.iter().zip(&colours) {
                     let points = curve(&|f| (part.of)(f));

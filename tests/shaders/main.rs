@@ -367,6 +367,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "MeasuredCell",
         "OwnPoint",
         "OwnStress",
+        "TornContact",
     ];
     for name in shader.keys().filter(|n| !local.contains(&n.as_str())) {
         assert!(host.contains(name.as_str()), "struct {name} of the shaders is unknown to the host");

@@ -5,7 +5,7 @@ use egui_plot::{Line, MarkerShape, Plot, PlotPoints, Points, VLine};
 use crate::training::debrief::{Debrief, Moment};
 use crate::training::events::Gravity;
 use crate::window::lesson;
-use crate::window::panels::{ACROSS, UPRIGHT, axis_label, axis_marks};
+use crate::window::panels::{UPRIGHT, axis_label, axis_marks};
 use crate::words::say;
 
 /// Part of the height that the force has; the rest is the depth.
@@ -33,8 +33,6 @@ fn one(ui: &mut egui::Ui, debrief: &Debrief, now: f64, (key, height, of): Curve<
         .include_x(0.0)
         .include_x(debrief.simulated)
         .include_y(0.0)
-        .x_grid_spacer(|input| axis_marks(input, ACROSS))
-        .x_axis_formatter(|mark, _| axis_label(mark))
         .y_axis_label(say(key))
         .y_grid_spacer(|input| axis_marks(input, UPRIGHT))
         .y_axis_formatter(|mark, _| axis_label(mark))
@@ -45,7 +43,7 @@ fn one(ui: &mut egui::Ui, debrief: &Debrief, now: f64, (key, height, of): Curve<
         .show(ui, |plot| {
             let every = debrief.moments.len().div_ceil(MOST_POINTS).max(1);
             let points: PlotPoints<'_> = debrief.moments.iter().step_by(every).map(|m| [m.time, of(m)]).collect();
-            plot.line(Line::new(say(key), points).color(ink).width(1.5));
+            plot.line(Line::new(say(key), points).color(ink).width(1.5).allow_band(false));
             for event in &debrief.events {
                 let Some((moment, _)) = debrief.at(event.time) else { continue };
                 let (shape, colour) = match event.gravity() {
