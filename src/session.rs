@@ -186,8 +186,11 @@ impl Session {
         let scene = Scene::load(&self.scene, &self.overrides)?;
         if fingerprint(&scene) != self.fingerprint {
             return Err(Error::input(
-                format!("{}: the scene has changed since the session was recorded", self.scene.display()),
-                "bring the file back to what it was, or record the session anew",
+                format!(
+                    "{}: the scene, or the model of this program, has changed since the session was recorded",
+                    self.scene.display()
+                ),
+                "bring the file back to what it was, take the program that recorded it, or record the session anew",
             ));
         }
         Ok(scene)
