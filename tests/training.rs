@@ -12,7 +12,7 @@ use stylet::scene::{Goal, Obstacle, RegionShape, Scene};
 use stylet::simulation::{EngineChoice, Simulation};
 use stylet::training::history::{self, History, file_name, progress};
 use stylet::training::kinematic::{Block, Body, KinematicFigures, Plan, Sample, check, passes};
-use stylet::training::physical::{PhysicalFigures, Trust};
+use stylet::training::physical::{MOST_CLAMPED, PhysicalFigures, Trust};
 use stylet::training::score::{COLUMNS, Score, TEXT_WIDTH};
 use stylet::training::task::clearance_of;
 use stylet::training::{scripted_samples, texts};
@@ -445,15 +445,14 @@ fn every_gate_of_trust_shuts() {
             },
             texts::HOURGLASS_TO_INTERNAL,
         ),
-        // Told by the table of bounds.
-        (&|r| r.health.clamped_nodes = 2_000_000, "ran into the speed limit"),
+        (&|r| r.health.clamped_nodes = MOST_CLAMPED as u32 / 3 + 1, texts::CLAMPED_NODES),
         (&|r| r.force.axial = f64::NAN, texts::NOT_A_NUMBER),
         (&|r| r.energy.friction = f64::NAN, LOST_OR_CREATED),
     ] {
         let found = reasons(change);
         assert!(found.iter().any(|r| r.contains(expected)), "no `{expected}` in {found:?}");
     }
-    assert!(reasons(&|r| r.health.clamped_nodes = 1).is_empty());
+    assert!(reasons(&|r| r.health.clamped_nodes = MOST_CLAMPED as u32 / 3).is_empty());
     assert_eq!(Trust::of(&[]).reasons, [texts::NO_FRAMES]);
     // What is missing in a touch of the skin is much of its work, and nothing of that of the attempt.
     let whole = records.last().unwrap().energy.external_max;

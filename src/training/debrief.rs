@@ -320,7 +320,9 @@ fn reasons(score: &Score, records: &[FrameRecord], stopped: bool) -> Vec<&'stati
     if beyond(trust.kinetic_to_internal, super::physical::LARGEST_KINETIC) {
         keys.push("reason-inertia");
     }
-    if beyond(trust.hourglass_to_internal, super::physical::LARGEST_HOURGLASS) {
+    if beyond(trust.hourglass_to_internal, super::physical::LARGEST_HOURGLASS)
+        || trust.clamped_nodes > super::physical::MOST_CLAMPED
+    {
         keys.push("reason-deformed");
     }
     if keys.is_empty() {

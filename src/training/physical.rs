@@ -39,6 +39,9 @@ pub const LARGEST_KINETIC: f64 = 0.05;
 /// Largest hourglass over internal energy, a median over the way in: the usual bound for reduced integration.
 pub const LARGEST_HOURGLASS: f64 = 0.10;
 
+/// Most clamped node steps. Layers that are squeezed to nothing clamp some hundreds (scenes/layers.toml, on its skin).
+pub const MOST_CLAMPED: u64 = 100;
+
 /// Step along the needle in which its way through the layers is followed [m]; a layer is not thinner.
 const LAYER_STEP: f64 = 2e-5;
 
@@ -85,6 +88,9 @@ impl Trust {
             if value.is_none_or(|value| value > bound) {
                 trust.reasons.push(texts::outside_gate(name, value, bound));
             }
+        }
+        if trust.clamped_nodes > MOST_CLAMPED {
+            trust.reasons.push(texts::too_many_clamped(trust.clamped_nodes, MOST_CLAMPED));
         }
         trust
     }

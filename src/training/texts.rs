@@ -130,6 +130,10 @@ pub fn outside_gate(name: &str, value: Option<f64>, bound: f64) -> String {
     }
 }
 
+pub fn too_many_clamped(count: u64, most: u64) -> String {
+    format!("{count} {CLAMPED_NODES}, at most {most} can be trusted")
+}
+
 // Goals; lengths in mm.
 pub fn hit_target(name: &str) -> String {
     format!("hit {name}")
