@@ -2,15 +2,16 @@
 
 use glam::{DMat3, DVec3};
 
-use super::lanes::LaneCells;
+use super::lanes::opening::{OpeningInLanes, PointSums};
 use super::{ContactSums, CpuEngine};
 use crate::engine::elements::{CellForces, CellShape};
 use crate::material::TangentBound;
-use crate::material::kinematics::cofactor;
-use crate::material::regular::{Polynomial, Regular};
+use crate::material::kinematics::{cofactor, jacobian_minus_one};
 use crate::material_point::{Material, PointState, Volumetric};
 use crate::mesh::CORNERS;
-use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, mean_place};
+use crate::model::opening::{
+    NearCell, OpeningPlan, OpeningStation, PathPoint, VOLUME_PLACE, is_volume_place, mean_place,
+};
 use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
 use crate::needle::centre_line::Bend;
@@ -30,11 +31,25 @@ pub(super) struct StationSums {
 
 impl StationSums {
     /// Adds derivatives of an energy per volume, of the volume `by` [m^3].
-    fn add(&mut self, d: &Derivatives, by: f64) {
-        self.centre -= d.place * by;
-        self.centre_rate += d.centre_rate * by;
+    fn add(&mut self, d: &Derivatives<f64>, by: f64) {
+        self.centre -= DVec3::from(d.place) * by;
+        self.centre_rate += DVec3::from(d.centre_rate) * by;
         self.radius += d.radius * by;
         self.radius_rate += d.radius_rate * by;
+    }
+
+    fn add_other(&mut self, other: &StationSums) {
+        self.centre += other.centre;
+        self.centre_rate += other.centre_rate;
+        self.radius += other.radius;
+        self.radius_rate += other.radius_rate;
+    }
+}
+
+impl From<&PointSums> for StationSums {
+    fn from(p: &PointSums) -> Self {
+        let PointSums { place, centre_rate, radius, radius_rate, energy } = *p;
+        StationSums { centre: -place, centre_rate, radius, radius_rate, energy }
     }
 }
 
@@ -60,16 +75,8 @@ fn neighbours(i: usize, count: usize, spacing: f64) -> (usize, usize, f64) {
 }
 
 /// The path in a cell: the mean of the stations in it.
-fn within(now: &[Now], cell: &NearCell) -> Station {
-    let mut mean = Station::default();
-    let by = 1.0 / f64::from(cell.count);
-    for n in &now[usize::from(cell.first)..][..usize::from(cell.count)] {
-        mean.centre += n.section.centre * by;
-        mean.centre_rate += n.section.centre_rate * by;
-        mean.radius += n.section.radius * by;
-        mean.radius_rate += n.section.radius_rate * by;
-    }
-    mean
+fn within(stations: &[Station], near: &NearCell) -> Station {
+    Station::mean(&stations[usize::from(near.first)..][..usize::from(near.count)])
 }
 
 impl CpuEngine {
@@ -103,19 +110,26 @@ impl CpuEngine {
     pub(super) fn opening(&mut self, plan: &PuncturePlan, opening: &OpeningPlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
         let now = self.stations_now(plan, opening, pose.tip);
-        let mut sums = vec![StationSums::default(); now.len()];
+        let sections: Vec<Station> = now.iter().map(|n| n.section).collect();
+        let (sums, elastic) = match self.opened_in_lanes(&model, opening, &sections) {
+            Some(found) => found,
+            None => self.opened_in_f64(&model, opening, &sections),
+        };
+        if self.measures {
+            self.opening_elastic = elastic;
+        }
+        self.station_reactions(opening, plan, (pose, step), &now, &sums);
+    }
+
+    /// Forces of points and near cells on nodes; what is derived of the stations, and the energy that opening adds.
+    fn opened_in_f64(&mut self, model: &Model, opening: &OpeningPlan, sections: &[Station]) -> (Vec<StationSums>, f64) {
+        let mut sums = vec![StationSums::default(); sections.len()];
         let mut elastic = 0.0;
         // Points: every station its own.
-        let displacement = &self.state.displacement;
-        let (lanes, measures) = (&self.lanes, self.measures);
-        let shape = |lanes: &Option<LaneCells>, cell: u32| Shape {
-            material: model.material(cell as usize),
-            regular: lanes.as_ref().and_then(|lanes| lanes.law(model.material_index(cell as usize))),
-            measures,
-        };
-        let points = self.each(now.len(), |i| {
-            point_forces(&|cell| shape(lanes, cell), opening, &opening.stations[i], &now[i].section, displacement)
-        });
+        let (displacement, measures) = (&self.state.displacement, self.measures);
+        let shape = |cell: u32| Shape { material: model.material(cell as usize), measures };
+        let points = self
+            .each(sections.len(), |i| point_forces(&shape, opening, &opening.stations[i], &sections[i], displacement));
         for ((station, local), sums) in opening.stations.iter().zip(&points).zip(&mut sums) {
             for (node, (force, bound)) in station.nodes.iter().zip(&local.1) {
                 self.external[*node as usize] -= *force;
@@ -124,24 +138,82 @@ impl CpuEngine {
             *sums = local.0;
             elastic += local.0.energy;
         }
-        // Cells that the map reaches.
-        let (lanes, displacement) = (&self.lanes, &self.state.displacement);
+        let displacement = &self.state.displacement;
         let cells = self.each(opening.cells.len(), |i| {
             let near = &opening.cells[i];
-            near_cell_forces(&model, shape(lanes, near.cell), opening, near, &within(&now, near), displacement)
+            near_cell_forces(model, shape(near.cell), opening, near, &within(sections, near), displacement)
         });
         for (near, added) in opening.cells.iter().zip(cells) {
-            let Some((forces, derivatives, energy)) = added else { continue };
-            self.add_to_cell(near.cell as usize, &forces);
-            elastic += energy;
-            for sums in &mut sums[usize::from(near.first)..][..usize::from(near.count)] {
-                sums.add(&derivatives, 1.0 / f64::from(near.count));
+            let Some(found) = added else { continue };
+            elastic += self.add_near_cell(near, &found, &mut sums);
+        }
+        (sums, elastic)
+    }
+
+    /// Adds a near cell to its nodes and stations; returns its energy.
+    fn add_near_cell(&mut self, near: &NearCell, found: &NearCellForces, sums: &mut [StationSums]) -> f64 {
+        let (forces, derivatives, energy) = found;
+        self.add_to_cell(near.cell as usize, forces);
+        for sums in &mut sums[usize::from(near.first)..][..usize::from(near.count)] {
+            sums.add(derivatives, 1.0 / f64::from(near.count));
+        }
+        *energy
+    }
+
+    /// The same in lanes, and in f64 where these do not know a state; `None`: there are no lanes.
+    fn opened_in_lanes(
+        &mut self,
+        model: &Model,
+        opening: &OpeningPlan,
+        sections: &[Station],
+    ) -> Option<(Vec<StationSums>, f64)> {
+        let measures = self.measures;
+        let shape = |cell: u32| Shape { material: model.material(cell as usize), measures };
+        let CpuEngine { lanes, state, external, added_bound, .. } = self;
+        let OpeningInLanes { opening: lanes, team, numbers, stride } = lanes.as_mut()?.opening()?;
+        let displacement = &state.displacement;
+        let [clusters, cells] = lanes.compute(team, opening, sections, displacement, measures);
+        for number in clusters {
+            for (lane, (station, index)) in opening.clusters[number].points.iter().enumerate() {
+                let (section, station) = (&sections[*station], &opening.stations[*station]);
+                let mut found = PointSums::default();
+                if section.radius > 0.0 {
+                    let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
+                    let point = &station.points[*index];
+                    let (d, energy) =
+                        point_force(shape(point.cell), opening, point, section, &u, |place, force, bound| {
+                            let node = station.nodes[place] as usize;
+                            external[node] -= force;
+                            added_bound[node] += bound;
+                        });
+                    found = PointSums::new(&d, energy, point.volume);
+                }
+                lanes.set_point(number, lane, &found);
             }
         }
-        if measures {
-            self.opening_elastic = elastic;
+        lanes.at_corners(|node, force, bound| {
+            external[node] -= force;
+            added_bound[node] += bound;
+        });
+        let lanes = &*lanes;
+        let mut sums: Vec<StationSums> =
+            team.each(sections.len(), |i| lanes.of_station(i)).iter().map(StationSums::from).collect();
+        let mut elastic: f64 = sums.iter().map(|s| s.energy).sum();
+        for ((first, count), found) in lanes.cells_at_nodes(numbers, stride) {
+            elastic += found.energy;
+            let found = StationSums::from(&found.times(1.0 / f64::from(count)));
+            for sums in &mut sums[usize::from(first)..][..usize::from(count)] {
+                sums.add_other(&found);
+            }
         }
-        self.station_reactions(opening, plan, (pose, step), &now, &sums);
+        for near in cells.into_iter().map(|i| &opening.cells[i]) {
+            let section = within(sections, near);
+            let found = near_cell_forces(model, shape(near.cell), opening, near, &section, &self.state.displacement);
+            if let Some(found) = found {
+                elastic += self.add_near_cell(near, &found, &mut sums);
+            }
+        }
+        Some((sums, elastic))
     }
 
     /// Forces of the stations on their nodes, on the needle and on the tip; friction.
@@ -294,45 +366,29 @@ fn averaged_normal(opening: &OpeningPlan, now: &[Now], sums: &[StationSums]) -> 
 #[derive(Clone, Copy)]
 struct Shape<'a> {
     material: &'a Material,
-    /// Form of the law that lanes know, without powers and with all that stress and bound share; `None` on the f64 engine.
-    regular: Option<Polynomial>,
     /// True where the energy is asked for.
     measures: bool,
 }
 
 impl Shape<'_> {
-    /// Stress [Pa] and bound of the tangent of F.
-    fn stress_and_bound(&self, f: DMat3) -> (DMat3, TangentBound) {
-        let h = f - DMat3::IDENTITY;
-        if let Some((law, state)) = self.regular.as_ref().zip(Regular::new(h.to_cols_array_2d())) {
-            let [straight, turned] = state.tangent_bound(&law.in_lanes(0.0), self.material.law.bulk_modulus);
-            let stress = state.stress(&law.in_lanes(0.0), 0.0);
-            return (DMat3::from_cols_array_2d(&stress), TangentBound { straight, turned });
-        }
-        (self.stress(f), self.material.tangent_bound(h, &PointState::default()))
+    /// Stress [Pa] and bound of the tangent of F = I + h.
+    fn stress_and_bound(&self, h: DMat3) -> (DMat3, TangentBound) {
+        (self.stress(h), self.material.tangent_bound(h, &PointState::default()))
     }
 
-    fn stress(&self, f: DMat3) -> DMat3 {
-        let h = f - DMat3::IDENTITY;
-        if let Some((law, state)) = self.regular.as_ref().zip(Regular::new(h.to_cols_array_2d())) {
-            return DMat3::from_cols_array_2d(&state.stress(&law.in_lanes(0.0), 0.0));
-        }
+    fn stress(&self, h: DMat3) -> DMat3 {
         self.material.stress(h, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default())
     }
 
-    /// Energy of F over that of F_h [J/m^3]; 0 where nobody asks.
-    fn energy_over(&self, f: DMat3, gradient: DMat3) -> f64 {
-        let energy = |f: DMat3| self.material.energy(f - DMat3::IDENTITY, 0.0, 1.0, &PointState::default()).stored;
-        if self.measures { energy(f) - energy(gradient) } else { 0.0 }
-    }
-
-    /// What opening adds at a place: derivatives of `W(F) - W(F_h)`, that difference, per volume, and the bound of the tangent there.
-    fn opened(&self, map: &Opening, gradient: DMat3) -> (Derivatives, f64, TangentBound) {
-        let f = map.gradient(gradient);
+    /// What opening adds at a place: derivatives of `W(F) - W(F_h)`, that difference (0 where nobody asks), per volume, and the bound of
+    /// the tangent there.
+    fn opened(&self, map: &Opening<f64>, h: DMat3) -> (Derivatives<f64>, f64, TangentBound) {
+        let f = DMat3::from_cols_array_2d(&map.gradient(&h.to_cols_array_2d()));
         let (stress, bound) = self.stress_and_bound(f);
-        let mut d = map.pull_back(stress);
-        d.gradient -= self.stress(gradient);
-        (d, self.energy_over(f, gradient), bound)
+        let mut d = map.pull_back(&stress.to_cols_array_2d());
+        d.gradient = (DMat3::from_cols_array_2d(&d.gradient) - self.stress(h)).to_cols_array_2d();
+        let energy = |h: DMat3| self.material.energy(h, 0.0, 1.0, &PointState::default()).stored;
+        (d, if self.measures { energy(f) - energy(h) } else { 0.0 }, bound)
     }
 }
 
@@ -352,34 +408,45 @@ fn point_forces<'a>(
     let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
     let mut local = vec![(DVec3::ZERO, 0.0); u.len()];
     for point in &station.points {
-        let (y, gradient) = point.place_and_gradient(&u);
-        let map = opening.map.at(section, y, gradient);
-        let (d, energy, tangent) = shape(point.cell).opened(&map, gradient);
+        let (d, energy) = point_force(shape(point.cell), opening, point, section, &u, |place, force, bound| {
+            local[place].0 += force;
+            local[place].1 += bound;
+        });
         sums.energy += point.volume * energy;
         sums.add(&d, point.volume);
-        // Rows of the point's own stiffness.
-        let (by_gradient, by_place) = map.amplification();
-        let grown = by_gradient + by_place * map.eta().length();
-        let stiffness = tangent.straight * grown * grown + tangent.turned * squared_norm_bound(cofactor(gradient));
-        let sizes = point.gradients.map(|g| g.length());
-        let bound = point.volume * stiffness * sizes.iter().sum::<f64>();
-        for (c, node) in point.corners.iter().enumerate() {
-            let out = &mut local[usize::from(*node)];
-            out.0 += (d.gradient * point.gradients[c] + d.place * point.weights[c]) * point.volume;
-            out.1 += bound * sizes[c];
-        }
     }
     (sums, local)
 }
 
-/// Places of Gauss' rule in a cell, -1..1, are at the corners times this.
-const GAUSS: f64 = 0.577_350_269_189_625_8;
-
-/// Four of the corners of a cell, no two on one edge, give its volume: to second order as good as all eight, and all four across a path
-/// along an edge.
-fn is_volume_place(corner: usize) -> bool {
-    CORNERS[corner].iter().product::<f64>() < 0.0
+/// What opening adds at a point: derivatives and energy per volume; `add` gets places of its corners in the station, forces and bounds.
+fn point_force(
+    shape: Shape,
+    opening: &OpeningPlan,
+    point: &PathPoint,
+    section: &Station,
+    u: &[DVec3],
+    mut add: impl FnMut(usize, DVec3, f64),
+) -> (Derivatives<f64>, f64) {
+    let (y, h) = point.place_and_gradient(u);
+    let map = opening.map.at(section, y, h);
+    let (d, energy, tangent) = shape.opened(&map, h);
+    // Rows of the point's own stiffness.
+    let (by_gradient, by_place) = map.amplification();
+    let grown = by_gradient + by_place * map.distance();
+    let cof = cofactor(DMat3::IDENTITY + h).to_cols_array_2d();
+    let stiffness = tangent.straight * grown * grown + tangent.turned * squared_norm_bound(&cof);
+    let (by_gradient, by_place) = (DMat3::from_cols_array_2d(&d.gradient), DVec3::from(d.place));
+    let sizes = point.gradients.map(|g| g.length());
+    let bound = point.volume * stiffness * sizes.iter().sum::<f64>();
+    for (c, place) in point.corners.iter().enumerate() {
+        let force = (by_gradient * point.gradients[c] + by_place * point.weights[c]) * point.volume;
+        add(usize::from(*place), force, bound * sizes[c]);
+    }
+    (d, energy)
 }
+
+/// Forces and bounds of a near cell, derivatives of its energy, and that energy [J].
+type NearCellForces = (CellForces, Derivatives<f64>, f64);
 
 /// What opening adds to a cell: forces, derivatives of its energy by the path, and that energy. The gradient of y is that of its centre,
 /// as elsewhere; the volume is taken at four places, the shape at one.
@@ -390,7 +457,7 @@ fn near_cell_forces(
     near: &NearCell,
     section: &Station,
     displacement: &[DVec3],
-) -> Option<(CellForces, Derivatives, f64)> {
+) -> Option<NearCellForces> {
     if section.radius == 0.0 {
         return None;
     }
@@ -399,34 +466,36 @@ fn near_cell_forces(
     let u = shape.gather(displacement);
     let nodes = model.mesh.cell_nodes(cell);
     let y: [DVec3; 8] = std::array::from_fn(|i| model.mesh.rest_position(nodes[i]) + u[i]);
-    let gradient = DMat3::IDENTITY + shape.displacement_gradient(&u);
+    let h = shape.displacement_gradient(&u);
+    let gradient = DMat3::IDENTITY + h;
     let material = shape_of.material;
-    let (mut sum, mut energy) = (Derivatives::ZERO, 0.0);
+    let (mut sum, mut energy) = (Derivatives::none(0.0), 0.0);
     let mut grown = 1.0f64;
     // y is linear in the cell, as its gradient is one: a force at a place is one on the middle and one on the gradient.
     let middle = y.iter().copied().sum::<DVec3>() / 8.0;
     let width = model.mesh.block().cell_size(cell);
-    let map = |offset: DVec3| opening.map.at(section, middle + gradient * offset, gradient);
-    let add = |sum: &mut Derivatives, d: &Derivatives, offset: DVec3, by: f64| {
+    let add = |sum: &mut Derivatives<f64>, d: &Derivatives<f64>, offset: DVec3, by: f64| {
         sum.add(d, by);
-        sum.gradient += outer(d.place * by, offset);
+        let by_offset = outer((DVec3::from(d.place) * by).to_array(), offset.to_array());
+        sum.gradient =
+            (DMat3::from_cols_array_2d(&sum.gradient) + DMat3::from_cols_array_2d(&by_offset)).to_cols_array_2d();
     };
     let at_volume_places: Vec<_> = (0..8)
         .filter(|corner| is_volume_place(*corner))
         .map(|corner| {
-            let offset = DVec3::from(CORNERS[corner]) * (0.5 * GAUSS) * width;
-            (map(offset), offset)
+            let offset = DVec3::from(CORNERS[corner]) * (0.5 * VOLUME_PLACE) * width;
+            (opening.map.dilation(section, middle + gradient * offset), offset)
         })
         .collect();
-    let tangent = material.tangent_bound(gradient - DMat3::IDENTITY, &PointState::default());
+    let tangent = material.tangent_bound(h, &PointState::default());
     let (mut straight, mut turned) = (tangent.straight, tangent.turned);
-    let dilation = at_volume_places.iter().map(|(m, _)| m.dilation).sum::<f64>() / 4.0;
+    let less = at_volume_places.iter().map(|(d, _)| d.less_one).sum::<f64>() / 4.0;
     // What keeps the shape, of what points do not carry.
     if near.share > 0.0 {
         let offset = near.place * width;
-        let map = map(offset);
+        let map = opening.map.at(section, middle + gradient * offset, h);
         let volume = near.share * shape.volume;
-        let (d, w, tangent) = shape_of.opened(&map, gradient);
+        let (d, w, tangent) = shape_of.opened(&map, h);
         energy += volume * w;
         add(&mut sum, &d, offset, volume);
         let (by_gradient, by_place) = map.amplification();
@@ -434,23 +503,26 @@ fn near_cell_forces(
         (straight, turned) = (straight.max(tangent.straight), turned.max(tangent.turned));
     }
     // The volume is the cell's.
-    let (j, cof) = (gradient.determinant(), cofactor(gradient));
+    let (closed, cof) = (jacobian_minus_one(h), cofactor(gradient));
     let bulk = material.law.bulk_modulus;
-    let (closed, open) = (j - 1.0, j * dilation - 1.0);
-    energy += shape.volume * 0.5 * bulk * (open * open - closed * closed);
-    sum.gradient += cof * (bulk * (open * dilation - closed) * shape.volume);
-    for (map, offset) in &at_volume_places {
-        add(&mut sum, &map.pull_back_dilation(bulk * open * j), *offset, 0.25 * shape.volume);
+    let open = closed + less + closed * less;
+    energy += shape.volume * 0.5 * bulk * (open - closed) * (open + closed);
+    let by_gradient = cof * (bulk * less * (1.0 + closed + open) * shape.volume);
+    sum.gradient = (DMat3::from_cols_array_2d(&sum.gradient) + by_gradient).to_cols_array_2d();
+    for (dilation, offset) in &at_volume_places {
+        let (place, radius) = dilation.pull_back(bulk * open * (1.0 + closed));
+        add(&mut sum, &Derivatives { place, radius, ..Derivatives::none(0.0) }, *offset, 0.25 * shape.volume);
     }
     // Bound of the stiffness beyond that of the closed cell, where open faces may meet (see Elements::stiffness_bound).
-    let b = 0.25 / model.mesh.block().cell_size(cell);
+    let b = 0.25 / width;
     let b = b.length_squared();
-    let cof_b = squared_norm_bound(cof) * b;
-    let with = (bulk + turned) * cof_b * dilation.max(1.0).powi(2) + straight * grown * grown * b;
+    let cof_b = squared_norm_bound(&cof.to_cols_array_2d()) * b;
+    let with = (bulk + turned) * cof_b * (1.0 + less).max(1.0).powi(2) + straight * grown * grown * b;
     let without = (bulk + tangent.turned) * cof_b + tangent.straight * b;
     let mut forces = CellForces { bound: [8.0 * shape.volume * (with - without).max(0.0); 8], ..CellForces::default() };
+    let (by_gradient, by_place) = (DMat3::from_cols_array_2d(&sum.gradient), DVec3::from(sum.place));
     for (i, b) in shape.gradients().iter().enumerate() {
-        forces.force[i] = sum.gradient * *b + sum.place / 8.0;
+        forces.force[i] = by_gradient * *b + by_place / 8.0;
     }
     Some((forces, sum, energy))
 }

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DMat3, DVec3};
 
 use crate::effects::puncture::LEAST_TRAVELS;
-use crate::mesh::{BlockMesh, trilinear};
+use crate::mesh::{BlockMesh, CORNERS, trilinear};
 use crate::needle::lateral_axes;
 use crate::needle::opening::OpeningMap;
 use crate::needle::{NeedleShape, PlannedPath};
@@ -38,6 +38,15 @@ const GAUSS: [(f64, f64); 5] = [
     (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
     (0.906_179_845_938_664, 0.236_926_885_056_189_08),
 ];
+
+/// Places of Gauss' rule in a cell, -1..1, are at the corners times this.
+pub const VOLUME_PLACE: f64 = 0.577_350_269_189_625_8;
+
+/// Four of the corners of a cell, no two on one edge, give its volume: to second order as good as all eight, and all four across a path
+/// along an edge.
+pub fn is_volume_place(corner: usize) -> bool {
+    CORNERS[corner].iter().product::<f64>() < 0.0
+}
 
 /// A mean over nodes: their places in [`Station::nodes`] and weights.
 pub type Mean = Vec<(u16, f64)>;
@@ -386,9 +395,9 @@ pub fn mean_place(mean: &Mean, nodes: &[u32], mesh: &BlockMesh, u: &[DVec3]) -> 
 }
 
 impl PathPoint {
-    /// y and grad y there, from the displacements of the nodes of its station.
+    /// y and the gradient of the displacement there, from the displacements of the nodes of its station.
     pub fn place_and_gradient(&self, u: &[DVec3]) -> (DVec3, DMat3) {
-        let (mut y, mut h) = (self.place, DMat3::IDENTITY);
+        let (mut y, mut h) = (self.place, DMat3::ZERO);
         for ((corner, w), g) in self.corners.iter().zip(self.weights).zip(self.gradients) {
             let u = u[*corner as usize];
             y += u * w;

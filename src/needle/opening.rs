@@ -15,7 +15,12 @@
 //! For an energy per volume with `P = dW/dF` the derivatives of W follow: with respect to F_h, eta, c_Z, rc and rc_Z ([`Opening::pull_back`]).
 //! `s0`: a few micrometres squared, since no direction leads away from the middle of the path. Source: this project (docs/opening.md).
 
+// Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
+#![allow(clippy::needless_range_loop)]
+
 use glam::{DMat3, DVec3};
+
+use crate::material::number::{Number, Tensor};
 
 /// Radius up to which the hole is exact, and radius beyond which nothing of it is left, in needle radii.
 pub const EXACT: f64 = 2.0;
@@ -33,6 +38,21 @@ pub struct Station {
     pub radius_rate: f64,
 }
 
+impl Station {
+    /// The mean of some.
+    pub fn mean(stations: &[Station]) -> Station {
+        let mut mean = Station::default();
+        let by = 1.0 / stations.len() as f64;
+        for station in stations {
+            mean.centre += station.centre * by;
+            mean.centre_rate += station.centre_rate * by;
+            mean.radius += station.radius * by;
+            mean.radius_rate += station.radius_rate * by;
+        }
+        mean
+    }
+}
+
 /// What does not change along a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpeningMap {
@@ -45,77 +65,126 @@ pub struct OpeningMap {
     pub least: f64,
 }
 
-/// v(s) with its first and second derivatives.
-fn fade_over_area(map: &OpeningMap, s: f64) -> [f64; 3] {
-    let rho = s.sqrt();
-    let (from, width) = (EXACT * map.shaft, (FADED - EXACT) * map.shaft);
-    let x = ((rho - from) / width).clamp(0.0, 1.0);
-    let (mut w, mut w1, mut w2) = (1.0, 0.0, 0.0);
-    if x > 0.0 {
-        w = 1.0 - x * x * x * (10.0 - x * (15.0 - 6.0 * x));
-        let slope = -30.0 * x * x * (1.0 - x) * (1.0 - x) / width;
-        let curvature = -60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / (width * width);
-        w1 = slope / (2.0 * rho);
-        w2 = curvature / (4.0 * s) - slope / (4.0 * s * rho);
-    }
-    let a = 1.0 / (s + map.least);
-    [w * a, (w1 - w * a) * a, (w2 - 2.0 * (w1 - w * a) * a) * a]
+/// The same in the numbers that it is computed with.
+#[derive(Debug, Clone, Copy)]
+pub struct MapIn<N> {
+    direction: [N; 3],
+    rest_direction: [N; 3],
+    /// Where it begins to fade [m], and one over the length on which it does [1/m].
+    from: N,
+    over_width: N,
+    least: N,
+}
+
+/// What a place needs of the path: where it lies from the middle [m], the rate of the middle, the radius and its rate.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside<N> {
+    pub offset: [N; 3],
+    pub centre_rate: [N; 3],
+    pub radius: N,
+    pub radius_rate: N,
 }
 
 /// The map at one point: all that its gradient and the derivatives of an energy need.
 #[derive(Debug, Clone, Copy)]
-pub struct Opening {
-    map: OpeningMap,
+pub struct Opening<N> {
+    map: MapIn<N>,
     /// rc_Z there.
-    radius_rate: f64,
-    eta: DVec3,
-    /// g and its derivatives by s; g_rc and its derivatives by s and rc.
-    g: f64,
-    g1: f64,
-    g2: f64,
-    gr: f64,
-    gr1: f64,
-    grr: f64,
+    radius_rate: N,
+    eta: [N; 3],
+    square: N,
+    /// g - 1, g and its derivatives by s; g_rc and its derivatives by s and rc.
+    g_less: N,
+    g: N,
+    g1: N,
+    g2: N,
+    gr: N,
+    gr1: N,
+    grr: N,
     /// H.
-    lateral: DMat3,
-    /// det grad x / det F_h, with its derivatives by s and rc, as long as it does not turn.
-    pub dilation: f64,
-    dilation_by_area: f64,
-    dilation_by_radius: f64,
+    lateral: Tensor<N>,
+}
+
+/// What the map does to a volume at one point.
+#[derive(Debug, Clone, Copy)]
+pub struct Dilation<N> {
+    eta: [N; 3],
+    /// det grad x / det F_h less one, with its derivatives by s and rc, as long as it does not turn.
+    pub less_one: N,
+    by_area: N,
+    by_radius: N,
 }
 
 /// Derivatives of an energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Derivatives {
+pub struct Derivatives<N> {
     /// By F_h.
-    pub gradient: DMat3,
+    pub gradient: Tensor<N>,
     /// By y (and, with the other sign, by c), across the path.
-    pub place: DVec3,
+    pub place: [N; 3],
     /// By c_Z.
-    pub centre_rate: DVec3,
+    pub centre_rate: [N; 3],
     /// By rc at fixed rc_Z, and by rc_Z.
-    pub radius: f64,
-    pub radius_rate: f64,
+    pub radius: N,
+    pub radius_rate: N,
 }
 
-impl Derivatives {
-    /// None (glam's default matrix is the identity).
-    pub const ZERO: Derivatives = Derivatives {
-        gradient: DMat3::ZERO,
-        place: DVec3::ZERO,
-        centre_rate: DVec3::ZERO,
-        radius: 0.0,
-        radius_rate: 0.0,
-    };
+impl<N: Number> Derivatives<N> {
+    /// None, in the kind of number of `n`.
+    #[inline(always)]
+    pub fn none(n: N) -> Self {
+        let zero = n.of(0.0);
+        Derivatives {
+            gradient: [[zero; 3]; 3],
+            place: [zero; 3],
+            centre_rate: [zero; 3],
+            radius: zero,
+            radius_rate: zero,
+        }
+    }
 
     /// Adds those of another energy, `by` times.
-    pub fn add(&mut self, other: &Derivatives, by: f64) {
-        self.gradient += other.gradient * by;
-        self.place += other.place * by;
-        self.centre_rate += other.centre_rate * by;
-        self.radius += other.radius * by;
-        self.radius_rate += other.radius_rate * by;
+    #[inline(always)]
+    pub fn add(&mut self, other: &Self, by: N) {
+        for a in 0..3 {
+            for b in 0..3 {
+                self.gradient[a][b] = other.gradient[a][b].mul_add(by, self.gradient[a][b]);
+            }
+            self.place[a] = other.place[a].mul_add(by, self.place[a]);
+            self.centre_rate[a] = other.centre_rate[a].mul_add(by, self.centre_rate[a]);
+        }
+        self.radius = other.radius.mul_add(by, self.radius);
+        self.radius_rate = other.radius_rate.mul_add(by, self.radius_rate);
     }
+}
+
+/// Of two vectors.
+#[inline(always)]
+fn dot<N: Number>(a: [N; 3], b: [N; 3]) -> N {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
+}
+
+/// `m v`, of a tensor by its columns.
+#[inline(always)]
+fn times<N: Number>(m: &Tensor<N>, v: [N; 3]) -> [N; 3] {
+    let mut product = [v[0]; 3];
+    for b in 0..3 {
+        product[b] = m[2][b].mul_add(v[2], m[1][b].mul_add(v[1], m[0][b] * v[0]));
+    }
+    product
+}
+
+/// `m^T v`.
+#[inline(always)]
+fn transposed_times<N: Number>(m: &Tensor<N>, v: [N; 3]) -> [N; 3] {
+    [dot(m[0], v), dot(m[1], v), dot(m[2], v)]
+}
+
+/// v less its part along a unit vector.
+#[inline(always)]
+fn across<N: Number>(direction: [N; 3], v: [N; 3]) -> [N; 3] {
+    let along = dot(direction, v);
+    [v[0] - direction[0] * along, v[1] - direction[1] * along, v[2] - direction[2] * along]
 }
 
 impl OpeningMap {
@@ -124,112 +193,245 @@ impl OpeningMap {
         v - self.direction * v.dot(self.direction)
     }
 
-    /// The map at the place y [m] with the gradient F_h of y.
-    pub fn at(&self, station: &Station, y: DVec3, gradient: DMat3) -> Opening {
-        let eta = self.across(y - station.centre);
-        let s = eta.length_squared();
-        let [v, v1, v2] = fade_over_area(self, s);
-        let rc = station.radius;
-        let g = (1.0 + rc * rc * v).sqrt();
-        let g1 = rc * rc * v1 / (2.0 * g);
-        let gr = rc * v / g;
-        let columns = [gradient.x_axis, gradient.y_axis, gradient.z_axis];
-        let along = [self.rest_direction.x, self.rest_direction.y, self.rest_direction.z];
-        let h: [DVec3; 3] = std::array::from_fn(|a| self.across(columns[a]) - station.centre_rate * along[a]);
-        Opening {
-            map: *self,
-            radius_rate: station.radius_rate,
-            eta,
-            g,
-            g1,
-            g2: rc * rc * v2 / (2.0 * g) - g1 * g1 / g,
-            gr,
-            gr1: rc * v1 / g - gr * g1 / g,
-            grr: v / g - gr * gr / g,
-            lateral: DMat3::from_cols(h[0], h[1], h[2]),
-            dilation: 1.0 + rc * rc * (v + s * v1),
-            dilation_by_area: rc * rc * (2.0 * v1 + s * v2),
-            dilation_by_radius: 2.0 * rc * (v + s * v1),
+    /// In numbers of the kind of `n` and lengths in metres.
+    #[inline(always)]
+    pub fn in_numbers<N: Number>(&self, n: N) -> MapIn<N> {
+        self.in_lengths(n, 1.0)
+    }
+
+    /// In numbers of the kind of `n` and lengths in radii of the needle: in metres powers of a short one leave the range of f32.
+    #[inline(always)]
+    pub fn in_radii<N: Number>(&self, n: N) -> MapIn<N> {
+        self.in_lengths(n, self.shaft)
+    }
+
+    #[inline(always)]
+    fn in_lengths<N: Number>(&self, n: N, unit: f64) -> MapIn<N> {
+        let (t, t0) = (self.direction, self.rest_direction);
+        MapIn {
+            direction: [n.of(t.x), n.of(t.y), n.of(t.z)],
+            rest_direction: [n.of(t0.x), n.of(t0.y), n.of(t0.z)],
+            from: n.of(EXACT * self.shaft / unit),
+            over_width: n.of(unit / ((FADED - EXACT) * self.shaft)),
+            least: n.of(self.least / (unit * unit)),
         }
+    }
+
+    /// The map at the place y [m] with the gradient of the displacement `y - X` there.
+    pub fn at(&self, station: &Station, y: DVec3, h: DMat3) -> Opening<f64> {
+        let beside = Beside {
+            offset: (y - station.centre).to_array(),
+            centre_rate: station.centre_rate.to_array(),
+            radius: station.radius,
+            radius_rate: station.radius_rate,
+        };
+        self.in_numbers(0.0).at(&beside, &h.to_cols_array_2d())
+    }
+
+    /// What the map does to a volume at the place y [m].
+    pub fn dilation(&self, station: &Station, y: DVec3) -> Dilation<f64> {
+        self.in_numbers(0.0).dilation((y - station.centre).to_array(), station.radius)
     }
 
     /// Where a place y [m] is seen, x [m].
     pub fn place(&self, station: &Station, y: DVec3) -> DVec3 {
         let eta = self.across(y - station.centre);
-        let [v, ..] = fade_over_area(self, eta.length_squared());
+        let map = self.in_numbers(0.0);
+        let [v, ..] = map.fade_over_area(eta.length_squared());
         y + eta * ((1.0 + station.radius.powi(2) * v).sqrt() - 1.0)
     }
 }
 
-/// a b^T.
-pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
-}
-
-impl Opening {
-    /// Where the place lies from the middle of the path [m], across it.
-    pub fn eta(&self) -> DVec3 {
-        self.eta
+impl<N: Number> MapIn<N> {
+    /// v(s) with its first and second derivatives, then `v + s v'` and `2 v' + s v''`, which hardly differ from zero near the path.
+    #[inline(always)]
+    fn fade_over_area(&self, s: N) -> [N; 5] {
+        let MapIn { from, over_width, least, .. } = *self;
+        let (none, one, two) = (s.of(0.0), s.of(1.0), s.of(2.0));
+        let rho = s.root();
+        let x = ((rho - from) * over_width).larger(none).smaller(one);
+        let left = one - x;
+        let w = one - x * x * x * (s.of(10.0) - x * (s.of(15.0) - s.of(6.0) * x));
+        let slope = s.of(-30.0) * x * x * left * left * over_width;
+        let curvature = s.of(-60.0) * x * left * (one - two * x) * over_width * over_width;
+        // Nothing fades before `from`, and nothing is divided by zero on the path.
+        let over_rho = one.over(rho.larger(from));
+        let w1 = s.of(0.5) * slope * over_rho;
+        let w2 = s.of(0.25) * over_rho * over_rho * (curvature - slope * over_rho);
+        let a = one.over(s + least);
+        let fall = w1 - w * a;
+        let rest = least * a;
+        [
+            w * a,
+            fall * a,
+            (w2 - two * fall * a) * a,
+            a * w.mul_add(rest, s * w1),
+            a * (two * fall).mul_add(rest, s * w2),
+        ]
     }
 
-    /// F = grad x, from the gradient F_h that the map was made with.
-    pub fn gradient(&self, gradient: DMat3) -> DMat3 {
-        let ht_eta = self.lateral.transpose() * self.eta;
-        gradient
-            + self.lateral * (self.g - 1.0)
-            + outer(self.eta, ht_eta * (2.0 * self.g1) + self.map.rest_direction * (self.gr * self.radius_rate))
-    }
-
-    /// Derivatives of an energy per volume, from its derivative P by F.
-    pub fn pull_back(&self, p: DMat3) -> Derivatives {
-        let Opening { eta, g, g1, g2, gr, gr1, grr, lateral: h, radius_rate: rcz, map, .. } = *self;
-        let ht_eta = h.transpose() * eta;
-        let pt_eta = p.transpose() * eta;
-        let h_p = h.x_axis.dot(p.x_axis) + h.y_axis.dot(p.y_axis) + h.z_axis.dot(p.z_axis);
-        let stretched = pt_eta.dot(ht_eta);
-        let sheared = pt_eta.dot(map.rest_direction);
-        let by_h = p * (g - 1.0) + outer(eta, pt_eta * (2.0 * g1));
-        let by_h = DMat3::from_cols(map.across(by_h.x_axis), map.across(by_h.y_axis), map.across(by_h.z_axis));
-        let place = eta * (2.0 * g1 * h_p + 4.0 * g2 * stretched + 2.0 * gr1 * rcz * sheared)
-            + (p * ht_eta + h * pt_eta) * (2.0 * g1)
-            + p * map.rest_direction * (gr * rcz);
-        Derivatives {
-            gradient: p + by_h,
-            place: map.across(place),
-            centre_rate: -(by_h * map.rest_direction),
-            radius: gr * h_p + 2.0 * gr1 * stretched + grr * rcz * sheared,
-            radius_rate: gr * sheared,
+    /// What the map does to a volume, at a place that lies `offset` [m] from the middle of the path of the radius `rc` [m].
+    #[inline(always)]
+    pub fn dilation(&self, offset: [N; 3], rc: N) -> Dilation<N> {
+        let eta = across(self.direction, offset);
+        let [_, _, _, dilated, dilated_by_area] = self.fade_over_area(dot(eta, eta));
+        Dilation {
+            eta,
+            less_one: rc * rc * dilated,
+            by_area: rc * rc * dilated_by_area,
+            by_radius: rc.of(2.0) * rc * dilated,
         }
     }
 
-    /// Derivatives of an energy of the volume, from its derivative by the dilation of the map; that by F_h is not in it.
-    pub fn pull_back_dilation(&self, by_dilation: f64) -> Derivatives {
+    /// The map at a place beside the path, with the gradient of the displacement there.
+    #[inline(always)]
+    pub fn at(&self, beside: &Beside<N>, h: &Tensor<N>) -> Opening<N> {
+        let rc = beside.radius;
+        let one = rc.of(1.0);
+        let eta = across(self.direction, beside.offset);
+        let s = dot(eta, eta);
+        let [v, v1, v2, ..] = self.fade_over_area(s);
+        let area = rc * rc;
+        let g = (one + area * v).root();
+        let over_g = one.over(g);
+        let g1 = rc.of(0.5) * area * v1 * over_g;
+        let gr = rc * v * over_g;
+        let mut lateral = *h;
+        for a in 0..3 {
+            let mut column = h[a];
+            column[a] = column[a] + one;
+            column = across(self.direction, column);
+            for b in 0..3 {
+                column[b] = column[b] - beside.centre_rate[b] * self.rest_direction[a];
+            }
+            lateral[a] = column;
+        }
+        Opening {
+            map: *self,
+            radius_rate: beside.radius_rate,
+            eta,
+            square: s,
+            g_less: (area * v).over(g + one),
+            g,
+            g1,
+            g2: rc.of(0.5) * area * v2 * over_g - g1 * g1 * over_g,
+            gr,
+            gr1: (rc * v1 - gr * g1) * over_g,
+            grr: (v - gr * gr) * over_g,
+            lateral,
+        }
+    }
+}
+
+impl<N: Number> Dilation<N> {
+    /// Derivatives of an energy of the volume by y and by rc, from its derivative by the dilation of the map; that by F_h is not in it.
+    #[inline(always)]
+    pub fn pull_back(&self, by_dilation: N) -> ([N; 3], N) {
+        let by = by_dilation.of(2.0) * self.by_area * by_dilation;
+        ([self.eta[0] * by, self.eta[1] * by, self.eta[2] * by], self.by_radius * by_dilation)
+    }
+}
+
+/// a b^T.
+#[inline(always)]
+pub fn outer<N: Number>(a: [N; 3], b: [N; 3]) -> Tensor<N> {
+    [
+        [a[0] * b[0], a[1] * b[0], a[2] * b[0]],
+        [a[0] * b[1], a[1] * b[1], a[2] * b[1]],
+        [a[0] * b[2], a[1] * b[2], a[2] * b[2]],
+    ]
+}
+
+impl<N: Number> Opening<N> {
+    /// Distance of the place from the middle of the path [m], across it.
+    #[inline(always)]
+    pub fn distance(&self) -> N {
+        self.square.root()
+    }
+
+    /// F - I, of F = grad x, from the gradient of the displacement that the map was made with.
+    #[inline(always)]
+    pub fn gradient(&self, h: &Tensor<N>) -> Tensor<N> {
+        let Opening { eta, g_less, g1, gr, lateral, map, .. } = *self;
+        let ht_eta = transposed_times(&lateral, eta);
+        let (twice, widening) = (self.g.of(2.0) * g1, gr * self.radius_rate);
+        let mut f = *h;
+        for a in 0..3 {
+            let by_eta = ht_eta[a].mul_add(twice, map.rest_direction[a] * widening);
+            for b in 0..3 {
+                f[a][b] = eta[b].mul_add(by_eta, lateral[a][b].mul_add(g_less, f[a][b]));
+            }
+        }
+        f
+    }
+
+    /// Derivatives of an energy per volume, from its derivative P by F.
+    #[inline(always)]
+    pub fn pull_back(&self, p: &Tensor<N>) -> Derivatives<N> {
+        let Opening { eta, g_less, g1, g2, gr, gr1, grr, lateral: h, radius_rate: rcz, map, .. } = *self;
+        let two = g1.of(2.0);
+        let twice = two * g1;
+        let (ht_eta, pt_eta) = (transposed_times(&h, eta), transposed_times(p, eta));
+        let h_p = dot(h[2], p[2]) + (dot(h[1], p[1]) + dot(h[0], p[0]));
+        let (stretched, sheared) = (dot(pt_eta, ht_eta), dot(pt_eta, map.rest_direction));
+        let mut by_h = *p;
+        for a in 0..3 {
+            let by_eta = pt_eta[a] * twice;
+            let column = [
+                eta[0].mul_add(by_eta, p[a][0] * g_less),
+                eta[1].mul_add(by_eta, p[a][1] * g_less),
+                eta[2].mul_add(by_eta, p[a][2] * g_less),
+            ];
+            by_h[a] = across(map.direction, column);
+        }
+        let along_eta = twice * h_p + g1.of(4.0) * g2 * stretched + two * gr1 * rcz * sheared;
+        let (p_ht_eta, h_pt_eta, p_t0) = (times(p, ht_eta), times(&h, pt_eta), times(p, map.rest_direction));
+        let widening = gr * rcz;
+        let mut place = eta;
+        for b in 0..3 {
+            place[b] = p_t0[b].mul_add(widening, (p_ht_eta[b] + h_pt_eta[b]).mul_add(twice, eta[b] * along_eta));
+        }
+        let rate = times(&by_h, map.rest_direction);
+        let none = g1.of(0.0);
+        let mut gradient = by_h;
+        for a in 0..3 {
+            for b in 0..3 {
+                gradient[a][b] = p[a][b] + by_h[a][b];
+            }
+        }
         Derivatives {
-            place: self.eta * (2.0 * self.dilation_by_area * by_dilation),
-            radius: self.dilation_by_radius * by_dilation,
-            ..Derivatives::ZERO
+            gradient,
+            place: across(map.direction, place),
+            centre_rate: [none - rate[0], none - rate[1], none - rate[2]],
+            radius: gr * h_p + two * gr1 * stretched + grr * rcz * sheared,
+            radius_rate: gr * sheared,
         }
     }
 
     /// By how much a change of F_h grows in F at most, and by how much one of eta does [1/m]. Along and across eta the third derivative of
     /// the map has the entries `6 g' |eta| + 4 g'' |eta|^3` (three times along) and `2 g' |eta|` (once along); the first vanishes near the path.
-    pub fn amplification(&self) -> (f64, f64) {
-        let eta = self.eta.length();
-        let along = self.g + 2.0 * self.g1 * eta * eta;
-        let third = (6.0 * self.g1 * eta + 4.0 * self.g2 * eta.powi(3)).abs().max(2.0 * self.g1.abs() * eta);
-        let by_place = squared_norm_bound(self.lateral).sqrt() * third
-            + self.radius_rate.abs() * (self.gr + 2.0 * self.gr1.abs() * eta * eta);
-        (self.g.max(along.abs()).max(1.0), by_place)
+    #[inline(always)]
+    pub fn amplification(&self) -> (N, N) {
+        let Opening { g, g1, g2, square, .. } = *self;
+        let (one, two) = (g.of(1.0), g.of(2.0));
+        let eta = self.distance();
+        let along = g + two * g1 * square;
+        let third = (g.of(6.0) * g1 * eta + g.of(4.0) * g2 * square * eta).size().larger(two * g1.size() * eta);
+        let by_place = squared_norm_bound(&self.lateral).root() * third
+            + self.radius_rate.size() * (self.gr + two * self.gr1.size() * square);
+        (g.larger(along.size()).larger(one), by_place)
     }
 }
 
 /// Bound of the square of the spectral norm: largest sum of a column times that of a row.
-pub fn squared_norm_bound(m: DMat3) -> f64 {
-    let sums = |m: DMat3| {
-        let column = |c: DVec3| c.abs().element_sum();
-        column(m.x_axis).max(column(m.y_axis)).max(column(m.z_axis))
-    };
-    sums(m) * sums(m.transpose())
+#[inline(always)]
+pub fn squared_norm_bound<N: Number>(m: &Tensor<N>) -> N {
+    let (mut columns, mut rows) = (m[0], m[0]);
+    for a in 0..3 {
+        columns[a] = m[a][0].size() + m[a][1].size() + m[a][2].size();
+        rows[a] = m[0][a].size() + m[1][a].size() + m[2][a].size();
+    }
+    columns[0].larger(columns[1]).larger(columns[2]) * rows[0].larger(rows[1]).larger(rows[2])
 }
 
 #[cfg(test)]
@@ -254,6 +456,15 @@ mod tests {
     const GRADIENT: DMat3 =
         DMat3::from_cols(DVec3::new(1.1, 0.05, -0.02), DVec3::new(-0.1, 0.95, 0.04), DVec3::new(0.03, -0.06, 0.97));
 
+    /// F - I, and back.
+    fn less(f: DMat3) -> Tensor<f64> {
+        (f - DMat3::IDENTITY).to_cols_array_2d()
+    }
+
+    fn full(less: Tensor<f64>) -> DMat3 {
+        DMat3::from_cols_array_2d(&less) + DMat3::IDENTITY
+    }
+
     /// Any smooth function of F stands for an energy.
     fn energy(f: DMat3) -> (f64, DMat3) {
         let m = DMat3::from_cols(DVec3::new(1.0, 2.0, 0.5), DVec3::new(-0.7, 1.5, 0.3), DVec3::new(0.2, -0.4, 0.9));
@@ -277,7 +488,8 @@ mod tests {
         // x(X) for fields y, c and rc that are linear near one material point.
         let (map, station) = (map(), station());
         for y in places() {
-            let f = map.at(&station, y, GRADIENT).gradient(GRADIENT);
+            let opening = map.at(&station, y, GRADIENT - DMat3::IDENTITY);
+            let f = full(opening.gradient(&less(GRADIENT)));
             for (axis, column) in [(DVec3::X, f.x_axis), (DVec3::Y, f.y_axis), (DVec3::Z, f.z_axis)] {
                 let step = 1e-8;
                 let at = |h: f64| {
@@ -299,10 +511,14 @@ mod tests {
     fn derivatives_of_an_energy_are_those_of_differences() {
         let (map, station) = (map(), station());
         for y in places() {
-            let value = |s: &Station, y: DVec3, g: DMat3| energy(map.at(s, y, g).gradient(g)).0;
-            let opening = map.at(&station, y, GRADIENT);
-            let (w, p) = energy(opening.gradient(GRADIENT));
-            let got = opening.pull_back(p);
+            let seen = |s: &Station, y: DVec3, g: DMat3| {
+                let opening = map.at(s, y, g - DMat3::IDENTITY);
+                (opening, full(opening.gradient(&less(g))))
+            };
+            let value = |s: &Station, y: DVec3, g: DMat3| energy(seen(s, y, g).1).0;
+            let (opening, f) = seen(&station, y, GRADIENT);
+            let (w, p) = energy(f);
+            let got = opening.pull_back(&p.to_cols_array_2d());
             let close = |plus: f64, minus: f64, step: f64, exact: f64, what: &str| {
                 let difference = (plus - minus) / (2.0 * step);
                 let bound = 1e-6
@@ -326,7 +542,7 @@ mod tests {
                     value(&rate(h), y, GRADIENT),
                     value(&rate(-h), y, GRADIENT),
                     h,
-                    got.centre_rate.dot(lateral),
+                    DVec3::from(got.centre_rate).dot(lateral),
                     "centre rate",
                 );
                 for b in 0..3 {
@@ -336,7 +552,7 @@ mod tests {
                         value(&station, y, GRADIENT + change),
                         value(&station, y, GRADIENT - change),
                         h,
-                        got.gradient.col(a)[b],
+                        got.gradient[a][b],
                         "gradient",
                     );
                 }
@@ -348,16 +564,16 @@ mod tests {
             let rate = |h: f64| Station { radius_rate: station.radius_rate + h, ..station };
             close(value(&rate(h), y, GRADIENT), value(&rate(-h), y, GRADIENT), h, got.radius_rate, "radius rate");
             // The volume.
-            let dilation = |s: &Station, y: DVec3| map.at(s, y, GRADIENT).dilation;
-            let got = opening.pull_back_dilation(1.0);
+            let dilation = |s: &Station, y: DVec3| 1.0 + map.dilation(s, y).less_one;
+            let (by_place, by_radius) = map.dilation(&station, y).pull_back(1.0);
             let h = 1e-9;
             for a in 0..3 {
                 let e = DVec3::AXES[a] * h;
                 let difference = (dilation(&station, y + e) - dilation(&station, y - e)) / (2.0 * h);
-                assert!((difference - got.place[a]).abs() < 1e-3, "{difference} {}", got.place[a]);
+                assert!((difference - by_place[a]).abs() < 1e-3, "{difference} {}", by_place[a]);
             }
             let difference = (dilation(&radius(h), y) - dilation(&radius(-h), y)) / (2.0 * h);
-            assert!((difference - got.radius).abs() < 1e-3, "{difference} {}", got.radius);
+            assert!((difference - by_radius).abs() < 1e-3, "{difference} {by_radius}");
         }
     }
 
@@ -370,12 +586,13 @@ mod tests {
         assert!((x.dot(side) - 0.8e-3).abs() < 1e-9);
         assert_eq!(map.place(&straight, side * 4.9e-3), side * 4.9e-3);
         for rho in [1e-5, 1e-4, 1e-3, 1.5e-3] {
-            let opening = map.at(&straight, side * rho, DMat3::IDENTITY);
-            assert!((opening.gradient(DMat3::IDENTITY).determinant() - 1.0).abs() < 1e-9);
-            assert!((opening.dilation - 1.0).abs() < 1e-12);
+            let opening = map.at(&straight, side * rho, DMat3::ZERO);
+            assert!((full(opening.gradient(&less(DMat3::IDENTITY))).determinant() - 1.0).abs() < 1e-9);
+            assert!(map.dilation(&straight, side * rho).less_one.abs() < 1e-12);
         }
-        let opening = map.at(&straight, side * 3e-3, DMat3::IDENTITY);
-        let det = opening.gradient(DMat3::IDENTITY).determinant();
-        assert!((opening.dilation - det).abs() < 1e-9, "{} {det}", opening.dilation);
+        let opening = map.at(&straight, side * 3e-3, DMat3::ZERO);
+        let det = full(opening.gradient(&less(DMat3::IDENTITY))).determinant();
+        let dilation = 1.0 + map.dilation(&straight, side * 3e-3).less_one;
+        assert!((dilation - det).abs() < 1e-9, "{dilation} {det}");
     }
 }

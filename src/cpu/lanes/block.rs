@@ -9,13 +9,13 @@ use glam::DVec3;
 use pulp::Arch;
 
 use super::nodes::{NODE, NodeLines};
+use super::opening::{LaneOpening, OpeningInLanes};
 use super::rows::{CellRows, gather_rows};
 use super::shapes::BentColumns;
 use super::{LaneMaterial, WIDEST, materials_of, threads_for};
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
 use crate::engine::elements::{CellMeasure, Elements};
-use crate::material::regular::Polynomial;
 use crate::material::stretches::Powers;
 use crate::mesh::BlockMesh;
 use crate::model::Model;
@@ -89,6 +89,7 @@ pub struct LaneBlock {
     places: Vec<f32>,
     lines: Vec<f32>,
     nodes: NodeLines,
+    opening: Option<LaneOpening>,
 }
 
 impl LaneBlock {
@@ -114,7 +115,10 @@ impl LaneBlock {
         }
         let mixed = mixed_rows(model, block, &materials, stride);
         let lines = (ny + 1) * (nz + 1) * stride;
+        let nodes = NodeLines::new(model, nx + 1, stride);
+        let opening = |plan| LaneOpening::new(model, block, plan, &materials, |node| nodes.first_number(node));
         Ok(LaneBlock {
+            opening: model.opening().map(opening),
             grid: Grid {
                 arch: Arch::new(),
                 cells,
@@ -139,7 +143,7 @@ impl LaneBlock {
             team: Team::new(threads_for(block.cell_count())),
             places: vec![0.0; lines * PLACE],
             lines: vec![0.0; ny * nz * LINES * stride],
-            nodes: NodeLines::new(model, nx + 1, stride),
+            nodes,
         })
     }
 
@@ -148,9 +152,15 @@ impl LaneBlock {
         &self.team
     }
 
-    /// Law of a material, where it is a polynomial.
-    pub fn law(&self, material: usize) -> Option<Polynomial> {
-        self.grid.materials[material].polynomial()
+    /// What carries tissue beside an opened path.
+    pub fn opening(&mut self) -> Option<OpeningInLanes<'_>> {
+        let LaneBlock { opening, team, nodes, .. } = self;
+        opening.as_mut().map(|opening| OpeningInLanes {
+            opening,
+            team,
+            stride: nodes.stride(),
+            numbers: &mut nodes.numbers,
+        })
     }
 
     /// Numbers of the nodes.
@@ -168,11 +178,12 @@ impl LaneBlock {
         4 * (self.places.len() + self.lines.len() + self.grid.on_edge.len() + self.grid.mixed.len())
             + self.grid.bent.as_ref().map_or(0, BentColumns::bytes)
             + self.nodes.bytes()
+            + self.opening.as_ref().map_or(0, LaneOpening::bytes)
     }
 
     /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it).
     pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3], stiffness: &[f64]) {
-        let LaneBlock { grid, team, places, lines, nodes } = self;
+        let LaneBlock { grid, team, places, lines, nodes, .. } = self;
         let (stride, [_, ny, nz]) = (grid.stride, grid.cells);
         let stiffness = left_by_a_path(stiffness);
         let rows = CellRows { grid, places, model, elements, displacement, stiffness };

@@ -7,6 +7,7 @@ mod block;
 mod measure;
 mod nodes;
 mod number;
+pub(super) mod opening;
 mod rows;
 mod shapes;
 mod tet_vectors;
@@ -16,6 +17,7 @@ use glam::DVec3;
 
 use self::block::LaneBlock;
 use self::nodes::NodeLines;
+use self::opening::OpeningInLanes;
 use self::tets::LaneTets;
 use super::integrate_nodes::{NodeStep, NodeSums};
 use super::team::Team;
@@ -75,11 +77,11 @@ impl LaneCells {
         }
     }
 
-    /// Law of a material, where it is a polynomial.
-    pub fn law(&self, material: usize) -> Option<Polynomial> {
+    /// What carries tissue beside an opened path, and its numbers of the nodes; `None`: there is none, or f64 does it.
+    pub fn opening(&mut self) -> Option<OpeningInLanes<'_>> {
         match self {
-            LaneCells::Block(cells) => cells.law(material),
-            LaneCells::Tets(cells) => cells.law(material),
+            LaneCells::Block(cells) => cells.opening(),
+            LaneCells::Tets(_) => None,
         }
     }
 

@@ -64,8 +64,13 @@ impl NodeLines {
             + size_of_val(self.copies.as_slice())
     }
 
+    /// f32 of a row.
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
     /// Where the first number of a node stands; the next follow a row later each.
-    fn first_number(&self, node: usize) -> usize {
+    pub fn first_number(&self, node: usize) -> usize {
         node / self.width * NODE * self.stride + node % self.width
     }
 

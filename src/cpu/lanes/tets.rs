@@ -15,7 +15,6 @@ use super::{LaneMaterial, WIDEST, materials_of, threads_for};
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
 use crate::engine::elements::{Elements, cells_of_nodes};
-use crate::material::regular::Polynomial;
 use crate::mesh::TetMesh;
 use crate::model::Model;
 
@@ -213,11 +212,6 @@ impl LaneTets {
     /// The threads that its stages share.
     pub fn team(&self) -> &Team {
         &self.team
-    }
-
-    /// Law of a material, where it is a polynomial.
-    pub fn law(&self, material: usize) -> Option<Polynomial> {
-        self.shapes.materials[material].polynomial()
     }
 
     /// Numbers of the nodes.
