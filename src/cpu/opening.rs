@@ -82,14 +82,13 @@ fn within(stations: &[Station], near: &NearCell) -> Station {
 impl CpuEngine {
     /// Where all stations are.
     fn stations_now(&self, plan: &PuncturePlan, opening: &OpeningPlan, tip: DVec3) -> Vec<Now> {
-        let mesh = self.model.mesh.block();
-        let (u, a) = (&self.state.displacement, self.state.tip_coordinate);
+        let (rest, u, a) = (&self.rest, &self.state.displacement, self.state.tip_coordinate);
         let t = plan.path.direction;
         let shift = plan.contact.as_ref().map_or(0.0, |c| c.part(a)) * self.state.touch.dimple;
         let mut now = self.each(opening.stations.len(), |i| {
             let station = &opening.stations[i];
-            let centre = mean_place(&station.centre, &station.nodes, mesh, u);
-            let behind = (tip - mean_place(&station.disc, &station.nodes, mesh, u)).dot(t) - shift;
+            let centre = mean_place(&station.centre, &station.nodes, rest, u);
+            let behind = (tip - mean_place(&station.disc, &station.nodes, rest, u)).dot(t) - shift;
             let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.map.shaft));
             let (full, slope) = (radius * opened, rate * opened);
             let (cut, cut_rate) = opening.cut(station, a);

@@ -384,14 +384,14 @@ fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: 
     cells
 }
 
-/// Mean of `y = X + u` over nodes.
-pub fn mean_place(mean: &Mean, nodes: &[u32], mesh: &BlockMesh, u: &[DVec3]) -> DVec3 {
-    mean.iter()
-        .map(|(place, w)| {
-            let node = nodes[*place as usize] as usize;
-            (mesh.rest_position(node) + u[node]) * *w
-        })
-        .sum()
+/// Mean of `y = X + u` over nodes, from the rest positions and displacements of all.
+pub fn mean_place(mean: &Mean, nodes: &[u32], rest: &[DVec3], u: &[DVec3]) -> DVec3 {
+    let mut sum = DVec3::ZERO;
+    for (place, w) in mean {
+        let node = nodes[*place as usize] as usize;
+        sum += (rest[node] + u[node]) * *w;
+    }
+    sum
 }
 
 impl PathPoint {

@@ -6,7 +6,7 @@
 //! a second pass adds the four rows around every line.
 
 use glam::DVec3;
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::nodes::{NODE, NodeLines};
 use super::opening::{LaneOpening, OpeningInLanes};
@@ -216,7 +216,7 @@ impl LaneBlock {
     pub fn take(&mut self, displacement: &[DVec3]) {
         let (stride, width) = (self.grid.stride, self.grid.cells[0] + 1);
         for (places, u) in self.places.chunks_exact_mut(PLACE * stride).zip(displacement.chunks(width)) {
-            set_places(stride, places, u);
+            set_places(self.grid.arch, stride, places, u);
         }
     }
 
@@ -224,8 +224,9 @@ impl LaneBlock {
     pub fn integrate(&mut self, step: &NodeStep, u: &mut [DVec3], v: &mut [DVec3]) -> Vec<NodeSums> {
         let stride = self.grid.stride;
         let places = self.places.chunks_exact_mut(PLACE * stride);
-        let keep = |places: &mut [f32], u: &[DVec3]| set_places(stride, places, u);
-        self.nodes.integrate(self.grid.arch, &self.team, step, (u, v), (places.collect(), keep))
+        let arch = self.grid.arch;
+        let keep = |places: &mut [f32], u: &[DVec3]| set_places(arch, stride, places, u);
+        self.nodes.integrate(arch, &self.team, step, (u, v), (places.collect(), keep))
     }
 }
 
@@ -259,16 +260,36 @@ fn mixed_rows(model: &Model, block: &BlockMesh, materials: &[LaneMaterial], stri
 }
 
 /// Keeps the displacement of a line of nodes as `u = high + low`.
-fn set_places(stride: usize, places: &mut [f32], displacement: &[DVec3]) {
-    // Adding what has digits of 2^-20 m, and of 2^-44 m, rounds to them.
-    const ROUNDED: f32 = 12.0;
-    const FINE: f32 = 1.5 / (1 << 21) as f32;
-    for (axis, both) in places.chunks_exact_mut(2 * stride).enumerate() {
-        let (high, low) = both.split_at_mut(stride);
-        for ((high, low), u) in high.iter_mut().zip(low).zip(displacement) {
-            let u = u[axis];
-            *high = (u as f32 + ROUNDED) - ROUNDED;
-            *low = ((u - f64::from(*high)) as f32 + FINE) - FINE;
+fn set_places(arch: Arch, stride: usize, places: &mut [f32], displacement: &[DVec3]) {
+    arch.dispatch(SetPlaces { stride, places, displacement });
+}
+
+struct SetPlaces<'a> {
+    stride: usize,
+    places: &'a mut [f32],
+    displacement: &'a [DVec3],
+}
+
+impl WithSimd for SetPlaces<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        // Adding what has digits of 2^-20 m, and of 2^-44 m, rounds to them.
+        const ROUNDED: f32 = 12.0;
+        const FINE: f32 = 1.5 / (1 << 21) as f32;
+        let SetPlaces { stride, places, displacement } = self;
+        let count = displacement.len();
+        let numbers: &[f64] = bytemuck::cast_slice(displacement);
+        for axis in 0..3 {
+            let (high, low) = places[2 * axis * stride..][..2 * stride].split_at_mut(stride);
+            let (high, low) = (&mut high[..count], &mut low[..count]);
+            for i in 0..count {
+                let u = numbers[3 * i + axis];
+                let rounded = (u as f32 + ROUNDED) - ROUNDED;
+                high[i] = rounded;
+                low[i] = ((u - f64::from(rounded)) as f32 + FINE) - FINE;
+            }
         }
     }
 }

@@ -78,16 +78,26 @@ pub(in crate::cpu) struct LaneOpening {
     out: Out,
 }
 
+/// How far lanes have come with a group.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Found {
+    /// The path is not open there: nothing acts.
+    Closed,
+    Known,
+    /// A state that these forms do not know.
+    Unknown,
+}
+
 /// What a step has found.
 #[derive(Default)]
 struct Out {
     /// [`POINT_SUMS`] rows per cluster.
     points: Vec<f32>,
-    /// Per cluster: true where it was computed or is nothing, and force (as f_int) [N] and bound [N/m] of the corners.
-    clusters: Vec<(bool, [(DVec3, f64); SIGNS])>,
+    /// Per cluster: force (as f_int) [N] and bound [N/m] of the corners.
+    clusters: Vec<(Found, [(DVec3, f64); SIGNS])>,
     /// [`CELL_SUMS`] rows per vector of cells.
     cells: Vec<f32>,
-    known: Vec<bool>,
+    vectors: Vec<Found>,
 }
 
 /// Derivatives of the energy of points by what their station is.
@@ -237,9 +247,9 @@ impl LaneOpening {
             has_c01: materials.iter().any(|m| m.law.c01 != 0.0),
             out: Out {
                 points: vec![0.0; clusters.len() * POINT_SUMS * WIDEST],
-                clusters: vec![(true, [(DVec3::ZERO, 0.0); SIGNS]); clusters.len()],
+                clusters: vec![(Found::Closed, [(DVec3::ZERO, 0.0); SIGNS]); clusters.len()],
                 cells: vec![0.0; vectors * CELL_SUMS * WIDEST],
-                known: vec![true; vectors],
+                vectors: vec![Found::Closed; vectors],
             },
             clusters,
             points,
@@ -281,13 +291,13 @@ impl LaneOpening {
         team.map(clusters, |number, (corners, sums)| {
             self.arch.dispatch(SomeClusters { step, first: number * part, corners, sums });
         });
-        let part = team.part(out.known.len());
-        let cells = out.known.chunks_mut(part).zip(out.cells.chunks_mut(part * CELL_SUMS * WIDEST));
-        team.map(cells, |number, (known, sums)| {
-            self.arch.dispatch(SomeCells { step, first: number * part, known, sums });
+        let part = team.part(out.vectors.len());
+        let cells = out.vectors.chunks_mut(part).zip(out.cells.chunks_mut(part * CELL_SUMS * WIDEST));
+        team.map(cells, |number, (found, sums)| {
+            self.arch.dispatch(SomeCells { step, first: number * part, found, sums });
         });
-        let unknown = out.clusters.iter().enumerate().filter(|(_, c)| !c.0).map(|(i, _)| i).collect();
-        let cells = out.known.iter().enumerate().filter(|(_, known)| !**known);
+        let unknown = out.clusters.iter().enumerate().filter(|(_, c)| c.0 == Found::Unknown).map(|(i, _)| i).collect();
+        let cells = out.vectors.iter().enumerate().filter(|(_, found)| **found == Found::Unknown);
         let cells = cells.flat_map(|(i, _)| i * WIDEST..((i + 1) * WIDEST).min(self.cells.len())).collect();
         self.out = out;
         [unknown, cells]
@@ -315,7 +325,8 @@ impl LaneOpening {
 
     /// Calls `add` with nodes, forces (as f_int) [N] and bounds [N/m] of the points of every cluster.
     pub fn at_corners(&self, mut add: impl FnMut(usize, DVec3, f64)) {
-        for (cluster, (_, corners)) in self.clusters.iter().zip(&self.out.clusters) {
+        let found = self.clusters.iter().zip(&self.out.clusters);
+        for (cluster, (_, corners)) in found.filter(|(_, (found, _))| *found == Found::Known) {
             for (node, (force, bound)) in cluster.nodes.iter().zip(corners) {
                 add(*node as usize, *force, *bound);
             }
@@ -328,7 +339,7 @@ impl LaneOpening {
         let mut spans: Vec<_> = self.spans.iter().map(|span| (*span, PointSums::default())).collect();
         let over_shaft = 1.0 / self.shaft;
         for (vector, cells) in self.cells.chunks(WIDEST).enumerate() {
-            if !self.out.known[vector] {
+            if self.out.vectors[vector] != Found::Known {
                 continue;
             }
             let rows = &self.out.cells[vector * CELL_SUMS * WIDEST..][..CELL_SUMS * WIDEST];
@@ -436,7 +447,7 @@ impl Gathered {
 struct SomeClusters<'a> {
     step: Step<'a>,
     first: usize,
-    corners: &'a mut [(bool, [(DVec3, f64); SIGNS])],
+    corners: &'a mut [(Found, [(DVec3, f64); SIGNS])],
     sums: &'a mut [f32],
 }
 
@@ -449,26 +460,25 @@ impl WithSimd for SomeClusters<'_> {
         let map = step.plan.map.in_radii(Lanes::splat(simd, 0.0));
         for i in 0..corners.len() {
             let sums = &mut sums[i * POINT_SUMS * WIDEST..(i + 1) * POINT_SUMS * WIDEST];
-            let (is_known, at_corners) = &mut corners[i];
-            *is_known = cluster_forces(simd, &step, &map, first + i, sums, at_corners);
+            let (found, at_corners) = &mut corners[i];
+            *found = cluster_forces(simd, &step, &map, first + i, (*found, sums), at_corners);
         }
     }
 }
 
-/// Forces of the points of a cluster; false where one has left the range of these forms.
+/// Forces of the points of a cluster; `before`: what the last step found there.
 #[inline(always)]
 fn cluster_forces<S: Simd>(
     simd: S,
     step: &Step,
     map: &MapIn<Lanes<S>>,
     number: usize,
-    out: &mut [f32],
+    (before, out): (Found, &mut [f32]),
     at_corners: &mut [(DVec3, f64); SIGNS],
-) -> bool {
+) -> Found {
     let all = step.all;
     let cluster = &all.clusters[number];
-    *at_corners = [(DVec3::ZERO, 0.0); SIGNS];
-    let Some(law) = &all.materials[cluster.material] else { return false };
+    let Some(law) = &all.materials[cluster.material] else { return Found::Unknown };
     let over_shaft = 1.0 / all.shaft;
     let first = step.u[cluster.nodes[0] as usize];
     let mut path = Gathered::new();
@@ -477,8 +487,10 @@ fn cluster_forces<S: Simd>(
         path.set(lane, station, cluster.origin + first, over_shaft);
     }
     if !path.is_any_open {
-        out.fill(0.0);
-        return true;
+        if before != Found::Closed {
+            out.fill(0.0);
+        }
+        return Found::Closed;
     }
     // u = sum of modes times products of the place in the cell, by the bits of its factors; in radii.
     let mut modes = [DVec3::ZERO; SIGNS];
@@ -532,7 +544,7 @@ fn cluster_forces<S: Simd>(
             h[1][axis] = by_y * over_edges[1];
             h[2][axis] = by_z * over_edges[2];
         }
-        let Some(point) = opened(map, &beside, &h, &law, bulk, step.measures) else { return false };
+        let Some(point) = opened(map, &beside, &h, &law, bulk, step.measures) else { return Found::Unknown };
         let Opened { d, energy, closed, straight, turned, by_gradient, by_place, distance } = point;
         let grown = distance.mul_add(by_place, by_gradient);
         let stiffness = (straight * grown * grown + turned * squared_norm_bound(&closed.cofactor())) * open;
@@ -586,7 +598,7 @@ fn cluster_forces<S: Simd>(
     for bits in 0..SIGNS {
         at_corners[bits] = (forces[bits], f64::from(bounds[bits].sum()));
     }
-    true
+    Found::Known
 }
 
 /// What opening adds at places, per volume, and what bounds of the stiffness need.
@@ -636,7 +648,7 @@ fn opened<N: Number>(
 struct SomeCells<'a> {
     step: Step<'a>,
     first: usize,
-    known: &'a mut [bool],
+    found: &'a mut [Found],
     sums: &'a mut [f32],
 }
 
@@ -645,18 +657,18 @@ impl WithSimd for SomeCells<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let SomeCells { step, first, known, sums } = self;
+        let SomeCells { step, first, found, sums } = self;
         let map = step.plan.map.in_radii(Lanes::splat(simd, 0.0));
-        for i in 0..known.len() {
+        for i in 0..found.len() {
             let sums = &mut sums[i * CELL_SUMS * WIDEST..(i + 1) * CELL_SUMS * WIDEST];
-            known[i] = cell_vector(simd, &step, &map, first + i, sums);
+            found[i] = cell_vector(simd, &step, &map, first + i, sums);
         }
     }
 }
 
-/// Cells from `number` times [`WIDEST`] on; false where one has left the range of these forms.
+/// Cells from `number` times [`WIDEST`] on.
 #[inline(always)]
-fn cell_vector<S: Simd>(simd: S, step: &Step, map: &MapIn<Lanes<S>>, number: usize, out: &mut [f32]) -> bool {
+fn cell_vector<S: Simd>(simd: S, step: &Step, map: &MapIn<Lanes<S>>, number: usize, out: &mut [f32]) -> Found {
     let all = step.all;
     let cells = &all.cells[number * WIDEST..((number + 1) * WIDEST).min(all.cells.len())];
     let over_shaft = 1.0 / all.shaft;
@@ -684,18 +696,17 @@ fn cell_vector<S: Simd>(simd: S, step: &Step, map: &MapIn<Lanes<S>>, number: usi
         path.set(lane, span, cell.middle + ((e0 + e1) + (e2 + e3)) * 0.125, over_shaft);
     }
     if !path.is_any_open {
-        out.fill(0.0);
-        return true;
+        return Found::Closed;
     }
     let constants = &all.constants[number * CELL * WIDEST..(number + 1) * CELL * WIDEST];
     let mut at = 0;
     while at < cells.len() {
         if !cell_lanes(simd, step, map, (constants, &path, &gradients), at, out) {
-            return false;
+            return Found::Unknown;
         }
         at += Lanes::<S>::COUNT;
     }
-    true
+    Found::Known
 }
 
 /// Adds what acts at the place `offset` from the middle of a cell.
@@ -710,7 +721,7 @@ fn add_at<N: Number>(sum: &mut Derivatives<N>, place: [N; 3], offset: [N; 3]) {
     }
 }
 
-/// One vector of cells.
+/// One vector of cells; false where one has left the range of these forms.
 #[inline(always)]
 fn cell_lanes<S: Simd>(
     simd: S,
