@@ -195,7 +195,7 @@ const COARSE: &str = "tissue.cell_size_mm=0.9";
 const FAST: &str = "motion.phase.0.speed_mm_s=10.0";
 
 /// Scenes with layers, friction, cohesive faces, opened paths, free paths, a hollow and a bent needle, an indenter and driven faces: short.
-const SCENES: [(&str, &[&str]); 11] = [
+const SCENES: [(&str, &[&str]); 13] = [
     ("anatomy/neck_vein.toml", &["tissue.cell_size_mm=1.8"]),
     ("lv2022/hollow.toml", &[COARSE, FAST]),
     (
@@ -203,6 +203,28 @@ const SCENES: [(&str, &[&str]); 11] = [
         &["tissue.cell_size_mm=1.6", "motion.phase.0.depth_mm=5.0", "motion.phase.0.speed_mm_s=10.0"],
     ),
     ("opening.toml", &["tissue.cell_size_mm=1.6", "motion.phase.0.depth_mm=7.0", "motion.phase.0.speed_mm_s=10.0"]),
+    // A path across the cells.
+    (
+        "opening.toml",
+        &[
+            "tissue.cell_size_mm=1.3",
+            "motion.phase.0.depth_mm=7.0",
+            "motion.phase.0.speed_mm_s=10.0",
+            "motion.angle_deg=25.0",
+            "motion.azimuth_deg=40.0",
+        ],
+    ),
+    // A law that the points know in f64 only.
+    (
+        "opening.toml",
+        &[
+            "tissue.cell_size_mm=1.6",
+            "material.preset=nerve",
+            "material.toughness_j_m2=164.0",
+            "motion.phase.0.depth_mm=5.0",
+            "motion.phase.0.speed_mm_s=10.0",
+        ],
+    ),
     ("layers.toml", &["tissue.cell_size_mm=1.6"]),
     // A layer of Ogden's law among polynomial ones.
     ("layers.toml", &["tissue.cell_size_mm=1.6", "region.1.material.preset=nerve"]),
@@ -286,9 +308,11 @@ fn cells_are_measured_as_by_the_f64_engine() {
 #[test]
 fn no_bit_hangs_on_the_number_of_threads() {
     // Cells enough for seven threads.
-    for (name, cell) in
-        [("muscle_biopsy.toml", "tissue.cell_size_mm=0.65"), ("lv2022/hollow.toml", "tissue.cell_size_mm=0.7")]
-    {
+    for (name, cell) in [
+        ("muscle_biopsy.toml", "tissue.cell_size_mm=0.65"),
+        ("lv2022/hollow.toml", "tissue.cell_size_mm=0.7"),
+        ("opening.toml", "tissue.cell_size_mm=0.52"),
+    ] {
         let state = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {

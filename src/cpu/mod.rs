@@ -17,7 +17,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 use lanes::LaneCells;
 pub use lanes::unknown_to_lanes;
-use needle_contact::NearNodes;
+use needle_contact::{NearNodes, NodeLoads};
 use rayon::prelude::*;
 
 use crate::effects::adhesion::Bond;
@@ -80,6 +80,7 @@ pub struct CpuEngine {
     contact_energy: f64,
     /// Contact nodes of a free path that are looked at.
     near: Option<NearNodes>,
+    tip_loads: NodeLoads,
     /// In the scheme `opening`: how far the tip advanced in this step, and how far the dimple shifted the path with it [m].
     advanced: [f64; 2],
     /// True in the last step of a frame, at which energies are told.
@@ -169,6 +170,7 @@ impl CpuEngine {
             tip_sway: DVec3::ZERO,
             contact_energy: 0.0,
             near: NearNodes::of(&model),
+            tip_loads: NodeLoads::default(),
             advanced: [0.0; 2],
             measures: false,
             opening_elastic: 0.0,

@@ -1,7 +1,5 @@
 //! Stage `needle_contact` in f64. Equations: src/effects/puncture.rs, src/needle/gap.rs.
 
-use std::collections::HashMap;
-
 use glam::DVec3;
 
 use super::needle_touch::Needle;
@@ -9,7 +7,7 @@ use super::slit_contact::SlitContact;
 use super::{ContactSums, CpuEngine};
 use crate::effects::friction::stick_or_slide;
 use crate::engine::{ContactState, State};
-use crate::model::{ANCHOR_COUNT, Model, PuncturePlan};
+use crate::model::{ANCHOR_COUNT, ContactSurface, Model, PuncturePlan};
 use crate::needle::gap::Profile;
 use crate::needle::{ToolPose, swing};
 
@@ -45,12 +43,58 @@ impl NearNodes {
     }
 }
 
+/// What the springs of the tip do to a node.
+#[derive(Debug, Clone, Copy)]
+struct NodeLoad {
+    node: usize,
+    /// [N], [N/m]
+    force: DVec3,
+    stiffness: f64,
+}
+
+/// Loads of the few nodes that carry the tip.
+#[derive(Debug, Default)]
+pub(super) struct NodeLoads {
+    list: Vec<NodeLoad>,
+    /// One more than the place in the list, of every node; 0 for none.
+    places: Vec<u32>,
+}
+
+impl NodeLoads {
+    /// Takes all loads away, of a mesh of so many nodes.
+    fn clear(&mut self, nodes: usize) {
+        self.places.resize(nodes, 0);
+        for load in self.list.drain(..) {
+            self.places[load.node] = 0;
+        }
+    }
+
+    /// The load of a node, begun where there is none.
+    fn at(&mut self, node: usize) -> &mut NodeLoad {
+        if self.places[node] == 0 {
+            self.list.push(NodeLoad { node, force: DVec3::ZERO, stiffness: 0.0 });
+            self.places[node] = self.list.len() as u32;
+        }
+        &mut self.list[self.places[node] as usize - 1]
+    }
+
+    /// The load of a node that has one.
+    fn of(&self, node: usize) -> Option<&NodeLoad> {
+        self.list.get((self.places[node] as usize).wrapping_sub(1))
+    }
+
+    fn nodes(&self) -> impl Iterator<Item = usize> {
+        self.list.iter().map(|load| load.node)
+    }
+}
+
 impl CpuEngine {
     /// Stage `needle_contact`: nodes of the ring that the tip has passed stay outside the opened path (potential
     /// `1/2 k phi^2`, see `needle::gap`); friction on the shaft; tip springs.
     pub(super) fn needle_contact(&mut self, plan: &PuncturePlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
-        let tip_loads = self.tip_loads(plan, pose);
+        let mut tip_loads = std::mem::take(&mut self.tip_loads);
+        self.load_tip(plan, pose, &mut tip_loads);
         let centre_line = self.centre_line;
         let line = centre_line.as_ref().map(|l| (l, (step - l.first_step) as f64 * self.dt));
         let turned = swing(plan.path.direction, pose.direction, plan.profile.shift);
@@ -66,9 +110,16 @@ impl CpuEngine {
             let (contact, memory) = (&model.contact_nodes[index], &mut memories[index]);
             let node = contact.node as usize;
             let mut sums = ContactSums::default();
-            if let Some((force, stiffness)) = tip_loads.get(&node) {
-                sums.tip = *force;
-                self.added_bound[node] += stiffness;
+            match tip_loads.of(node) {
+                Some(load) => {
+                    sums.tip = load.force;
+                    self.added_bound[node] += load.stiffness;
+                }
+                // What only carries the tip of a planned path, and carries nothing.
+                None if !contact.pushed && plan.free.is_none() && contact.surface == ContactSurface::OpenedPath => {
+                    continue;
+                }
+                None => {}
             }
             let rest = self.rest[node];
             let lever = rest + displacement[node] - pose.tip;
@@ -119,6 +170,7 @@ impl CpuEngine {
             }
         }
         self.contact_energy = stored;
+        self.tip_loads = tip_loads;
         if let Some(near) = &mut self.near {
             near.keep(&looked_at, memories);
         }
@@ -126,7 +178,7 @@ impl CpuEngine {
 
     /// Numbers of the contact nodes that the needle may have to do with, in their order: all of them on a planned path; on a free one, where
     /// every node is a contact node, what is not far from it, what it has touched or passed, and what carries the tip.
-    fn nodes_at_needle(&mut self, needle: &Needle, tip_loads: &HashMap<usize, (DVec3, f64)>) -> Vec<u32> {
+    fn nodes_at_needle(&mut self, needle: &Needle, tip_loads: &NodeLoads) -> Vec<u32> {
         let count = needle.model.contact_nodes.len();
         let all = || (0..count as u32).collect::<Vec<u32>>();
         // A needle that bends is near to nothing along a straight line.
@@ -148,29 +200,28 @@ impl CpuEngine {
             self.in_ranges(count, |range| range.filter(is_near).map(|index| index as u32).collect::<Vec<u32>>());
         let mut all: Vec<u32> = found.into_iter().flatten().collect();
         all.extend(&near.busy);
-        all.extend(tip_loads.keys().map(|node| near.of_node[*node]).filter(|index| *index != NO_CONTACT));
+        all.extend(tip_loads.nodes().map(|node| near.of_node[node]).filter(|index| *index != NO_CONTACT));
         all.sort_unstable();
         all.dedup();
         self.near = Some(near);
         all
     }
 
-    /// Force [N] and stiffness [N/m] of the tip springs at the nodes that they act on.
-    fn tip_loads(&self, plan: &PuncturePlan, pose: &ToolPose) -> HashMap<usize, (DVec3, f64)> {
+    /// Finds force and stiffness of the tip springs at the nodes that they act on.
+    fn load_tip(&self, plan: &PuncturePlan, pose: &ToolPose, loads: &mut NodeLoads) {
         let count = if plan.anchors.is_empty() { ANCHOR_COUNT } else { plan.anchors.len() };
         let spring = plan.params.tip_stiffness / count as f64;
-        let mut loads: HashMap<usize, (DVec3, f64)> = HashMap::new();
+        loads.clear(self.rest.len());
         for (force, nodes, weights) in &self.tip_forces {
             let acts = if plan.free.is_some() { self.state.tip.inside } else { *force != 0.0 };
             for (n, w) in nodes.iter().zip(weights) {
-                let load = loads.entry(*n).or_default();
-                load.0 += (pose.direction * *force + self.tip_sway) * *w;
+                let load = loads.at(*n);
+                load.force += (pose.direction * *force + self.tip_sway) * *w;
                 // Of how many springs, first.
-                load.1 += if acts { *w } else { 0.0 };
+                load.stiffness += if acts { *w } else { 0.0 };
             }
         }
-        loads.values_mut().for_each(|load| load.1 *= spring);
-        loads
+        loads.list.iter_mut().for_each(|load| load.stiffness *= spring);
     }
 
     /// Shares the impulses of the frame over the entries of the centre-line, by where the nodes are at its end.

@@ -1,7 +1,5 @@
 //! Stage `opening` in f64: tissue beside the path of the needle, carried by points. Equations: src/needle/opening.rs.
 
-use glam::{DMat3, DVec3};
-
 use super::lanes::opening::{OpeningInLanes, PointSums};
 use super::{ContactSums, CpuEngine};
 use crate::engine::elements::{CellForces, CellShape};
@@ -16,6 +14,7 @@ use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
 use crate::needle::centre_line::Bend;
 use crate::needle::opening::{Derivatives, Opening, Station, outer, squared_norm_bound};
+use glam::{DMat3, DVec3};
 
 /// What is derived of one station: of the energy E.
 #[derive(Debug, Clone, Copy, Default)]
@@ -171,14 +170,14 @@ impl CpuEngine {
         let CpuEngine { lanes, state, external, added_bound, .. } = self;
         let OpeningInLanes { opening: lanes, team, numbers, stride } = lanes.as_mut()?.opening()?;
         let displacement = &state.displacement;
-        let [clusters, cells] = lanes.compute(team, opening, sections, displacement, measures);
-        for number in clusters {
-            for (lane, (station, index)) in opening.clusters[number].points.iter().enumerate() {
-                let (section, station) = (&sections[*station], &opening.stations[*station]);
+        let [vectors, cells] = lanes.compute(team, opening, sections, displacement, measures);
+        for number in vectors {
+            for (lane, (station, index)) in lanes.points_of(number).to_vec().into_iter().enumerate() {
+                let (section, station) = (&sections[station], &opening.stations[station]);
                 let mut found = PointSums::default();
                 if section.radius > 0.0 {
                     let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
-                    let point = &station.points[*index];
+                    let point = &station.points[index];
                     let (d, energy) =
                         point_force(shape(point.cell), opening, point, section, &u, |place, force, bound| {
                             let node = station.nodes[place] as usize;
@@ -195,10 +194,14 @@ impl CpuEngine {
             added_bound[node] += bound;
         });
         let lanes = &*lanes;
-        let mut sums: Vec<StationSums> =
-            team.each(sections.len(), |i| lanes.of_station(i)).iter().map(StationSums::from).collect();
+        // What is not open adds nothing.
+        let of_station = |i: usize| match sections[i].radius > 0.0 {
+            true => lanes.of_station(i),
+            false => PointSums::default(),
+        };
+        let mut sums: Vec<StationSums> = team.each(sections.len(), of_station).iter().map(StationSums::from).collect();
         let mut elastic: f64 = sums.iter().map(|s| s.energy).sum();
-        for ((first, count), found) in lanes.cells_at_nodes(numbers, stride) {
+        for ((first, count), found) in lanes.cells_at_nodes(team, numbers, stride) {
             elastic += found.energy;
             let found = StationSums::from(&found.times(1.0 / f64::from(count)));
             for sums in &mut sums[usize::from(first)..][..usize::from(count)] {
@@ -260,16 +263,16 @@ impl CpuEngine {
             let Guide { force: guide, held, .. } = guides[i];
             stored += guides[i].stored;
             let spread = spreads[i];
-            let mean_velocity: DVec3 =
-                station.disc.iter().map(|(p, w)| velocity[station.nodes[usize::from(*p)] as usize] * *w).sum();
             let mut rubbing = 0.0;
             let memory = &mut self.state.stations[i];
             let on_shaft =
                 crate::effects::friction::part_on_shaft(n.behind, opening.tip_length, friction.fade_length) * n.cut;
             let squeeze = normal[i].max(0.0) * on_shaft;
             self.sums.shaft_normal_impulse += squeeze * self.dt;
-            if model.effects.friction.is_some() {
-                let limit = friction.coefficient * squeeze;
+            let limit = friction.coefficient * squeeze;
+            if model.effects.friction.is_some() && (limit > 0.0 || *memory != 0.0) {
+                let velocity_of = |(place, w): &(u16, f64)| velocity[station.nodes[usize::from(*place)] as usize] * *w;
+                let mean_velocity: DVec3 = station.disc.iter().map(velocity_of).sum();
                 let kt = friction.stiffness_ratio * opening.stick;
                 let motion = (mean_velocity - pose.velocity).dot(t) * self.dt;
                 let (old, trial) = (*memory, *memory + motion);
@@ -282,11 +285,11 @@ impl CpuEngine {
                 }
             }
             let along = t * (spread + rubbing);
-            for (place, w) in &station.disc {
+            for (place, w) in station.disc.iter().filter(|_| along != DVec3::ZERO) {
                 self.external[station.nodes[usize::from(*place)] as usize] += along * *w;
             }
             let across = guide - centre[i];
-            for (place, w) in &station.centre {
+            for (place, w) in station.centre.iter().filter(|_| across != DVec3::ZERO || held > 0.0) {
                 let node = station.nodes[usize::from(*place)] as usize;
                 self.external[node] += across * *w;
                 self.added_bound[node] += 2.0 * held * w;

@@ -89,7 +89,7 @@ pub struct LaneBlock {
     places: Vec<f32>,
     lines: Vec<f32>,
     nodes: NodeLines,
-    opening: Option<LaneOpening>,
+    opening: Option<Box<LaneOpening>>,
 }
 
 impl LaneBlock {
@@ -116,7 +116,8 @@ impl LaneBlock {
         let mixed = mixed_rows(model, block, &materials, stride);
         let lines = (ny + 1) * (nz + 1) * stride;
         let nodes = NodeLines::new(model, nx + 1, stride);
-        let opening = |plan| LaneOpening::new(model, block, plan, &materials, |node| nodes.first_number(node));
+        let first_number = |node| nodes.first_number(node);
+        let opening = |plan| Box::new(LaneOpening::new(model, block, plan, &materials, first_number));
         Ok(LaneBlock {
             opening: model.opening().map(opening),
             grid: Grid {
@@ -178,7 +179,7 @@ impl LaneBlock {
         4 * (self.places.len() + self.lines.len() + self.grid.on_edge.len() + self.grid.mixed.len())
             + self.grid.bent.as_ref().map_or(0, BentColumns::bytes)
             + self.nodes.bytes()
-            + self.opening.as_ref().map_or(0, LaneOpening::bytes)
+            + self.opening.as_ref().map_or(0, |opening| opening.bytes())
     }
 
     /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it).
@@ -280,16 +281,19 @@ impl WithSimd for SetPlaces<'_> {
         const FINE: f32 = 1.5 / (1 << 21) as f32;
         let SetPlaces { stride, places, displacement } = self;
         let count = displacement.len();
-        let numbers: &[f64] = bytemuck::cast_slice(displacement);
-        for axis in 0..3 {
-            let (high, low) = places[2 * axis * stride..][..2 * stride].split_at_mut(stride);
-            let (high, low) = (&mut high[..count], &mut low[..count]);
-            for i in 0..count {
-                let u = numbers[3 * i + axis];
-                let rounded = (u as f32 + ROUNDED) - ROUNDED;
-                high[i] = rounded;
-                low[i] = ((u - f64::from(rounded)) as f32 + FINE) - FINE;
-            }
+        let (x, rest) = places.split_at_mut(2 * stride);
+        let (y, z) = rest.split_at_mut(2 * stride);
+        let ((hx, lx), (hy, ly), (hz, lz)) = (x.split_at_mut(stride), y.split_at_mut(stride), z.split_at_mut(stride));
+        let (hx, hy, hz) = (&mut hx[..count], &mut hy[..count], &mut hz[..count]);
+        let (lx, ly, lz) = (&mut lx[..count], &mut ly[..count], &mut lz[..count]);
+        for i in 0..count {
+            let u = displacement[i];
+            hx[i] = (u.x as f32 + ROUNDED) - ROUNDED;
+            hy[i] = (u.y as f32 + ROUNDED) - ROUNDED;
+            hz[i] = (u.z as f32 + ROUNDED) - ROUNDED;
+            lx[i] = ((u.x - f64::from(hx[i])) as f32 + FINE) - FINE;
+            ly[i] = ((u.y - f64::from(hy[i])) as f32 + FINE) - FINE;
+            lz[i] = ((u.z - f64::from(hz[i])) as f32 + FINE) - FINE;
         }
     }
 }

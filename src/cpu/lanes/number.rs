@@ -29,12 +29,6 @@ impl<S: Simd> Lanes<S> {
         Lanes { simd, value: bytemuck::pod_read_unaligned(bytemuck::cast_slice(&values[at..at + Self::COUNT])) }
     }
 
-    /// Sum of the lanes.
-    #[inline(always)]
-    pub fn sum(self) -> f32 {
-        self.simd.reduce_sum_f32s(self.value)
-    }
-
     /// Writes the lanes from `at` on.
     #[inline(always)]
     pub fn store(self, values: &mut [f32], at: usize) {

@@ -1,0 +1,201 @@
+//! Cells around an opened path in lanes.
+
+// Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
+#![allow(clippy::needless_range_loop)]
+
+use glam::DVec3;
+use pulp::{Simd, WithSimd};
+
+use super::{CELL, CELL_SUMS, Found, Gathered, Lanes, Step, law_in_lanes, opened};
+use crate::cpu::lanes::WIDEST;
+use crate::cpu::lanes::shapes::SIGNS;
+use crate::material::number::Number;
+use crate::mesh::CORNERS;
+use crate::model::opening::{VOLUME_PLACE, is_volume_place};
+use crate::needle::opening::{Beside, Derivatives, MapIn, outer, squared_norm_bound};
+
+pub(super) struct SomeCells<'a> {
+    pub step: Step<'a>,
+    /// Number of the first vector.
+    pub first: usize,
+    pub found: &'a mut [Found],
+    pub sums: &'a mut [f32],
+}
+
+impl WithSimd for SomeCells<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let SomeCells { step, first, found, sums } = self;
+        let map = step.plan.map.in_radii(Lanes::splat(simd, 0.0));
+        for i in 0..found.len() {
+            let sums = &mut sums[i * CELL_SUMS * WIDEST..(i + 1) * CELL_SUMS * WIDEST];
+            found[i] = cell_vector(simd, &step, &map, first + i, sums);
+        }
+    }
+}
+
+/// Cells from `number` times [`WIDEST`] on.
+#[inline(always)]
+fn cell_vector<S: Simd>(simd: S, step: &Step, map: &MapIn<Lanes<S>>, number: usize, out: &mut [f32]) -> Found {
+    let all = step.all;
+    let cells = &all.cells[number * WIDEST..((number + 1) * WIDEST).min(all.cells.len())];
+    let over_shaft = 1.0 / all.shaft;
+    let mut path = Gathered::new();
+    let mut gradients = [[[0.0f32; WIDEST]; 3]; 3];
+    for lane in 0..cells.len() {
+        let cell = &cells[lane];
+        let span = &step.spans[usize::from(cell.span)];
+        if span.radius == 0.0 {
+            continue;
+        }
+        let mut u = [DVec3::ZERO; SIGNS];
+        for bits in 0..SIGNS {
+            u[bits] = step.u[cell.nodes[bits] as usize];
+        }
+        let (e0, e1, e2, e3) = (u[0] + u[1], u[2] + u[3], u[4] + u[5], u[6] + u[7]);
+        let by_x = ((u[1] - u[0]) + (u[3] - u[2])) + ((u[5] - u[4]) + (u[7] - u[6]));
+        let (by_y, by_z) = ((e1 - e0) + (e3 - e2), (e2 - e0) + (e3 - e1));
+        let columns = [by_x * cell.quarter.x, by_y * cell.quarter.y, by_z * cell.quarter.z];
+        for a in 0..3 {
+            for b in 0..3 {
+                gradients[a][b][lane] = columns[a][b] as f32;
+            }
+        }
+        path.set(lane, span, cell.middle + ((e0 + e1) + (e2 + e3)) * 0.125, over_shaft);
+    }
+    if !path.is_any_open {
+        return Found::Closed;
+    }
+    if !all.is_known[number] {
+        return Found::Unknown;
+    }
+    let constants = &all.constants[number * CELL * WIDEST..(number + 1) * CELL * WIDEST];
+    let mut at = 0;
+    while at < cells.len() {
+        if !cell_lanes(simd, step, map, (constants, &path, &gradients), at, out) {
+            return Found::Unknown;
+        }
+        at += Lanes::<S>::COUNT;
+    }
+    Found::Known
+}
+
+/// Adds what acts at the place `offset` from the middle of a cell.
+#[inline(always)]
+fn add_at<N: Number>(sum: &mut Derivatives<N>, place: [N; 3], offset: [N; 3]) {
+    let by_offset = outer(place, offset);
+    for a in 0..3 {
+        sum.place[a] = sum.place[a] + place[a];
+        for b in 0..3 {
+            sum.gradient[a][b] = sum.gradient[a][b] + by_offset[a][b];
+        }
+    }
+}
+
+/// One vector of cells; false where one has left the range of these forms.
+#[inline(always)]
+fn cell_lanes<S: Simd>(
+    simd: S,
+    step: &Step,
+    map: &MapIn<Lanes<S>>,
+    (constants, path, gradients): (&[f32], &Gathered, &[[[f32; WIDEST]; 3]; 3]),
+    at: usize,
+    out: &mut [f32],
+) -> bool {
+    let all = step.all;
+    let row = |row: usize| Lanes::load(simd, constants, row * WIDEST + at);
+    let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+    let open_lanes = Lanes::load(simd, &path.open, at);
+    let [width, place] = [[row(0), row(1), row(2)], [row(3), row(4), row(5)]];
+    let (volume, share, edge, b_squared) = (row(6) * open_lanes, row(7), row(8), row(9));
+    let law = law_in_lanes(simd, all, constants, 10, at);
+    let bulk = row(14);
+    let mut h = [[zero; 3]; 3];
+    for a in 0..3 {
+        for b in 0..3 {
+            h[a][b] = Lanes::load(simd, &gradients[a][b], at);
+        }
+    }
+    let middle = path.beside(simd, at);
+    // (I + h) applied to a place in the cell.
+    let mut sum = Derivatives::none(zero);
+    let mut offset = [zero; 3];
+    for a in 0..3 {
+        offset[a] = place[a]
+            + h[2][a].mul_add(place[2], h[1][a].mul_add(place[1], h[0][a].mul_add(place[0], middle.offset[a])));
+    }
+    let Some(shape) = opened(map, &Beside { offset, ..middle }, &h, &law, bulk, step.measures) else { return false };
+    let closed = &shape.closed;
+    let [closed_straight, closed_turned] = closed.tangent_bound(&law, bulk);
+    let shared = volume * share;
+    sum.add(&Derivatives { place: [zero; 3], ..shape.d }, shared);
+    let by_place = [shape.d.place[0] * shared, shape.d.place[1] * shared, shape.d.place[2] * shared];
+    add_at(&mut sum, by_place, place);
+    let mut energy = shape.energy * shared;
+    // Where points carry all of the shape nothing grows.
+    let little = Lanes::splat(simd, 1e-9);
+    let grown = share.choose(little, one, edge.mul_add(shape.by_place, shape.by_gradient).larger(one));
+    let straight = share.choose(little, closed_straight, closed_straight.larger(shape.straight));
+    let turned = share.choose(little, closed_turned, closed_turned.larger(shape.turned));
+    // The volume is the cell's, at four places.
+    let mut offsets = [[zero; 3]; 4];
+    let mut found = 0;
+    for corner in 0..SIGNS {
+        if is_volume_place(corner) {
+            for axis in 0..3 {
+                offsets[found][axis] =
+                    width[axis] * Lanes::splat(simd, (0.5 * VOLUME_PLACE * CORNERS[corner][axis]) as f32);
+            }
+            found += 1;
+        }
+    }
+    let mut dilations = [map.dilation(middle.offset, zero); 4];
+    let mut less = zero;
+    for i in 0..4 {
+        let o = offsets[i];
+        let mut seen = middle.offset;
+        for a in 0..3 {
+            seen[a] = o[a] + h[2][a].mul_add(o[2], h[1][a].mul_add(o[1], h[0][a].mul_add(o[0], seen[a])));
+        }
+        dilations[i] = map.dilation(seen, middle.radius);
+        less = less + dilations[i].less_one;
+    }
+    let quarter = Lanes::splat(simd, 0.25);
+    less = less * quarter;
+    let dj = closed.dj;
+    let j = one + dj;
+    let open = dj + less.mul_add(dj, less);
+    energy = (volume * quarter * (bulk + bulk)).mul_add((open - dj) * (open + dj), energy);
+    let cofactor = closed.cofactor();
+    let by_cofactor = bulk * less * (j + open) * volume;
+    for a in 0..3 {
+        for b in 0..3 {
+            sum.gradient[a][b] = cofactor[a][b].mul_add(by_cofactor, sum.gradient[a][b]);
+        }
+    }
+    let pressure = bulk * open * j * volume * quarter;
+    for i in 0..4 {
+        let (place, radius) = dilations[i].pull_back(pressure);
+        add_at(&mut sum, place, offsets[i]);
+        sum.radius = sum.radius + radius;
+    }
+    let cof_b = squared_norm_bound(&cofactor) * b_squared;
+    let widened = (one + less).larger(one);
+    let with = (bulk + turned) * cof_b * widened * widened + straight * grown * grown * b_squared;
+    let without = (bulk + closed_turned) * cof_b + closed_straight * b_squared;
+    let bound = Lanes::splat(simd, 8.0) * volume * (with - without).larger(zero);
+    for a in 0..3 {
+        for b in 0..3 {
+            sum.gradient[a][b].store(out, (3 * a + b) * WIDEST + at);
+        }
+        sum.place[a].store(out, (9 + a) * WIDEST + at);
+        sum.centre_rate[a].store(out, (12 + a) * WIDEST + at);
+    }
+    sum.radius.store(out, 15 * WIDEST + at);
+    sum.radius_rate.store(out, 16 * WIDEST + at);
+    energy.store(out, 17 * WIDEST + at);
+    bound.store(out, 18 * WIDEST + at);
+    true
+}

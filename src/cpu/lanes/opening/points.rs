@@ -1,0 +1,215 @@
+//! Points in lanes: what they do to the corners of their cells and to their stations.
+
+// Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
+#![allow(clippy::needless_range_loop)]
+
+use glam::DVec3;
+use pulp::{Simd, WithSimd};
+
+use super::{
+    AtCorners, Found, Gathered, LAW, Lanes, Opened, POINT, POINT_SUMS, ROOM, RUN_SUMS, STRIDES, Step, law_in_lanes,
+    opened,
+};
+use crate::cpu::lanes::WIDEST;
+use crate::cpu::lanes::rows::HOURGLASS;
+use crate::cpu::lanes::shapes::SIGNS;
+use crate::material::number::Number;
+use crate::needle::opening::{MapIn, squared_norm_bound};
+
+pub(super) struct SomePoints<'a> {
+    pub step: Step<'a>,
+    /// Number of the first vector.
+    pub first: usize,
+    pub found: &'a mut [Found],
+    /// Of the runs of these vectors.
+    pub runs: &'a mut [AtCorners],
+    pub sums: &'a mut [f32],
+}
+
+impl WithSimd for SomePoints<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let SomePoints { step, first, found, runs, sums } = self;
+        let map = step.plan.map.in_radii(Lanes::splat(simd, 0.0));
+        let all = step.all;
+        let first_run = all.vectors[first].first_run;
+        for i in 0..found.len() {
+            let sums = &mut sums[i * POINT_SUMS * WIDEST..(i + 1) * POINT_SUMS * WIDEST];
+            let end =
+                if first + i + 1 < all.vectors.len() { all.vectors[first + i + 1].first_run } else { all.runs.len() };
+            let runs = &mut runs[all.vectors[first + i].first_run - first_run..end - first_run];
+            found[i] = point_vector(simd, &step, &map, first + i, (found[i], sums), runs);
+        }
+    }
+}
+
+/// Forces of a vector of points; `before`: what the last step found there.
+#[inline(always)]
+fn point_vector<S: Simd>(
+    simd: S,
+    step: &Step,
+    map: &MapIn<Lanes<S>>,
+    number: usize,
+    (before, out): (Found, &mut [f32]),
+    at_corners: &mut [AtCorners],
+) -> Found {
+    let all = step.all;
+    let vector = &all.vectors[number];
+    let runs = &all.runs[vector.first_run..vector.first_run + at_corners.len()];
+    let over_shaft = 1.0 / all.shaft;
+    let mut is_open = false;
+    for lane in 0..vector.count {
+        is_open |= step.stations[usize::from(vector.stations[lane])].radius != 0.0;
+    }
+    if !is_open {
+        if before != Found::Closed {
+            out.fill(0.0);
+        }
+        return Found::Closed;
+    }
+    if !vector.is_known {
+        return Found::Unknown;
+    }
+    // u = sum of modes times products of the place in the cell, by the bits of its factors; in radii.
+    let mut path = Gathered::new();
+    let mut modes = [[[0.0f32; ROOM]; 3]; SIGNS];
+    for run in runs {
+        let first = step.u[run.nodes[0] as usize];
+        for lane in run.lanes.start..run.lanes.end {
+            let station = &step.stations[usize::from(vector.stations[lane])];
+            path.set(lane, station, run.origin + first, over_shaft);
+        }
+        let mut of_run = [DVec3::ZERO; SIGNS];
+        for bits in 1..SIGNS {
+            of_run[bits] = (step.u[run.nodes[bits] as usize] - first) * over_shaft;
+        }
+        for bit in [1, 2, 4] {
+            for bits in 0..SIGNS {
+                if bits & bit != 0 {
+                    let low = of_run[bits ^ bit];
+                    of_run[bits] -= low;
+                }
+            }
+        }
+        // The lanes behind the run are those of the next ones, which come later.
+        for bits in 1..SIGNS {
+            let mode = of_run[bits];
+            for (axis, value) in [mode.x as f32, mode.y as f32, mode.z as f32].into_iter().enumerate() {
+                modes[bits][axis][run.lanes.start..run.lanes.start + WIDEST].copy_from_slice(&[value; WIDEST]);
+            }
+        }
+    }
+    let points = &all.points[number * POINT * WIDEST..(number + 1) * POINT * WIDEST];
+    let mut summed = [[0.0f32; ROOM]; RUN_SUMS];
+    let mut at = 0;
+    while at < vector.count {
+        if !point_lanes(simd, step, map, (points, &path, &modes), at, (out, &mut summed)) {
+            return Found::Unknown;
+        }
+        at += Lanes::<S>::COUNT;
+    }
+    // The first lane of a run gets its sum: of lanes side by side, of pairs, of fours and of eights.
+    for (stride, same_run) in STRIDES.into_iter().zip(&vector.same_run) {
+        for row in &mut summed {
+            let mut sums = [0.0f32; WIDEST];
+            for lane in 0..WIDEST {
+                sums[lane] = row[lane + stride].mul_add(same_run[lane], row[lane]);
+            }
+            row[..WIDEST].copy_from_slice(&sums);
+        }
+    }
+    // Back to the corners.
+    for i in 0..runs.len() {
+        let first = runs[i].lanes.start;
+        let mut forces = [DVec3::ZERO; SIGNS];
+        for bits in 0..SIGNS {
+            let sums = [summed[3 * bits][first], summed[3 * bits + 1][first], summed[3 * bits + 2][first]];
+            forces[bits] = DVec3::new(f64::from(sums[0]), f64::from(sums[1]), f64::from(sums[2])) * over_shaft;
+        }
+        for bit in [1, 2, 4] {
+            for bits in 0..SIGNS {
+                if bits & bit != 0 {
+                    let high = forces[bits];
+                    forces[bits ^ bit] -= high;
+                }
+            }
+        }
+        for bits in 0..SIGNS {
+            at_corners[i][bits] = (forces[bits], f64::from(summed[3 * SIGNS + bits][first]));
+        }
+    }
+    Found::Known
+}
+
+/// One vector of points; false where one has left the range of these forms.
+#[inline(always)]
+fn point_lanes<S: Simd>(
+    simd: S,
+    step: &Step,
+    map: &MapIn<Lanes<S>>,
+    (points, path, modes): (&[f32], &Gathered, &[[[f32; ROOM]; 3]; SIGNS]),
+    at: usize,
+    (out, summed): (&mut [f32], &mut [[f32; ROOM]; RUN_SUMS]),
+) -> bool {
+    let all = step.all;
+    let zero = Lanes::splat(simd, 0.0);
+    let over_shaft = Lanes::splat(simd, (1.0 / all.shaft) as f32);
+    let row = |row: usize| Lanes::load(simd, points, row * WIDEST + at);
+    let [x, y, z] = [row(0), row(1), row(2)];
+    let open = Lanes::load(simd, &path.open, at);
+    let volume = row(3) * open;
+    let edges = [row(4), row(5), row(6)];
+    let one = Lanes::splat(simd, 1.0);
+    let over_edges = [one.over(edges[0]), one.over(edges[1]), one.over(edges[2])];
+    let law = law_in_lanes(simd, all, points, 7, at);
+    let bulk = row(11);
+    let [yz, zx, xy] = [y * z, z * x, x * y];
+    let mut beside = path.beside(simd, at);
+    let mut h = [[zero; 3]; 3];
+    for axis in 0..3 {
+        let mode = |bits: usize| Lanes::load(simd, &modes[bits][axis], at);
+        let [m_x, m_y, m_z] = [mode(1), mode(2), mode(4)];
+        let [m_xy, m_zx, m_yz, m_xyz] =
+            [mode(HOURGLASS[2]), mode(HOURGLASS[1]), mode(HOURGLASS[0]), mode(HOURGLASS[3])];
+        let by_x = m_xyz.mul_add(yz, m_zx.mul_add(z, m_xy.mul_add(y, m_x)));
+        let by_y = m_xyz.mul_add(zx, m_yz.mul_add(z, m_xy.mul_add(x, m_y)));
+        let by_z = m_xyz.mul_add(xy, m_yz.mul_add(y, m_zx.mul_add(x, m_z)));
+        let along = [x, y, z][axis].mul_add(edges[axis], beside.offset[axis]);
+        let straight = m_z.mul_add(z, m_y.mul_add(y, m_x.mul_add(x, along)));
+        beside.offset[axis] = m_xyz.mul_add(xy * z, m_yz.mul_add(yz, m_zx.mul_add(zx, m_xy.mul_add(xy, straight))));
+        h[0][axis] = by_x * over_edges[0];
+        h[1][axis] = by_y * over_edges[1];
+        h[2][axis] = by_z * over_edges[2];
+    }
+    let Some(point) = opened(map, &beside, &h, &law, bulk, step.measures) else { return false };
+    let Opened { d, energy, closed, straight, turned, by_gradient, by_place, distance } = point;
+    let grown = distance.mul_add(by_place, by_gradient);
+    let stiffness = (straight * grown * grown + turned * squared_norm_bound(&closed.cofactor())) * open;
+    for corner in 0..SIGNS {
+        (stiffness * row(7 + LAW + corner)).store(&mut summed[3 * SIGNS + corner], at);
+    }
+    for axis in 0..3 {
+        let p = d.place[axis] * volume;
+        let [gx, gy, gz] = [
+            d.gradient[0][axis] * volume * over_edges[0],
+            d.gradient[1][axis] * volume * over_edges[1],
+            d.gradient[2][axis] * volume * over_edges[2],
+        ];
+        p.store(&mut summed[axis], at);
+        p.mul_add(x, gx).store(&mut summed[3 + axis], at);
+        p.mul_add(y, gy).store(&mut summed[2 * 3 + axis], at);
+        p.mul_add(z, gz).store(&mut summed[4 * 3 + axis], at);
+        p.mul_add(xy, gx.mul_add(y, gy * x)).store(&mut summed[3 * 3 + axis], at);
+        p.mul_add(zx, gx.mul_add(z, gz * x)).store(&mut summed[5 * 3 + axis], at);
+        p.mul_add(yz, gy.mul_add(z, gz * y)).store(&mut summed[6 * 3 + axis], at);
+        (p * xy).mul_add(z, gx.mul_add(yz, gy.mul_add(zx, gz * xy))).store(&mut summed[7 * 3 + axis], at);
+        (p * over_shaft).store(out, axis * WIDEST + at);
+        (d.centre_rate[axis] * volume).store(out, (3 + axis) * WIDEST + at);
+    }
+    (d.radius * volume * over_shaft).store(out, 6 * WIDEST + at);
+    (d.radius_rate * volume).store(out, 7 * WIDEST + at);
+    (energy * volume).store(out, 8 * WIDEST + at);
+    true
+}
