@@ -53,7 +53,7 @@ impl From<&PointSums> for StationSums {
 }
 
 /// A station as it is: geometry, place along the needle, and what the tip has cut.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Now {
     section: Station,
     /// Distance behind the tip [m].
@@ -86,6 +86,9 @@ impl CpuEngine {
         let shift = plan.contact.as_ref().map_or(0.0, |c| c.part(a)) * self.state.touch.dimple;
         let mut now = self.each(opening.stations.len(), |i| {
             let station = &opening.stations[i];
+            if opening.is_ahead(station, a) {
+                return Now::default();
+            }
             let centre = mean_place(&station.centre, &station.nodes, rest, u);
             let behind = (tip - mean_place(&station.disc, &station.nodes, rest, u)).dot(t) - shift;
             let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.map.shaft));
@@ -193,15 +196,10 @@ impl CpuEngine {
             external[node] -= force;
             added_bound[node] += bound;
         });
-        let lanes = &*lanes;
-        // What is not open adds nothing.
-        let of_station = |i: usize| match sections[i].radius > 0.0 {
-            true => lanes.of_station(i),
-            false => PointSums::default(),
-        };
-        let mut sums: Vec<StationSums> = team.each(sections.len(), of_station).iter().map(StationSums::from).collect();
+        let (points, cells_of_spans) = lanes.gather(team, sections, (numbers, stride));
+        let mut sums: Vec<StationSums> = points.iter().map(StationSums::from).collect();
         let mut elastic: f64 = sums.iter().map(|s| s.energy).sum();
-        for ((first, count), found) in lanes.cells_at_nodes(team, numbers, stride) {
+        for ((first, count), found) in cells_of_spans {
             elastic += found.energy;
             let found = StationSums::from(&found.times(1.0 / f64::from(count)));
             for sums in &mut sums[usize::from(first)..][..usize::from(count)] {

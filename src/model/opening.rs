@@ -122,6 +122,8 @@ pub struct OpeningPlan {
     pub clusters: Vec<Cluster>,
     /// Those around the same stations side by side.
     pub cells: Vec<NearCell>,
+    /// Most stations in a cell.
+    pub longest_span: u16,
     /// All nodes that points, cells or stations act on.
     pub nodes: BTreeSet<u32>,
     /// Stiffness that holds the middle of the path on the needle, per station [N/m].
@@ -162,6 +164,11 @@ impl OpeningPlan {
     /// other. No node can be left inside of the needle here, so the speed of the needle is no limit.
     pub fn advance_limit(&self, travel: f64, dt: f64) -> f64 {
         (CRACK_SPEED * self.shear_wave_speed * dt).min(ADVANCE * self.spacing).max(LEAST_TRAVELS * travel)
+    }
+
+    /// True where neither a station nor any that shares a cell with it is cut by a tip at the material coordinate a.
+    pub fn is_ahead(&self, station: &OpeningStation, a: f64) -> bool {
+        station.depth > a + (f64::from(self.longest_span) + 2.0) * self.spacing
     }
 
     /// Part of a station that a tip at the material coordinate a has cut, and its rate [1/m]. On an oblique path what lies before the
@@ -250,6 +257,7 @@ impl OpeningPlan {
             clusters: clusters_of(&stations),
             stations,
             cells: Vec::new(),
+            longest_span: 0,
             nodes: BTreeSet::new(),
             guide: 50.0 * input.shear_modulus * spacing,
             stick: 2.0 * input.p_wave_modulus * spacing,
@@ -257,6 +265,7 @@ impl OpeningPlan {
             averaged: ((average / spacing).round() as usize).max(1) / 2,
         };
         plan.cells = near_cells(mesh, input, &plan, near, f64::from(count) * spacing);
+        plan.longest_span = plan.cells.iter().map(|near| near.count).max().unwrap_or(0);
         plan.nodes = plan.stations.iter().flat_map(|s| &s.nodes).copied().collect();
         let corners = plan.cells.iter().flat_map(|near| mesh.cell_nodes(near.cell as usize));
         plan.nodes.extend(corners.map(|n| n as u32));

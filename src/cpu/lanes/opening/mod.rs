@@ -145,6 +145,9 @@ pub(in crate::cpu) struct PointSums {
     pub energy: f64,
 }
 
+/// First station and number of stations in a cell, and what is derived of their mean.
+pub(in crate::cpu) type OfSpan = ((u16, u16), PointSums);
+
 impl PointSums {
     /// Of derivatives and an energy per volume.
     pub fn new(d: &Derivatives<f64>, energy: f64, volume: f64) -> Self {
@@ -370,19 +373,22 @@ impl LaneOpening {
         let part = team.part(self.vectors.len());
         let mut runs = out.runs.as_mut_slice();
         let vectors = out.vectors.chunks_mut(part).zip(out.points.chunks_mut(part * POINT_SUMS * WIDEST));
-        let parts = vectors.enumerate().map(|(number, (found, sums))| {
+        let points = vectors.enumerate().map(|(number, (found, sums))| {
             let end = |vector: usize| self.vectors.get(vector).map_or(self.runs.len(), |v| v.first_run);
             let first = number * part;
             let count = end(first + found.len()) - end(first);
             let own;
             (own, runs) = std::mem::take(&mut runs).split_at_mut(count);
-            SomePoints { step, first, found, runs: own, sums }
+            Part::Points(SomePoints { step, first, found, runs: own, sums })
         });
-        team.map(parts.collect::<Vec<_>>(), |_, points| self.arch.dispatch(points));
         let part = team.part(out.cell_vectors.len());
         let cells = out.cell_vectors.chunks_mut(part).zip(out.cells.chunks_mut(part * CELL_SUMS * WIDEST));
-        team.map(cells, |number, (found, sums)| {
-            self.arch.dispatch(SomeCells { step, first: number * part, found, sums });
+        let cells = cells
+            .enumerate()
+            .map(|(number, (found, sums))| Part::Cells(SomeCells { step, first: number * part, found, sums }));
+        team.map(points.chain(cells), |_, part| match part {
+            Part::Points(points) => self.arch.dispatch(points),
+            Part::Cells(cells) => self.arch.dispatch(cells),
         });
         let unknown = |found: &[Found]| -> Vec<usize> {
             found.iter().enumerate().filter(|(_, found)| **found == Found::Unknown).map(|(i, _)| i).collect()
@@ -406,7 +412,7 @@ impl LaneOpening {
     }
 
     /// Sums of the points of a station.
-    pub fn of_station(&self, station: usize) -> PointSums {
+    fn of_station(&self, station: usize) -> PointSums {
         let mut sums = [0.0; POINT_SUMS];
         for place in &self.of_station[self.starts[station] as usize..self.starts[station + 1] as usize] {
             let (vector, lane) = (*place as usize / WIDEST, *place as usize % WIDEST);
@@ -433,25 +439,42 @@ impl LaneOpening {
         }
     }
 
-    /// Adds the cells to the numbers of the nodes; derivatives of their energy by the path per pair of stations, and that energy [J]. What the
-    /// caller has to compute is left out.
+    /// Sums of the points of every station that is open, with energies, then of the cells per pair of stations; the cells are added to the
+    /// numbers of the nodes. What the caller has to compute is left out of these.
     ///
     /// Layers of cells that share no node side by side, first the even ones: no bit hangs on the number of threads.
-    pub fn cells_at_nodes(&self, team: &Team, numbers: &mut [f32], stride: usize) -> Vec<((u16, u16), PointSums)> {
+    pub fn gather(
+        &self,
+        team: &Team,
+        stations: &[Station],
+        (numbers, stride): (&mut [f32], usize),
+    ) -> (Vec<PointSums>, Vec<OfSpan>) {
+        let mut sums = vec![PointSums::default(); stations.len()];
         let mut spans: Vec<_> = self.spans.iter().map(|span| (*span, PointSums::default())).collect();
         for parity in 0..2 {
             let first = parity * self.layer;
-            let layers = self.layers.iter().skip(parity).step_by(2);
             let numbers = numbers[first..].chunks_mut(2 * self.layer);
-            let items = numbers.zip(layers).enumerate().filter(|(_, (_, cells))| !cells.is_empty());
-            let found = team.map(items, |_, (i, (numbers, cells))| {
-                self.layer_at_nodes(cells, numbers, (first + 2 * i * self.layer, stride))
+            let layers = numbers.zip(self.layers.iter().skip(parity).step_by(2)).enumerate();
+            let layers = layers
+                .filter(|(_, (_, cells))| !cells.is_empty())
+                .map(|(i, (numbers, cells))| Gather::Layer { cells, numbers, first: first + 2 * i * self.layer });
+            let part = team.part(stations.len());
+            let of_points = sums.chunks_mut(part).enumerate().filter(|_| parity == 0);
+            let of_points = of_points.map(|(i, sums)| Gather::Stations { first: i * part, sums });
+            let found = team.map(layers.chain(of_points), |_, part| match part {
+                Gather::Layer { cells, numbers, first } => self.layer_at_nodes(cells, numbers, (first, stride)),
+                Gather::Stations { first, sums } => {
+                    for (i, sums) in (first..).zip(sums).filter(|(i, _)| stations[*i].radius > 0.0) {
+                        *sums = self.of_station(i);
+                    }
+                    Vec::new()
+                }
             });
             for (span, sums) in found.into_iter().flatten() {
                 spans[usize::from(span)].1.add(&sums);
             }
         }
-        spans
+        (sums, spans)
     }
 
     /// Cells of a layer, to numbers of nodes from `first` on, which lie `stride` apart.
@@ -516,6 +539,26 @@ pub(in crate::cpu) struct OpeningInLanes<'a> {
     pub stride: usize,
 }
 
+/// Part of what is added up.
+enum Gather<'a> {
+    Layer {
+        cells: &'a [u32],
+        numbers: &'a mut [f32],
+        /// The first of these numbers among all.
+        first: usize,
+    },
+    Stations {
+        first: usize,
+        sums: &'a mut [PointSums],
+    },
+}
+
+/// Part of a stage.
+enum Part<'a> {
+    Points(SomePoints<'a>),
+    Cells(SomeCells<'a>),
+}
+
 /// What a step reads.
 #[derive(Clone, Copy)]
 struct Step<'a> {
@@ -549,6 +592,7 @@ impl Gathered {
     #[inline(always)]
     fn set(&mut self, lane: usize, station: &Station, at: DVec3, over_shaft: f64) {
         if station.radius == 0.0 {
+            self.close(lane);
             return;
         }
         let offset = (at - station.centre) * over_shaft;
@@ -560,6 +604,15 @@ impl Gathered {
         self.radius_rate[lane] = station.radius_rate as f32;
         self.open[lane] = 1.0;
         self.is_any_open = true;
+    }
+
+    /// No open path beside a lane.
+    #[inline(always)]
+    fn close(&mut self, lane: usize) {
+        for axis in 0..3 {
+            (self.offset[axis][lane], self.rate[axis][lane]) = (0.0, 0.0);
+        }
+        (self.radius[lane], self.radius_rate[lane], self.open[lane]) = (0.0, 0.0, 0.0);
     }
 
     #[inline(always)]

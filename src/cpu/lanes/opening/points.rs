@@ -35,14 +35,23 @@ impl WithSimd for SomePoints<'_> {
         let map = step.plan.map.in_radii(Lanes::splat(simd, 0.0));
         let all = step.all;
         let first_run = all.vectors[first].first_run;
+        let mut scratch =
+            Scratch { path: Gathered::new(), modes: [[[0.0; ROOM]; 3]; SIGNS], summed: [[0.0; ROOM]; RUN_SUMS] };
         for i in 0..found.len() {
             let sums = &mut sums[i * POINT_SUMS * WIDEST..(i + 1) * POINT_SUMS * WIDEST];
             let end =
                 if first + i + 1 < all.vectors.len() { all.vectors[first + i + 1].first_run } else { all.runs.len() };
             let runs = &mut runs[all.vectors[first + i].first_run - first_run..end - first_run];
-            found[i] = point_vector(simd, &step, &map, first + i, (found[i], sums), runs);
+            found[i] = point_vector(simd, &step, &map, first + i, (found[i], sums), runs, &mut scratch);
         }
     }
+}
+
+/// Rows that vectors share one after the other: what a vector leaves in them behind its lanes is not read, or zero.
+struct Scratch {
+    path: Gathered,
+    modes: [[[f32; ROOM]; 3]; SIGNS],
+    summed: [[f32; ROOM]; RUN_SUMS],
 }
 
 /// Forces of a vector of points; `before`: what the last step found there.
@@ -54,6 +63,7 @@ fn point_vector<S: Simd>(
     number: usize,
     (before, out): (Found, &mut [f32]),
     at_corners: &mut [AtCorners],
+    Scratch { path, modes, summed }: &mut Scratch,
 ) -> Found {
     let all = step.all;
     let vector = &all.vectors[number];
@@ -73,8 +83,9 @@ fn point_vector<S: Simd>(
         return Found::Unknown;
     }
     // u = sum of modes times products of the place in the cell, by the bits of its factors; in radii.
-    let mut path = Gathered::new();
-    let mut modes = [[[0.0f32; ROOM]; 3]; SIGNS];
+    for lane in vector.count..WIDEST {
+        path.close(lane);
+    }
     for run in runs {
         let first = step.u[run.nodes[0] as usize];
         for lane in run.lanes.start..run.lanes.end {
@@ -102,17 +113,16 @@ fn point_vector<S: Simd>(
         }
     }
     let points = &all.points[number * POINT * WIDEST..(number + 1) * POINT * WIDEST];
-    let mut summed = [[0.0f32; ROOM]; RUN_SUMS];
     let mut at = 0;
     while at < vector.count {
-        if !point_lanes(simd, step, map, (points, &path, &modes), at, (out, &mut summed)) {
+        if !point_lanes(simd, step, map, (points, path, modes), at, (out, summed)) {
             return Found::Unknown;
         }
         at += Lanes::<S>::COUNT;
     }
     // The first lane of a run gets its sum: of lanes side by side, of pairs, of fours and of eights.
     for (stride, same_run) in STRIDES.into_iter().zip(&vector.same_run) {
-        for row in &mut summed {
+        for row in summed.iter_mut() {
             let mut sums = [0.0f32; WIDEST];
             for lane in 0..WIDEST {
                 sums[lane] = row[lane + stride].mul_add(same_run[lane], row[lane]);
