@@ -6,7 +6,10 @@ use std::sync::atomic::AtomicBool;
 
 use assert_cmd::cargo::CommandCargoExt;
 use serde_json::Value;
+use stylet::effects::puncture::SchemeWord;
 use stylet::gpu::Gpu;
+use stylet::mesh::Mesh;
+use stylet::model::Model;
 use stylet::simulation::EngineChoice;
 use stylet::stability::random::{self, RandomOptions, RandomScene};
 use stylet::stability::{CASES, EngineReport, Options, Suite, run};
@@ -167,6 +170,23 @@ fn a_seed_gives_the_same_random_scenes() {
     let body = |scene: &RandomScene| scene.text.lines().skip(1).collect::<Vec<_>>().join("\n");
     let other = random_scenes(12, 0..25).1;
     assert!(first.iter().zip(&other).all(|(a, b)| body(a) != body(b)));
+}
+
+/// Needles that can open their path do so in a part of the scenes, with a toughness of every material.
+#[test]
+fn some_random_needles_open_their_path() {
+    let (folder, scenes) = random_scenes(1, 0..80);
+    let mut opened = [0; 2];
+    for scene in scenes.iter().filter(|scene| scene.mistake.is_none()) {
+        let Ok(read) = scene.scene(folder.path()) else { continue };
+        if read.effects.puncture.is_some_and(|p| p.scheme == SchemeWord::Opening) {
+            let model = Model::new(read.clone(), Mesh::of_scene(&read));
+            assert!(model.opening().is_some_and(|plan| !plan.cells.is_empty()), "{}", scene.text);
+            opened[usize::from(!read.regions.is_empty())] += 1;
+        }
+    }
+    println!("{opened:?} of 80 scenes open their path, in one material and in several");
+    assert!(opened[0] >= 4 && opened[1] >= 2, "{opened:?}");
 }
 
 /// 200 seeds, one scene of each: read, or refused with a way out; a mistake is refused for what it is. All effects, laws, tools and kinds of

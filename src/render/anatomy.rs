@@ -36,6 +36,8 @@ const LOOKED_AT: usize = 200;
 
 /// Nothing is there.
 pub const NOTHING: usize = 0;
+/// What tissue is called whose material says little to who looks at it.
+pub const UNNAMED: &str = "tissue";
 
 /// Parts of the tissue of a scene and where they lie.
 #[derive(Debug, Clone)]
@@ -103,7 +105,7 @@ impl<'a> Anatomy<'a> {
             of_region.push(Some(parts.len()));
             // `across-fibre` says little to who looks at it.
             let named = colours::of_kind(&scene.material.name).is_some();
-            let name = if named { scene.material.name.clone() } else { "tissue".into() };
+            let name = if named { scene.material.name.clone() } else { UNNAMED.into() };
             parts.push(Part { name, colour: [0; 3], rigid: false, material: 0 });
         }
         let found = colours::of_names(parts[1..].iter().map(|part| part.name.as_str()));

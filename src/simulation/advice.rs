@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::effects::TissueMaterial;
 use crate::effects::mass_scaling::{AUTO_MACH, AUTO_PASSAGES, FEWEST_PASSAGES, Loading, MOST_MACH};
-use crate::effects::puncture::{MOST_PRESSURE_OVER_BULK, MOST_PRESSURE_OVER_YOUNG};
+use crate::effects::puncture::{MOST_PRESSURE_OVER_BULK, MOST_PRESSURE_OVER_YOUNG, SchemeWord};
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::scene::{Face, Scene};
@@ -82,9 +82,13 @@ fn unfit_cells(model: &Model) -> Option<String> {
 }
 
 /// Largest puncture force over the section of the needle, as parts of Young's modulus and of the bulk modulus of the material that holds
-/// it, with the rate of the fastest motion; `None` without a needle that punctures.
+/// it, with the rate of the fastest motion; `None` without a needle that punctures, and where it opens its path.
 pub fn puncture_pressure(scene: &Scene) -> Option<(f64, f64)> {
     let (needle, puncture) = (scene.needle()?, scene.effects.puncture.as_ref()?);
+    // There the theory says what the tissue bears.
+    if puncture.scheme == SchemeWord::Opening {
+        return None;
+    }
     let section = std::f64::consts::PI * needle.radius.powi(2);
     let rate = puncture.rate_factor(scene.motion.largest_speed());
     let materials = std::iter::once(&scene.material).chain(scene.regions.iter().map(|r| &r.material));

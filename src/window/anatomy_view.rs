@@ -14,7 +14,7 @@ use crate::anatomy::colours::Rgb;
 use crate::gpu::{Bound, Gpu};
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::render::anatomy::Anatomy;
+use crate::render::anatomy::{Anatomy, UNNAMED};
 use crate::render::surfaces::{self, Detail, Embedding, Layer, Triangle};
 
 /// What comes to the shader of the tissue.
@@ -186,7 +186,8 @@ fn anchors(drawn: &[Triangle], plane: Option<RestPlane>, anatomy: &Anatomy) -> V
     for triangle in drawn.iter().filter(named) {
         by_colour.entry(triangle.colour).or_default()[usize::from(in_cut(triangle))].push(triangle);
     }
-    let parts = anatomy.parts().iter().skip(1).filter_map(|part| {
+    // That all around is tissue need not stand over what it hides.
+    let parts = anatomy.parts().iter().skip(1).filter(|part| part.name != UNNAMED).filter_map(|part| {
         let [surface, cut] = by_colour.get(&part.colour)?;
         let of = if cut.is_empty() { surface } else { cut };
         let whole: f64 = of.iter().map(|t| area(t)).sum();

@@ -2,7 +2,7 @@
 //!
 //! A scene is drawn from the whole schema by a seed and an index, written as text and read by the reader of scene files, so that
 //! refusals are those of a user. One in twenty-five holds a deliberate mistake. Needles (solid, bevelled, hollow, flexible; straight, oblique, free,
-//! vibrating; in, hold, out, in again), spheres and punches, driven and loaded faces, tetrahedra; all laws and presets, regions, membranes,
+//! vibrating; paths softened or opened; in, hold, out, in again), spheres and punches, driven and loaded faces, tetrahedra; all laws and presets, regions, membranes,
 //! all effects.
 //!
 //! Size: at most [`MOST_CELLS`] cells and [`MOST_CELL_STEPS`] steps times cells: 0.3 to 3 s of CPU time. Pace and cells follow that bound:
@@ -17,6 +17,7 @@
 //! | materials | stable laws; nu 0 to 0.499; moduli within 1 : 30; Ogden 1 <= abs(alpha) <= 10, Demiray b <= 10, Yeoh c20, c30 <= 3 c10 |
 //! | cells | at most 0.7 needle diameters (what a scene is told before it runs), an indenter 1.5 cells in radius, a sample 3 across, a region 1 |
 //! | tip forces | puncture force over the section of the needle 0.5 to 7 E and up to 3 K (what a scene is told before it runs), cutting below it; a membrane up to 2 mm times it |
+//! | opened path | toughness 0.5 to 20 times shear modulus and radius of the needle |
 //! | path | radius and 2 cells from the sides, 2 cells from the bottom; turns up to 10 degrees in the tissue; at most 4 phases |
 //! | flexible needle | punctures below half of its buckling load |
 //! | tip numbers | tip springs 0.3 to 10 N/mm, contact stiffness 0.5 to 5, damping to 0.6, softening and fade near their defaults |

@@ -1,6 +1,7 @@
 //! Whether a scene lies within what a user would do; the table stands at the head of `super`.
 
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 
 use crate::effects::TissueMaterial;
 use crate::effects::cohesive::Law;
@@ -20,6 +21,8 @@ const MOST_NU: f64 = 0.499;
 const MOST_CONTRAST: f64 = 30.0;
 /// Least puncture force over section of the needle and Young's modulus.
 const LEAST_PRESSURE: f64 = 0.5;
+/// Toughness over shear modulus and radius of the needle, where it opens its path.
+const TOUGHNESS: RangeInclusive<f64> = 0.5..=20.0;
 /// Strain of a driven face: pressed, pulled, sheared; its twist [rad]; a load over Young's modulus.
 const MOST_PRESSED: f64 = 0.35;
 const MOST_PULLED: f64 = 0.5;
@@ -112,9 +115,15 @@ fn needle(model: &Model, materials: &[&TissueMaterial], not: &mut impl FnMut(boo
     let h = scene.tissue.cell_size;
     let area = PI * needle.radius.powi(2);
     let mut hardest = 0.0_f64;
+    let opened = model.puncture.as_ref().filter(|plan| plan.opening.is_some());
     for material in materials {
         let forces = material.cutting.map(|c| (c.puncture_force, c.cutting_force));
         let (force, cutting) = forces.unwrap_or((puncture.puncture_force, puncture.cutting_force));
+        if opened.is_some() {
+            let part = material.toughness.unwrap_or_default() / (material.law.shear_modulus() * needle.radius);
+            not(TOUGHNESS.contains(&part), format!("toughness of {part:.1} mu R"));
+            continue;
+        }
         let pressure = force / (area * material.law.youngs_modulus());
         hardest = hardest.max(force);
         not(pressure >= LEAST_PRESSURE, format!("puncture force of {pressure:.1} E over the section"));
@@ -122,6 +131,9 @@ fn needle(model: &Model, materials: &[&TissueMaterial], not: &mut impl FnMut(boo
         if let Some(energy) = material.membrane_energy {
             not(energy <= 2e-3 * force, format!("membrane of {:.2} mJ", energy * 1e3));
         }
+    }
+    if let Some(plan) = opened {
+        hardest = plan.segments.iter().fold(0.0, |most, segment| segment.cutting.puncture_force.max(most));
     }
     let (over_young, over_bulk) = puncture_pressure(scene).unwrap_or_default();
     not(over_young <= MOST_PRESSURE_OVER_YOUNG, format!("puncture force of {over_young:.1} E over the section"));

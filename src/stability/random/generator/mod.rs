@@ -3,6 +3,7 @@
 mod effects;
 mod fitting;
 mod needle;
+mod opened;
 mod sample;
 mod tissue;
 
@@ -53,7 +54,9 @@ impl RandomScene {
             std::fs::write(&path, text).map_err(|source| crate::Error::file(&path, source))?;
             draft.mesh_file = Some(file.clone());
         }
-        draft.fit(&folder.join(format!("{name}.toml")));
+        let path = folder.join(format!("{name}.toml"));
+        draft.open_the_path((seed, index), tame, &path);
+        draft.fit(&path);
         let mistake = numbers.chance(MISTAKEN).then(|| draft.mistake(&mut numbers));
         Ok(RandomScene { seed, index, name, text: draft.text(), mesh, mistake })
     }
