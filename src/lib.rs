@@ -36,6 +36,7 @@ pub mod material_test;
 pub mod mesh;
 pub mod model;
 pub mod needle;
+pub mod number;
 pub mod observables;
 pub mod output;
 pub mod penetration;

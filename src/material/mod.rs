@@ -28,7 +28,6 @@ pub mod least_squares;
 pub mod mode;
 pub mod mooney_rivlin;
 pub mod neo_hookean;
-pub mod number;
 pub mod ogden;
 pub mod regular;
 pub mod stretches;

@@ -12,8 +12,8 @@
 // Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
 #![allow(clippy::needless_range_loop)]
 
-use super::number::{Number, Tensor};
 use super::stretches::{Powers, Stretches};
+use crate::number::{Number, Tensor};
 
 /// J between which the forms of this file hold to the last digits of f32.
 pub const LEAST_J: f64 = 0.4;

@@ -9,7 +9,7 @@
 // Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
 #![allow(clippy::needless_range_loop)]
 
-use super::number::{Number, Tensor};
+use crate::number::{Number, Tensor};
 
 /// Least eigenvalue of E for which these forms hold: `ogden` is continued below some.
 const LEAST_STRAIN: f64 = -0.98;

@@ -20,7 +20,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::material::number::{Number, Tensor};
+use crate::number::{Number, Tensor};
 
 /// Radius up to which the hole is exact, and radius beyond which nothing of it is left, in needle radii.
 pub const EXACT: f64 = 2.0;

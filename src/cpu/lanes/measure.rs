@@ -6,12 +6,13 @@
 use pulp::{Simd, WithSimd};
 
 use super::block::Grid;
+use super::corners::{HOURGLASS, SIGNS};
 use super::number::Lanes;
-use super::rows::{CellRows, HOURGLASS, MaterialLanes, Vector, differences, hadamard};
-use super::shapes::{Boxes, Prisms, SIGNS, Shape};
+use super::rows::{CellRows, MaterialLanes, Vector, differences, hadamard};
+use super::shapes::{Boxes, Prisms, Shape};
 use crate::engine::elements::{CellMeasure, CellStates};
-use crate::material::number::Number;
 use crate::material::regular::Regular;
+use crate::number::Number;
 
 /// Jacobian at a corner below which a vector is measured in f64: whether a cell has turned inside out is not left to f32.
 const LEAST_CORNER_J: f64 = 0.02;

@@ -4,6 +4,7 @@
 //! A vector in which a cell has left the range of `material/regular.rs` is computed cell by cell in f64.
 
 mod block;
+mod corners;
 mod measure;
 mod nodes;
 mod number;

@@ -4,7 +4,7 @@ use std::ops::{Add, Mul, Sub};
 
 use pulp::Simd;
 
-use crate::material::number::Number;
+use crate::number::Number;
 
 /// One vector of f32.
 #[derive(Debug, Clone, Copy)]

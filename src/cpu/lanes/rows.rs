@@ -7,19 +7,17 @@ use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
 use super::block::{Grid, LINES, MIXED, PLACE};
+use super::corners::{HOURGLASS, SIGNS};
 use super::nodes::NODE;
 use super::number::Lanes;
-use super::shapes::{Boxes, Prisms, SIGNS, Shape};
+use super::shapes::{Boxes, Prisms, Shape};
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, Elements};
-use crate::material::number::Number;
 use crate::material::regular::{Constants, Regular, dot};
 use crate::material::stretches::Powers;
 use crate::mesh::CORNERS;
 use crate::model::Model;
-
-/// Products of two and of three signs, by their bits.
-pub(super) const HOURGLASS: [usize; 4] = [6, 5, 3, 7];
+use crate::number::Number;
 
 /// What all rows read.
 pub(super) struct CellRows<'a> {

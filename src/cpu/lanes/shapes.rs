@@ -13,13 +13,12 @@
 use pulp::Simd;
 
 use super::block::Grid;
+use super::corners::SIGNS;
 use super::number::Lanes;
 use crate::engine::elements::PrismBase;
-use crate::material::number::{Number, Tensor};
 use crate::mesh::BlockMesh;
+use crate::number::{Number, Tensor};
 
-/// Sums of products of signs at the corners of a cell, by their bits: bit 0 along x, bit 1 along y, bit 2 along z.
-pub(super) const SIGNS: usize = 8;
 /// f32 per column of cells in [`BentColumns`]: x and y of `X_xi` and `X_eta`, 8 taper.X of both, area, its cube root and the inverse of
 /// the square of that, 1 where the column is no gap; then, for the corners, x and y of the two edges along xi and the two along eta, and
 /// 1 over the area that the two edges at each of the four span.

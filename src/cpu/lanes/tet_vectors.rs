@@ -12,12 +12,12 @@ use super::tets::{GRADIENT, NO_CELL, Place, SHAPE, TetShapes};
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, CellShape, Elements};
 use crate::material::kinematics::jacobian_minus_one;
-use crate::material::number::{Number, Tensor};
 use crate::material::regular::LEAST_J;
 use crate::material::regular::{Regular, dot};
 use crate::material_point::Volumetric;
 use crate::mesh::Mesh;
 use crate::model::Model;
+use crate::number::{Number, Tensor};
 
 /// Where numbers of [`TetShapes::constants`] stand.
 const LENGTH: usize = 9;

@@ -8,11 +8,11 @@ use pulp::{Simd, WithSimd};
 
 use super::{CELL, CELL_SUMS, Found, Gathered, Lanes, Step, law_in_lanes, opened};
 use crate::cpu::lanes::WIDEST;
-use crate::cpu::lanes::shapes::SIGNS;
-use crate::material::number::Number;
+use crate::cpu::lanes::corners::SIGNS;
 use crate::mesh::CORNERS;
 use crate::model::opening::{VOLUME_PLACE, is_volume_place};
 use crate::needle::opening::{Beside, Derivatives, MapIn, outer, squared_norm_bound};
+use crate::number::Number;
 
 pub(super) struct SomeCells<'a> {
     pub step: Step<'a>,

@@ -18,16 +18,16 @@ use pulp::{Arch, Simd};
 
 use self::cells::SomeCells;
 use self::points::SomePoints;
+use super::corners::SIGNS;
 use super::number::Lanes;
-use super::shapes::SIGNS;
 use super::{LaneMaterial, WIDEST};
 use crate::cpu::team::Team;
-use crate::material::number::{Number, Tensor};
 use crate::material::regular::{Constants, Regular};
 use crate::mesh::{BlockMesh, CORNERS, trilinear};
 use crate::model::Model;
 use crate::model::opening::OpeningPlan;
 use crate::needle::opening::{Beside, Derivatives, MapIn, Station};
+use crate::number::{Number, Tensor};
 
 /// Rows of a vector of points: place in the cell, 0..1; volume [m^3]; edges of the cell [radii]; c1, c2, c3, c01 and bulk modulus; what a
 /// stiffness makes of the bound of every corner [m].

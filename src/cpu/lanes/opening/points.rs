@@ -11,10 +11,9 @@ use super::{
     opened,
 };
 use crate::cpu::lanes::WIDEST;
-use crate::cpu::lanes::rows::HOURGLASS;
-use crate::cpu::lanes::shapes::SIGNS;
-use crate::material::number::Number;
+use crate::cpu::lanes::corners::{HOURGLASS, SIGNS};
 use crate::needle::opening::{MapIn, squared_norm_bound};
+use crate::number::Number;
 
 pub(super) struct SomePoints<'a> {
     pub step: Step<'a>,
