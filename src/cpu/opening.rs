@@ -1,4 +1,5 @@
-//! Stage `opening` in f64: tissue beside the path of the needle, carried by points. Equations: src/needle/opening.rs.
+//! Stage `opening`: tissue beside the path of the needle, carried by points, in f64 or by the lanes; stations, guide and friction. Equations:
+//! src/needle/opening.rs.
 
 use super::lanes::opening::{OpeningInLanes, PointSums};
 use super::{ContactSums, CpuEngine};
@@ -371,11 +372,7 @@ struct Shape<'a> {
 }
 
 impl Shape<'_> {
-    /// Stress [Pa] and bound of the tangent of F = I + h.
-    fn stress_and_bound(&self, h: DMat3) -> (DMat3, TangentBound) {
-        (self.stress(h), self.material.tangent_bound(h, &PointState::default()))
-    }
-
+    /// Stress of F = I + h [Pa].
     fn stress(&self, h: DMat3) -> DMat3 {
         self.material.stress(h, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default())
     }
@@ -384,8 +381,8 @@ impl Shape<'_> {
     /// the tangent there.
     fn opened(&self, map: &Opening<f64>, h: DMat3) -> (Derivatives<f64>, f64, TangentBound) {
         let f = DMat3::from_cols_array_2d(&map.gradient(&h.to_cols_array_2d()));
-        let (stress, bound) = self.stress_and_bound(f);
-        let mut d = map.pull_back(&stress.to_cols_array_2d());
+        let bound = self.material.tangent_bound(f, &PointState::default());
+        let mut d = map.pull_back(&self.stress(f).to_cols_array_2d());
         d.gradient = (DMat3::from_cols_array_2d(&d.gradient) - self.stress(h)).to_cols_array_2d();
         let energy = |h: DMat3| self.material.energy(h, 0.0, 1.0, &PointState::default()).stored;
         (d, if self.measures { energy(f) - energy(h) } else { 0.0 }, bound)
