@@ -279,9 +279,11 @@ impl CpuEngine {
                 rubbing = -kt * *memory;
                 booked.friction_work += 0.5 * kt * (old + *memory) * (trial - *memory);
                 stored += 0.5 * kt * *memory * *memory;
-                for (place, w) in &station.disc {
-                    self.added_bound[station.nodes[usize::from(*place)] as usize] += 2.0 * kt * w;
-                }
+            }
+            // Everywhere along the path: a mass that was raised where friction sets in would swing with another energy.
+            for (place, w) in station.disc.iter().filter(|_| model.effects.friction.is_some()) {
+                let kt = friction.stiffness_ratio * opening.stick;
+                self.added_bound[station.nodes[usize::from(*place)] as usize] += 2.0 * kt * w;
             }
             let along = t * (spread + rubbing);
             for (place, w) in station.disc.iter().filter(|_| along != DVec3::ZERO) {
