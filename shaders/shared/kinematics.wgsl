@@ -55,15 +55,34 @@ struct Measure {
     by_jj: f32,
 }
 
-// x^p for x >= low, its second-order Taylor polynomial at `low` below: value, first and second derivative.
-fn continued_power(x: f32, p: f32, low: f32) -> vec3<f32> {
+// ln x for x = 1 + e. A device may round its logarithm to 2^-21 near 1, which is all of a small strain: there the series of the inverse
+// hyperbolic tangent.
+fn logarithm(x: f32, e: f32) -> f32 {
+    let z = e / (2.0 + e);
+    let s = z * z;
+    let series = 2.0 * z * (1.0 + s * (0.33333333 + s * (0.2 + s * (0.14285714 + s * 0.11111111))));
+    return select(0.6931472 * log2(x), series, abs(e) < 0.4);
+}
+
+// exp(x) - 1, in the same way.
+fn exp_minus_one(x: f32) -> f32 {
+    let tail = 0.041666667 + x * (0.0083333333 + x * (0.0013888889 + x * (1.984127e-4 + x * 2.4801587e-5)));
+    let series = x * (1.0 + x * (0.5 + x * (0.16666667 + x * tail)));
+    return select(exp2(1.442695 * x) - 1.0, series, abs(x) < 0.5);
+}
+
+// x^p for x >= low, its second-order Taylor polynomial at `low` below: value, first and second derivative; w: value - 1. e: x - 1.
+fn continued_power(x: f32, e: f32, p: f32, low: f32) -> vec4<f32> {
     let at = max(x, low);
     // Exact at 1, so that tissue at rest stays there.
-    let value = select(exp2(p * log2(at)), 1.0, at == 1.0);
+    let of_log = p * logarithm(at, max(e, low - 1.0));
+    let beyond = exp_minus_one(of_log);
+    let value = select(exp2(1.442695 * of_log), 1.0 + beyond, abs(of_log) < 0.5);
     let slope = p * value / at;
     let curvature = (p - 1.0) * slope / at;
     let d = min(x - low, 0.0);
-    return vec3<f32>(value + d * (slope + 0.5 * d * curvature), slope + d * curvature, curvature);
+    let added = d * (slope + 0.5 * d * curvature);
+    return vec4<f32>(value + added, slope + d * curvature, curvature, beyond + added);
 }
 
 // Continuation of M = J^-m S for J < 0.3, m = 2/3 or, `of_areas`, 4/3; the equations are at `isochoric_measure`. All powers are

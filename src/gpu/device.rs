@@ -2,7 +2,8 @@
 
 #![warn(missing_docs)]
 
-use std::sync::{Arc, Mutex};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::kernel::KernelCache;
 use super::texels::{Access, rewritten};
@@ -55,11 +56,18 @@ fn adapters_of(backends: wgpu::Backends) -> Result<Vec<wgpu::Adapter>> {
             });
         }
     }
-    let instance = wgpu::Instance::new(descriptor);
-    let mut found = pollster::block_on(instance.enumerate_adapters(backends));
+    let mut found = pollster::block_on(instance(descriptor).enumerate_adapters(backends));
     // Hardware first, software last; the order of wgpu otherwise.
     found.sort_by_key(rank);
     Ok(found)
+}
+
+/// The instance of these backends: one for the whole program. A driver may take an instance for good (NVIDIA's gives none any more after
+/// some dozens, and then there seems to be no adapter).
+fn instance(descriptor: wgpu::InstanceDescriptor) -> wgpu::Instance {
+    static INSTANCES: Mutex<BTreeMap<u32, wgpu::Instance>> = Mutex::new(BTreeMap::new());
+    let mut made = INSTANCES.lock().unwrap_or_else(PoisonError::into_inner);
+    made.entry(descriptor.backends.bits()).or_insert_with(|| wgpu::Instance::new(descriptor)).clone()
 }
 
 /// Place of an adapter among others.

@@ -13,7 +13,7 @@ use super::arrays::{
 };
 use super::device::Gpu;
 use super::kernel::{BindingKind, Compiled, Kernel};
-use super::layout::Layout;
+use super::layout::{Layout, strip_layers};
 use super::memory::{Memory, allocate};
 use super::pace::Pace;
 use super::plan::{Features, defines, measure_threads, mesh_numbers, stages, threads};
@@ -88,8 +88,7 @@ impl GpuEngine {
     /// # Errors
     /// As [`GpuEngine::new`].
     pub fn for_purpose(model: Arc<Model>, gpu: Gpu, dt: f64, max_steps: usize, drawn: bool) -> Result<Self> {
-        // Software adapters pay per buffer access: long strips share most planes. Hardware wants many threads.
-        let layers = if gpu.is_software() { 8 } else { 4 };
+        let layers = strip_layers(model.mesh.cell_count(), gpu.is_software());
         let layout = Layout::new(&model.mesh, layers);
         let features = Features { drawn, ..Features::of(&model) };
         let defines = defines(&model.effects, &features);

@@ -5,7 +5,7 @@ pub mod compose;
 pub mod device;
 pub mod engine;
 pub mod kernel;
-mod layout;
+pub mod layout;
 mod memory;
 mod pace;
 pub mod plan;
