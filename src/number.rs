@@ -1,5 +1,8 @@
 //! What a law is computed with: one f64, or several values of the lanes of a processor at once.
 
+// Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
+#![allow(clippy::needless_range_loop)]
+
 use std::ops::{Add, Mul, Sub};
 
 /// A second-order tensor by its columns.
@@ -31,6 +34,53 @@ pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     fn choose(self, limit: Self, low: Self, high: Self) -> Self;
     /// True where every lane lies within `low..=high`; NaN does not.
     fn is_within(self, low: f64, high: f64) -> bool;
+}
+
+/// `mask` is 0 or 1 in a lane: `a` where it is 0, `b` where it is 1.
+#[inline(always)]
+pub fn blend<N: Number>(mask: N, a: N, b: N) -> N {
+    mask.choose(mask.of(0.5), a, b)
+}
+
+/// `A B`.
+#[inline(always)]
+pub fn product<N: Number>(a: &Tensor<N>, b: &Tensor<N>) -> Tensor<N> {
+    let mut out = *a;
+    for column in 0..3 {
+        for row in 0..3 {
+            out[column][row] =
+                a[0][row].mul_add(b[column][0], a[1][row].mul_add(b[column][1], a[2][row] * b[column][2]));
+        }
+    }
+    out
+}
+
+/// `A:B`.
+#[inline(always)]
+pub fn double_dot<N: Number>(a: &Tensor<N>, b: &Tensor<N>) -> N {
+    let mut sum = a[0][0] * b[0][0];
+    for column in 0..3 {
+        for row in 0..3 {
+            if column + row > 0 {
+                sum = a[column][row].mul_add(b[column][row], sum);
+            }
+        }
+    }
+    sum
+}
+
+/// `J - 1` of H, without cancellation.
+#[inline(always)]
+pub fn jacobian_less_one<N: Number>(h: &Tensor<N>) -> N {
+    let minors = h[0][0] * h[1][1] - h[1][0] * h[0][1] + h[1][1] * h[2][2] - h[2][1] * h[1][2] + h[0][0] * h[2][2]
+        - h[2][0] * h[0][2];
+    let cofactor = [
+        h[1][1] * h[2][2] - h[1][2] * h[2][1],
+        h[1][2] * h[2][0] - h[1][0] * h[2][2],
+        h[1][0] * h[2][1] - h[1][1] * h[2][0],
+    ];
+    let determinant = h[0][0].mul_add(cofactor[0], h[0][1].mul_add(cofactor[1], h[0][2] * cofactor[2]));
+    h[0][0] + h[1][1] + h[2][2] + minors + determinant
 }
 
 impl Number for f64 {

@@ -192,9 +192,7 @@ impl CpuEngine {
     /// copies have those of all of them. Nothing changes: a look at one step, for tests and bisecting.
     pub fn forces_and_bounds(&mut self, input: &StepInput) -> (Vec<DVec3>, Vec<f64>) {
         let kept = (self.state.clone(), self.sums.clone());
-        if let Some(lanes) = &mut self.lanes {
-            lanes.take(&self.state.displacement);
-        }
+        self.bring_to_lanes();
         self.forces(input);
         let nodes = 0..self.model.mesh.node_count();
         let at = |node: usize| {
@@ -210,6 +208,14 @@ impl CpuEngine {
         (self.state, self.sums) = kept;
         self.look_at_all();
         (forces, bounds)
+    }
+
+    /// Gives the lanes the state that a frame begins with.
+    fn bring_to_lanes(&mut self) {
+        if let Some(lanes) = &mut self.lanes {
+            lanes.take(&self.state.displacement);
+            lanes.take_points(&self.state.points);
+        }
     }
 
     /// The state is another one: what the contact knew of its nodes means nothing.
@@ -294,7 +300,8 @@ impl CpuEngine {
     /// Stage `element_forces`; tetrahedra get their averaged pressure first.
     fn element_forces(&mut self, input: &StepInput) {
         if let Some(lanes) = &mut self.lanes {
-            lanes.compute(&self.model, &self.elements, &self.state.displacement, &self.state.stiffness);
+            let State { displacement, stiffness, .. } = &self.state;
+            lanes.compute(&self.model, &self.elements, displacement, stiffness, Some((self.dt, input.step)));
             return;
         }
         let (model, elements, dt) = (&self.model, &self.elements, self.dt);
@@ -350,6 +357,9 @@ impl CpuEngine {
     /// Stages `measure_cells`, `measure_contact`, `measure_faces`, `measure_separation`: stored energies and health, between the forces of
     /// the last step and its motion.
     fn measure_stored(&mut self) {
+        if let Some(lanes) = &mut self.lanes {
+            self.sums.health.return_failures += lanes.give_points(&mut self.state.points);
+        }
         let (model, elements, state) = (&self.model, &self.elements, &self.state);
         let states = CellStates { points: &state.points, stiffness: &state.stiffness };
         let in_f64 = || -> Vec<CellMeasure> {
@@ -476,9 +486,7 @@ impl Engine for CpuEngine {
     fn start_frame(&mut self, plan: &FramePlan) -> Result<()> {
         self.sums = FrameSums { frame: plan.frame, steps: plan.steps.len() as u32, ..Default::default() };
         self.centre_line = plan.centre_line;
-        if let Some(lanes) = &mut self.lanes {
-            lanes.take(&self.state.displacement);
-        }
+        self.bring_to_lanes();
         for (index, input) in plan.steps.iter().enumerate() {
             if crate::ending::is_overdue() {
                 return Err(Error::Ended(crate::ending::reason()));
@@ -553,9 +561,9 @@ impl Engine for CpuEngine {
     }
 
     fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
+        self.bring_to_lanes();
         if let Some(lanes) = &mut self.lanes {
-            lanes.take(&self.state.displacement);
-            lanes.compute(&self.model, &self.elements, &self.state.displacement, &self.state.stiffness);
+            lanes.compute(&self.model, &self.elements, &self.state.displacement, &self.state.stiffness, None);
             return Ok((0..self.model.mesh.node_count()).map(|node| -lanes.at(node).0).collect());
         }
         let states = CellStates { points: &self.state.points, stiffness: &self.state.stiffness };

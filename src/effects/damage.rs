@@ -14,6 +14,7 @@
 
 use super::parameters::parameters;
 use super::{Effect, Kind};
+use crate::number::Number;
 use crate::units::{MILLIMETRE, ONE};
 use crate::within::Within::{Between, NotNegative, Positive};
 
@@ -86,5 +87,27 @@ impl Params {
     pub fn dissipation_per_area(&self, flow_stress: f64) -> f64 {
         let d = self.largest;
         (2.0 * d - d * d) * 0.5 * flow_stress * self.failure_displacement
+    }
+}
+
+/// Constants per lane, for any [`Number`]; a lane without damage has an onset beyond all strains.
+#[derive(Debug, Clone, Copy)]
+pub struct DamageInLanes<N> {
+    /// alpha_0.
+    pub onset: N,
+    /// 1/u_f [1/m].
+    pub inverse_displacement: N,
+    /// d_max.
+    pub largest: N,
+    /// d of a cell that has reached `largest`: the same, or 1 where it is deleted.
+    pub at_largest: N,
+}
+
+impl<N: Number> DamageInLanes<N> {
+    /// d for the plastic strain `alpha` of a cell of edge `length` [m].
+    #[inline(always)]
+    pub fn degradation(&self, alpha: N, length: N) -> N {
+        let d = ((alpha - self.onset) * length * self.inverse_displacement).larger(alpha.of(0.0));
+        d.choose(self.largest, d, self.at_largest)
     }
 }

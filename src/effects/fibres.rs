@@ -8,6 +8,9 @@
 //! `k2 e^2 = 10` the exponential continues as its second-order Taylor polynomial. Stiffness along the fibres at rest
 //! grows from 0: 4 k1 is the slope of W_f' at the onset. Source: Holzapfel, Gasser & Ogden 2000 with one family.
 
+// Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
+#![allow(clippy::needless_range_loop)]
+
 use glam::{DMat3, DVec3};
 
 use super::parameter::{Parameter, Value};
@@ -15,6 +18,8 @@ use super::parameters::parameters;
 use super::{Effect, Kind};
 use crate::material::demiray::{LARGEST_EXPONENT, capped_exponential};
 use crate::material::kinematics::{cofactor, isochoric_factor, jacobian_minus_one};
+use crate::material::regular::{Regular, dot};
+use crate::number::{Number, Tensor};
 use crate::units::{KILOPASCAL, ONE};
 use crate::within::Within::{NotNegative, Positive};
 
@@ -96,5 +101,60 @@ impl Params {
         let (_, first, second) = capped_exponential(self.k2 * e * e);
         let curvature = self.k1 * (first + 2.0 * self.k2 * e * e * second);
         4.0 * a * a * square * curvature + 2.0 * a * self.k1 * e * first
+    }
+}
+
+/// Constants per lane, for any [`Number`]; a lane without fibres has k1 = 0 and k2 > 0.
+#[derive(Debug, Clone, Copy)]
+pub struct FibresInLanes<N> {
+    /// Unit vector along the fibres at rest.
+    pub direction: [N; 3],
+    /// Stiffness [Pa].
+    pub k1: N,
+    /// Exponent.
+    pub k2: N,
+}
+
+impl<N: Number> FibresInLanes<N> {
+    /// Adds P_f to a stress; the bound of the tangent modulus [Pa] and W_f [J/m^3]. `None` where a lane has left the exponential for its
+    /// polynomial.
+    #[inline(always)]
+    pub fn add(&self, state: &Regular<N>, cof: &Tensor<N>, p: &mut Tensor<N>) -> Option<[N; 2]> {
+        let n = state.dj;
+        let (zero, one, two) = (n.of(0.0), n.of(1.0), n.of(2.0));
+        let (h, _) = state.strain();
+        let along = self.direction;
+        let mut longer = [zero; 3];
+        let mut stretched = [zero; 3];
+        for row in 0..3 {
+            longer[row] = h[0][row].mul_add(along[0], h[1][row].mul_add(along[1], h[2][row] * along[2]));
+            stretched[row] = along[row] + longer[row];
+        }
+        let root = state.root();
+        let a = root * root;
+        let square = dot(stretched, stretched);
+        // a |F n|^2 - 1 without cancellation: a = 1/r^2 with r = J^(1/3), and r - 1 of r^3 - 1.
+        let r = (state.dj + one) * a;
+        let less = state.dj.over(r.mul_add(r, r) + one);
+        let square_1 = two.mul_add(dot(along, longer), dot(longer, longer));
+        let e = a.mul_add(square_1, zero - less * (r + one) * a).larger(zero);
+        let x = self.k2 * e * e;
+        if !x.is_within(0.0, LARGEST_EXPONENT) {
+            return None;
+        }
+        let minus_one = x.exponential();
+        let exp = minus_one + one;
+        let slope = self.k1 * e * exp;
+        let by_along = two * a * slope;
+        let by_cof = n.of(-2.0 / 3.0) * a * a * root * square * slope;
+        for column in 0..3 {
+            for row in 0..3 {
+                let added = cof[column][row].mul_add(by_cof, by_along * stretched[row] * along[column]);
+                p[column][row] = p[column][row] + added;
+            }
+        }
+        let curvature = self.k1 * exp * two.mul_add(x, one);
+        let tangent = n.of(4.0) * a * a * square * curvature + by_along;
+        Some([tangent, n.of(0.5) * self.k1.over(self.k2) * minus_one])
     }
 }

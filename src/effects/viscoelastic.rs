@@ -14,11 +14,16 @@
 //! Energy. With `E` the Green-Lagrange strain the viscous part of the work is `-q:E + sum E:dq` per volume; of this
 //! `Xi = sum q_i:q_i/(4 mu0 g_i)` is stored and the rest, `sum E:dq - Xi`, dissipated.
 
+// Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
+#![allow(clippy::needless_range_loop)]
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::parameter::{Parameter, Value};
 use super::{Effect, Kind, Numbers};
+use crate::material::regular::Regular;
+use crate::number::{Number, Tensor};
 
 /// The entry of this effect in [`super::EFFECTS`].
 pub const EFFECT: Effect = Effect {
@@ -125,5 +130,57 @@ impl Term {
     pub fn is_due(&self, step: u64, dt: f64) -> bool {
         let n = u64::from(self.interval(dt));
         step % n == n / 2
+    }
+}
+
+/// A symmetric tensor for any [`Number`]: diagonal, then yz, zx, xy.
+pub type Symmetric<N> = [N; 6];
+
+/// `F^-1 P_iso` [Pa] in the range of [`Regular`].
+#[inline(always)]
+pub fn second_piola_kirchhoff<N: Number>(state: &Regular<N>, cof: &Tensor<N>, p: &Tensor<N>) -> Symmetric<N> {
+    let n = state.dj;
+    let root = state.root();
+    // 1/(2 J)
+    let by = n.of(0.5) * root * root * root;
+    let at = |row: usize, column: usize| {
+        cof[row][0].mul_add(p[column][0], cof[row][1].mul_add(p[column][1], cof[row][2] * p[column][2]))
+    };
+    [
+        at(0, 0) * (by + by),
+        at(1, 1) * (by + by),
+        at(2, 2) * (by + by),
+        (at(1, 2) + at(2, 1)) * by,
+        (at(2, 0) + at(0, 2)) * by,
+        (at(0, 1) + at(1, 0)) * by,
+    ]
+}
+
+/// `q:E` of two symmetric tensors, the second as C - I = 2 E.
+#[inline(always)]
+pub fn held_by_strain<N: Number>(q: &Symmetric<N>, twice_e: &Symmetric<N>) -> N {
+    let half = q[0].of(0.5);
+    let mut normal = q[0] * twice_e[0];
+    let mut shear = q[3] * twice_e[3];
+    for i in 1..3 {
+        normal = q[i].mul_add(twice_e[i], normal);
+        shear = q[3 + i].mul_add(twice_e[3 + i], shear);
+    }
+    normal.mul_add(half, shear)
+}
+
+/// Takes `F q` out of a stress.
+#[inline(always)]
+pub fn take_out<N: Number>(q: &Symmetric<N>, h: &Tensor<N>, p: &mut Tensor<N>) {
+    let [xx, yy, zz, yz, zx, xy] = *q;
+    let q = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
+    for column in 0..3 {
+        for row in 0..3 {
+            let turned = h[0][row].mul_add(
+                q[column][0],
+                h[1][row].mul_add(q[column][1], h[2][row].mul_add(q[column][2], q[column][row])),
+            );
+            p[column][row] = p[column][row] - turned;
+        }
     }
 }

@@ -69,6 +69,44 @@ impl<N: Number> Constants<N> {
     }
 }
 
+/// An elastic law: its polynomial part, and its powers of the stretches, if any lane has such.
+#[derive(Debug, Clone, Copy)]
+pub struct LawInLanes<N> {
+    pub polynomial: Constants<N>,
+    pub powers: Option<Powers<N>>,
+}
+
+/// What a law answers to a state.
+#[derive(Debug, Clone, Copy)]
+pub struct LawAnswer<N> {
+    pub state: Regular<N>,
+    /// P_iso [Pa].
+    pub stress: Tensor<N>,
+    /// Part of the straight bound of the tangent that powers of the stretches have [Pa].
+    pub of_powers: N,
+}
+
+impl<N: Number> LawInLanes<N> {
+    /// P_iso of H; `None` where a lane has left the range.
+    #[inline(always)]
+    pub fn answer(&self, h: &Tensor<N>) -> Option<LawAnswer<N>> {
+        let state = Regular::new(*h)?;
+        let none = state.dj.of(0.0);
+        let mut stress = state.stress(&self.polynomial, none);
+        let mut of_powers = none;
+        if let Some(powers) = &self.powers {
+            let (added, bound) = state.stress_and_bound_of_powers(powers)?;
+            of_powers = bound;
+            for a in 0..3 {
+                for b in 0..3 {
+                    stress[a][b] = stress[a][b] + added[a][b];
+                }
+            }
+        }
+        Some(LawAnswer { state, stress, of_powers })
+    }
+}
+
 /// A state and what its stress and its bound share.
 #[derive(Debug, Clone, Copy)]
 pub struct Regular<N> {
@@ -149,6 +187,18 @@ impl<N: Number> Regular<N> {
         }
         let (root, dj_second) = (j.inverse_cube_root(), cof_trace + determinant);
         Some(Regular { h, strain, cofactor_less_one: k, dj, j, root, e1, e2, dj_second, e2_second })
+    }
+
+    /// J^(-1/3).
+    #[inline(always)]
+    pub fn root(&self) -> N {
+        self.root
+    }
+
+    /// H, and E = C - I by diagonal, then yz, zx, xy.
+    #[inline(always)]
+    pub fn strain(&self) -> (&Tensor<N>, &[N; 6]) {
+        (&self.h, &self.strain)
     }
 
     /// Slopes w1, w2 and w11 of the law.

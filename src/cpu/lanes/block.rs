@@ -10,6 +10,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::nodes::{NODE, NodeLines};
 use super::opening::{LaneOpening, OpeningInLanes};
+use super::points::Points;
 use super::rows::{CellRows, gather_rows};
 use super::shapes::BentColumns;
 use super::{LaneMaterial, WIDEST, materials_of, threads_for};
@@ -17,6 +18,7 @@ use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
 use crate::engine::elements::{CellMeasure, Elements};
 use crate::material::stretches::Powers;
+use crate::material_point::PointState;
 use crate::mesh::BlockMesh;
 use crate::model::Model;
 
@@ -90,6 +92,9 @@ pub struct LaneBlock {
     lines: Vec<f32>,
     nodes: NodeLines,
     opening: Option<Box<LaneOpening>>,
+    /// Material points that do more than the elastic law, and what they remember, in rows.
+    points: Option<Points>,
+    histories: Vec<f32>,
 }
 
 impl LaneBlock {
@@ -118,7 +123,10 @@ impl LaneBlock {
         let nodes = NodeLines::new(model, nx + 1, stride);
         let first_number = |node| nodes.first_number(node);
         let opening = |plan| Box::new(LaneOpening::new(model, block, plan, &materials, first_number));
+        let points = Points::new(&model.materials, stride);
         Ok(LaneBlock {
+            histories: vec![0.0; points.as_ref().map_or(0, Points::row_length) * ny * nz],
+            points,
             opening: model.opening().map(opening),
             grid: Grid {
                 arch: Arch::new(),
@@ -179,20 +187,60 @@ impl LaneBlock {
         4 * (self.places.len() + self.lines.len() + self.grid.on_edge.len() + self.grid.mixed.len())
             + self.grid.bent.as_ref().map_or(0, BentColumns::bytes)
             + self.nodes.bytes()
+            + 4 * self.histories.len()
             + self.opening.as_ref().map_or(0, |opening| opening.bytes())
     }
 
-    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it).
-    pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3], stiffness: &[f64]) {
-        let LaneBlock { grid, team, places, lines, nodes, .. } = self;
+    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it). `advance`:
+    /// step [s] and number of the step that histories are brought forward to.
+    pub fn compute(
+        &mut self,
+        model: &Model,
+        elements: &Elements,
+        displacement: &[DVec3],
+        stiffness: &[f64],
+        advance: Option<(f64, u64)>,
+    ) {
+        let LaneBlock { grid, team, places, lines, nodes, points, histories, .. } = self;
         let (stride, [_, ny, nz]) = (grid.stride, grid.cells);
         let stiffness = left_by_a_path(stiffness);
-        let rows = CellRows { grid, places, model, elements, displacement, stiffness };
+        if let Some(points) = points {
+            points.prepare(&model.materials, advance);
+        }
+        let points = points.as_ref();
+        let rows = CellRows { grid, places, model, elements, displacement, stiffness, points, advance };
         let part = team.part(ny * nz);
-        team.map(lines.chunks_mut(part * LINES * stride), |i, lines| rows.compute(i * part, lines));
+        let lines_of = lines.chunks_mut(part * LINES * stride);
+        let work = |i: usize, (lines, histories): (&mut [f32], &mut [f32])| rows.compute(i * part, lines, histories);
+        match points.map_or(0, Points::row_length) {
+            0 => team.map(lines_of.map(|lines| (lines, &mut [][..])), work),
+            length => team.map(lines_of.zip(histories.chunks_mut(part * length)), work),
+        };
         let lines = lines.as_slice();
         let part = team.part((ny + 1) * (nz + 1));
         team.map(nodes.numbers.chunks_mut(part * NODE * stride), |i, nodes| gather_rows(grid, lines, i * part, nodes));
+    }
+
+    /// True where material points do more than the elastic law.
+    pub fn has_points(&self) -> bool {
+        self.points.is_some()
+    }
+
+    /// Takes in what the points remember.
+    pub fn take_points(&mut self, states: &[PointState]) {
+        let LaneBlock { grid, team, points, histories, .. } = self;
+        if let Some((points, length)) = remembering(points) {
+            let rows = histories.chunks_mut(length).zip(states.chunks(grid.cells[0]));
+            team.map(rows, |_, (row, states)| points.take(states, row));
+        }
+    }
+
+    /// Gives the points what they have become and booked since; how many returns failed.
+    pub fn give_points(&mut self, states: &mut [PointState]) -> u32 {
+        let LaneBlock { grid, team, points, histories, .. } = self;
+        let Some((points, length)) = remembering(points) else { return 0 };
+        let rows = histories.chunks_mut(length).zip(states.chunks_mut(grid.cells[0]));
+        team.map(rows, |_, (row, states)| points.give(row, states)).into_iter().sum()
     }
 
     /// Energies and Jacobians of all cells.
@@ -206,7 +254,7 @@ impl LaneBlock {
         let LaneBlock { grid, team, places, .. } = self;
         let [nx, ny, nz] = grid.cells;
         let stiffness = left_by_a_path(stiffness);
-        let rows = CellRows { grid, places, model, elements, displacement, stiffness };
+        let rows = CellRows { grid, places, model, elements, displacement, stiffness, points: None, advance: None };
         let part = team.part(ny * nz);
         let mut measures = vec![CellMeasure::default(); nx * ny * nz];
         team.map(measures.chunks_mut(part * nx), |i, measures| rows.measure(i * part, measures));
@@ -229,6 +277,12 @@ impl LaneBlock {
         let keep = |places: &mut [f32], u: &[DVec3]| set_places(arch, stride, places, u);
         self.nodes.integrate(arch, &self.team, step, (u, v), (places.collect(), keep))
     }
+}
+
+/// Points that remember something, and f32 of a row of them.
+fn remembering(points: &Option<Points>) -> Option<(&Points, usize)> {
+    let points = points.as_ref()?;
+    Some((points, points.row_length())).filter(|(_, length)| *length > 0)
 }
 
 /// The stiffness that a path left of every cell; empty where it left all of it.

@@ -103,7 +103,7 @@ fn lane_measure<S: Simd>(
 ) -> bool {
     let stride = grid.stride;
     // Energies of powers of the stretches are left to f64.
-    if let Some(powers) = &material.powers
+    if let Some(powers) = &material.law.powers
         && !powers.mu.is_within(0.0, 0.0)
     {
         return false;
@@ -147,7 +147,7 @@ fn lane_measure<S: Simd>(
     let [volume, edge, inverse_square] = cells.sizes();
     let q2 = q2 * Lanes::splat(simd, 1.0 / 64.0);
     let folding = Lanes::splat(simd, 0.5 * grid.quartic as f32) * q2 * inverse_square;
-    let elastic = intact * volume * state.energy(&material.law, material.bulk);
+    let elastic = intact * volume * state.energy(&material.law.polynomial, material.bulk);
     let hourglass = intact * Lanes::splat(simd, 0.5) * material.hourglass * edge * q2 * (one + folding);
     elastic.store(numbers, at.i);
     hourglass.store(numbers, stride + at.i);

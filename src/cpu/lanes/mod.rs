@@ -9,6 +9,7 @@ mod measure;
 mod nodes;
 mod number;
 pub(super) mod opening;
+mod points;
 mod rows;
 mod shapes;
 mod tet_vectors;
@@ -28,7 +29,7 @@ use crate::material::Isochoric;
 use crate::material::law::IsochoricLaw;
 use crate::material::regular::Polynomial;
 use crate::material::stretches::Powers;
-use crate::material_point::Material;
+use crate::material_point::{Material, PointState};
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::scene::Scene;
@@ -94,11 +95,35 @@ impl LaneCells {
         }
     }
 
-    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it).
-    pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3], stiffness: &[f64]) {
+    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it). `advance`:
+    /// step [s] and number of the step that histories are brought forward to; `None`: they stay.
+    pub fn compute(
+        &mut self,
+        model: &Model,
+        elements: &Elements,
+        displacement: &[DVec3],
+        stiffness: &[f64],
+        advance: Option<(f64, u64)>,
+    ) {
         match self {
-            LaneCells::Block(cells) => cells.compute(model, elements, displacement, stiffness),
+            LaneCells::Block(cells) => cells.compute(model, elements, displacement, stiffness, advance),
             LaneCells::Tets(cells) => cells.compute(model, elements, displacement, stiffness),
+        }
+    }
+
+    /// Takes in what the material points remember.
+    pub fn take_points(&mut self, points: &[PointState]) {
+        match self {
+            LaneCells::Block(cells) => cells.take_points(points),
+            LaneCells::Tets(_) => {}
+        }
+    }
+
+    /// Gives the material points what they have become and booked since; how many returns failed.
+    pub fn give_points(&mut self, points: &mut [PointState]) -> u32 {
+        match self {
+            LaneCells::Block(cells) => cells.give_points(points),
+            LaneCells::Tets(_) => 0,
         }
     }
 
@@ -111,6 +136,7 @@ impl LaneCells {
         stiffness: &[f64],
     ) -> Option<Vec<CellMeasure>> {
         match self {
+            LaneCells::Block(cells) if cells.has_points() => None,
             LaneCells::Block(cells) => Some(cells.measure(model, elements, displacement, stiffness)),
             LaneCells::Tets(_) => None,
         }
@@ -169,29 +195,38 @@ pub fn width() -> usize {
 /// What lanes do not know of a scene; `None`: they know it.
 pub fn unknown_to_lanes(scene: &Scene) -> Option<String> {
     let mut tissues = std::iter::once(&scene.material).chain(scene.regions.iter().map(|region| &region.material));
-    let known = |tissue: &TissueMaterial| known_law(&Material::of(tissue, &scene.effects)).map(drop);
+    let known = |tissue: &TissueMaterial| {
+        let material = Material::of(tissue, &scene.effects);
+        known_effects(&material, scene.mesh.is_some()).and_then(|()| known_law(&material)).map(drop)
+    };
     tissues.try_for_each(known).err()
 }
 
 fn materials_of(model: &Model, elements: &Elements) -> Result<Vec<LaneMaterial>, String> {
     let material = |(index, m): (usize, &Material)| {
+        known_effects(m, model.mesh.as_tets().is_some())?;
         let ((law, powers), bulk_modulus) = (known_law(m)?, m.law.bulk_modulus);
         Ok(LaneMaterial { law, powers, bulk_modulus, hourglass: elements.hourglass_of(index) })
     };
     model.materials.iter().enumerate().map(material).collect()
 }
 
-fn known_law(material: &Material) -> Result<(Polynomial, Option<Powers<f64>>), String> {
+/// Effects that lanes know: all of the program's in a block, none in tetrahedra.
+fn known_effects(material: &Material, of_tetrahedra: bool) -> Result<(), String> {
     let effects = [
-        (material.plasticity.is_some(), "plasticity"),
-        (material.viscoelastic.is_some(), "viscoelasticity"),
-        (material.damage.is_some(), "damage"),
-        (material.fibres.is_some(), "fibres"),
+        (of_tetrahedra && material.plasticity.is_some(), "plasticity in tetrahedra"),
+        (of_tetrahedra && material.viscoelastic.is_some(), "viscoelasticity in tetrahedra"),
+        (of_tetrahedra && material.damage.is_some(), "damage in tetrahedra"),
+        (of_tetrahedra && material.fibres.is_some(), "fibres in tetrahedra"),
         (!material.own.is_empty(), "effects of a program's own"),
     ];
-    if let Some((_, name)) = effects.into_iter().find(|(is_on, _)| *is_on) {
-        return Err(name.into());
+    match effects.into_iter().find(|(is_on, _)| *is_on) {
+        Some((_, name)) => Err(name.into()),
+        None => Ok(()),
     }
+}
+
+fn known_law(material: &Material) -> Result<(Polynomial, Option<Powers<f64>>), String> {
     let law = &material.law.isochoric;
     match (law.polynomial(), law.powers()) {
         (Some(polynomial), powers) => Ok((polynomial, powers)),

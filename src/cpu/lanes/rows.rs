@@ -10,14 +10,15 @@ use super::block::{Grid, LINES, MIXED, PLACE};
 use super::corners::{HOURGLASS, SIGNS};
 use super::nodes::NODE;
 use super::number::Lanes;
+use super::points::{Around, Points, VectorPoints};
 use super::shapes::{Boxes, Prisms, Shape};
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, Elements};
-use crate::material::regular::{Constants, Regular, dot};
+use crate::material::regular::{Constants, LawInLanes, Regular, dot};
 use crate::material::stretches::Powers;
 use crate::mesh::CORNERS;
 use crate::model::Model;
-use crate::number::Number;
+use crate::number::{Number, Tensor};
 
 /// What all rows read.
 pub(super) struct CellRows<'a> {
@@ -28,6 +29,10 @@ pub(super) struct CellRows<'a> {
     pub displacement: &'a [DVec3],
     /// Per cell; empty: all of it.
     pub stiffness: &'a [f64],
+    /// What material points need beside the elastic law; `None`: nothing.
+    pub points: Option<&'a Points>,
+    /// Step [s] and number of the step that histories are brought forward to; `None`: they stay.
+    pub advance: Option<(f64, u64)>,
 }
 
 /// Forces on the corners of a row of cells by corner and axis, then the bound; each with [`WIDEST`] zeros before it.
@@ -52,9 +57,9 @@ impl RowForces {
 }
 
 impl CellRows<'_> {
-    /// Rows of cells from `first` on, into their lines.
-    pub fn compute(&self, first: usize, lines: &mut [f32]) {
-        self.grid.arch.dispatch(SomeRows { rows: self, first, lines });
+    /// Rows of cells from `first` on, into their lines; `histories`: what their points remember.
+    pub fn compute(&self, first: usize, lines: &mut [f32], histories: &mut [f32]) {
+        self.grid.arch.dispatch(SomeRows { rows: self, first, lines, histories });
     }
 }
 
@@ -62,6 +67,7 @@ struct SomeRows<'a> {
     rows: &'a CellRows<'a>,
     first: usize,
     lines: &'a mut [f32],
+    histories: &'a mut [f32],
 }
 
 impl WithSimd for SomeRows<'_> {
@@ -69,13 +75,21 @@ impl WithSimd for SomeRows<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let SomeRows { rows, first, lines } = self;
+        let SomeRows { rows, first, lines, histories } = self;
         let (stride, ny) = (rows.grid.stride, rows.grid.cells[1]);
         let mut forces = RowForces::new(stride);
         let mut intact = vec![1.0f32; stride];
         for (i, lines) in lines.chunks_exact_mut(LINES * stride).enumerate() {
             let row = first + i;
-            cell_row(simd, rows, [row % ny, row / ny], &mut forces, &mut intact);
+            let at = [row % ny, row / ny];
+            match rows.points {
+                None => cell_row(simd, rows, at, &mut forces, &mut intact),
+                Some(points) => {
+                    let length = points.row_length();
+                    let history = &mut histories[i * length..(i + 1) * length];
+                    row_of_points(simd, rows, (points, history), at, &mut forces, &mut intact);
+                }
+            }
             add_up(simd, &forces, stride, rows.grid.cells[0] + 1, lines);
         }
     }
@@ -159,15 +173,138 @@ fn cell_row<S: Simd>(simd: S, rows: &CellRows, at: [usize; 2], forces: &mut RowF
             nothing(simd, &vector, forces);
             continue;
         };
+        let answers = Elastic { of_powers: Lanes::splat(simd, 0.0) };
         let is_known = match &grid.bent {
-            None => lane_forces(simd, grid, &Boxes::new(simd, grid, i, at), &material, &vector, forces),
+            None => lane_forces(simd, grid, &Boxes::new(simd, grid, i, at), &material, answers, &vector, forces),
             Some(columns) => {
-                lane_forces(simd, grid, &Prisms::new(simd, grid, columns, i, at), &material, &vector, forces)
+                let prisms = Prisms::new(simd, grid, columns, i, at);
+                lane_forces(simd, grid, &prisms, &material, answers, &vector, forces)
             }
         };
         if !is_known {
-            cells_one_by_one(rows, row.first_cell, i..(i + Lanes::<S>::COUNT).min(nx), forces);
+            cells_one_by_one(rows, row.first_cell, i..(i + Lanes::<S>::COUNT).min(nx), None, forces);
         }
+    }
+}
+
+/// The same where material points do more than the elastic law.
+#[inline(always)]
+fn row_of_points<S: Simd>(
+    simd: S,
+    rows: &CellRows,
+    (points, history): (&Points, &mut [f32]),
+    at: [usize; 2],
+    forces: &mut RowForces,
+    intact: &mut [f32],
+) {
+    let grid = rows.grid;
+    let nx = grid.cells[0];
+    let row = rows.row(at, intact);
+    let kind = |i: usize| rows.model.material_index(row.first_cell + i);
+    for i in (0..nx).step_by(Lanes::<S>::COUNT) {
+        let (vector, material) = rows.vector(simd, &row, i, intact);
+        let Some(material) = material else {
+            nothing(simd, &vector, forces);
+            continue;
+        };
+        let is_uniform = material.holds.is_none();
+        let answers = Remembering {
+            points: VectorPoints::new(simd, points, history, (i, nx), is_uniform, kind),
+            tangent: [Lanes::splat(simd, 0.0); 2],
+        };
+        let is_known = match &grid.bent {
+            None => lane_forces(simd, grid, &Boxes::new(simd, grid, i, at), &material, answers, &vector, forces),
+            Some(columns) => {
+                let prisms = Prisms::new(simd, grid, columns, i, at);
+                lane_forces(simd, grid, &prisms, &material, answers, &vector, forces)
+            }
+        };
+        if !is_known {
+            let cells = i..(i + Lanes::<S>::COUNT).min(nx);
+            cells_one_by_one(rows, row.first_cell, cells, Some((points, history)), forces);
+        }
+    }
+}
+
+/// What the material of a vector answers to its state.
+trait Answer<S: Simd> {
+    /// Stress with its pressure [Pa], and the part of the stiffness that is left; `None` where a lane has left the range of these forms.
+    fn stress(
+        &mut self,
+        simd: S,
+        material: &MaterialLanes<S>,
+        state: &Regular<Lanes<S>>,
+        around: &Around<S>,
+    ) -> Option<(Tensor<Lanes<S>>, Lanes<S>)>;
+    /// Bounds of the tangent, straight and turned [Pa].
+    fn tangent(&self, material: &MaterialLanes<S>, state: &Regular<Lanes<S>>) -> [Lanes<S>; 2];
+}
+
+/// The elastic law alone.
+struct Elastic<S: Simd> {
+    of_powers: Lanes<S>,
+}
+
+impl<S: Simd> Answer<S> for Elastic<S> {
+    #[inline(always)]
+    fn stress(
+        &mut self,
+        _: S,
+        material: &MaterialLanes<S>,
+        state: &Regular<Lanes<S>>,
+        around: &Around<S>,
+    ) -> Option<(Tensor<Lanes<S>>, Lanes<S>)> {
+        let mut p = state.stress(&material.law.polynomial, material.bulk * state.dj);
+        if let Some(powers) = &material.law.powers {
+            let (added, bound) = state.stress_and_bound_of_powers(powers)?;
+            self.of_powers = bound;
+            for b in 0..3 {
+                for axis in 0..3 {
+                    p[b][axis] = p[b][axis] + added[b][axis];
+                }
+            }
+        }
+        Some((p, around.kept))
+    }
+
+    #[inline(always)]
+    fn tangent(&self, material: &MaterialLanes<S>, state: &Regular<Lanes<S>>) -> [Lanes<S>; 2] {
+        let [straight, turned] = state.tangent_bound(&material.law.polynomial, material.bulk);
+        [straight + self.of_powers, turned]
+    }
+}
+
+/// Material points with their histories.
+struct Remembering<'a, 'b, S: Simd> {
+    points: VectorPoints<'a, 'b, S>,
+    tangent: [Lanes<S>; 2],
+}
+
+impl<S: Simd> Answer<S> for Remembering<'_, '_, S> {
+    #[inline(always)]
+    fn stress(
+        &mut self,
+        simd: S,
+        material: &MaterialLanes<S>,
+        state: &Regular<Lanes<S>>,
+        around: &Around<S>,
+    ) -> Option<(Tensor<Lanes<S>>, Lanes<S>)> {
+        let answer = self.points.answer(simd, &material.law, state, around)?;
+        self.tangent = answer.tangent;
+        let pressure = material.bulk * state.dj;
+        let cof = state.cofactor();
+        let mut p = answer.stress;
+        for b in 0..3 {
+            for axis in 0..3 {
+                p[b][axis] = cof[b][axis].mul_add(pressure, p[b][axis]);
+            }
+        }
+        Some((p, answer.intact))
+    }
+
+    #[inline(always)]
+    fn tangent(&self, _: &MaterialLanes<S>, _: &Regular<Lanes<S>>) -> [Lanes<S>; 2] {
+        self.tangent
     }
 }
 
@@ -187,9 +324,7 @@ fn nothing<S: Simd>(simd: S, at: &Vector, forces: &mut RowForces) {
 
 /// Constants of the materials of a vector.
 pub(super) struct MaterialLanes<S: Simd> {
-    pub law: Constants<Lanes<S>>,
-    /// `None`: no lane has any.
-    pub powers: Option<Powers<Lanes<S>>>,
+    pub law: LawInLanes<Lanes<S>>,
     pub bulk: Lanes<S>,
     pub hourglass: Lanes<S>,
     /// 1 where a cell holds tissue, 0 where it is empty; `None`: all do.
@@ -206,8 +341,7 @@ impl<S: Simd> MaterialLanes<S> {
             powers = Some(of_material.in_lanes(zero));
         }
         MaterialLanes {
-            law: material.law.in_lanes(zero),
-            powers,
+            law: LawInLanes { polynomial: material.law.in_lanes(zero), powers },
             bulk: Lanes::splat(simd, material.bulk_modulus as f32),
             hourglass: Lanes::splat(simd, material.hourglass as f32),
             holds: None,
@@ -219,7 +353,7 @@ impl<S: Simd> MaterialLanes<S> {
     fn mixed(simd: S, grid: &Grid, row: &[f32], i: usize) -> Self {
         let stride = grid.stride;
         let number = |number: usize| number * stride + i;
-        let law = Constants {
+        let polynomial = Constants {
             c1: Lanes::load(simd, row, number(0)),
             c2: Lanes::load(simd, row, number(1)),
             c3: Lanes::load(simd, row, number(2)),
@@ -232,8 +366,7 @@ impl<S: Simd> MaterialLanes<S> {
             false => None,
         };
         MaterialLanes {
-            law,
-            powers,
+            law: LawInLanes { polynomial, powers },
             bulk: Lanes::load(simd, row, number(4)),
             hourglass: Lanes::load(simd, row, number(5)),
             holds: Some(Lanes::load(simd, row, number(6))),
@@ -310,6 +443,7 @@ fn lane_forces<S: Simd>(
     grid: &Grid,
     shape: &impl Shape<S>,
     material: &MaterialLanes<S>,
+    mut answers: impl Answer<S>,
     at: &Vector,
     forces: &mut RowForces,
 ) -> bool {
@@ -332,19 +466,7 @@ fn lane_forces<S: Simd>(
         }
     }
     let Some(state) = Regular::new(h) else { return false };
-    let intact = Lanes::load(simd, at.intact, at.i);
     let bulk = material.bulk;
-    let mut p = state.stress(&material.law, bulk * state.dj);
-    let mut of_powers = zero;
-    if let Some(powers) = &material.powers {
-        let Some((added, bound)) = state.stress_and_bound_of_powers(powers) else { return false };
-        of_powers = bound;
-        for b in 0..3 {
-            for axis in 0..3 {
-                p[b][axis] = p[b][axis] + added[b][axis];
-            }
-        }
-    }
     let [volume, edge, inverse_square] = shape.sizes();
     shape.take_linear(&mut modes);
     // Hourglass modes: products of two and of three signs; an eighth of the sums.
@@ -357,6 +479,15 @@ fn lane_forces<S: Simd>(
     let q2 = q2 * Lanes::splat(simd, 1.0 / 64.0);
     let folding = Lanes::splat(simd, grid.quartic as f32) * q2 * inverse_square;
     let hourglass = material.hourglass * edge;
+    let half = Lanes::splat(simd, 0.5);
+    let around = Around {
+        length: edge,
+        kept: Lanes::load(simd, at.intact, at.i),
+        other_energy: (half * hourglass * q2 * half.mul_add(folding, one))
+            .over(volume.larger(Lanes::splat(simd, 1e-30))),
+        bulk_modulus: bulk,
+    };
+    let Some((p, intact)) = answers.stress(simd, material, &state, &around) else { return false };
     let kh = intact * hourglass * (one + folding) * Lanes::splat(simd, 1.0 / 64.0);
     let by_mode = shape.scaled(intact * volume).turned(&p);
     for axis in 0..3 {
@@ -374,8 +505,7 @@ fn lane_forces<S: Simd>(
             v[corner].store(&mut forces.values, place);
         }
     }
-    let [straight, turned] = state.tangent_bound(&material.law, bulk);
-    let straight = straight + of_powers;
+    let [straight, turned] = answers.tangent(material, &state);
     let cof = shape.turned(&state.cofactor());
     let (xx, yy, zz) = (dot(cof[0], cof[0]), dot(cof[1], cof[1]), dot(cof[2], cof[2]));
     let (xy, yz, zx) = (dot(cof[0], cof[1]).size(), dot(cof[1], cof[2]).size(), dot(cof[2], cof[0]).size());
@@ -397,14 +527,26 @@ fn lane_forces<S: Simd>(
 
 /// The same in f64.
 #[cold]
-fn cells_one_by_one(rows: &CellRows, first_cell: usize, cells: std::ops::Range<usize>, forces: &mut RowForces) {
+fn cells_one_by_one(
+    rows: &CellRows,
+    first_cell: usize,
+    cells: std::ops::Range<usize>,
+    mut remembered: Option<(&Points, &mut [f32])>,
+    forces: &mut RowForces,
+) {
     // Corner of `CORNERS` by its bits.
     let numbers = CORNERS.map(|c| (0..3).map(|a| usize::from(c[a] > 0.0) << a).sum::<usize>());
     for i in cells {
         let cell = first_cell + i;
         let remaining = rows.stiffness.get(cell).copied().unwrap_or(1.0);
-        let input = CellInput { averaged: None, remaining, point: None, advance: None };
-        let (of_cell, _) = rows.elements.corner_forces(rows.model, cell, rows.displacement, input);
+        let mut point = remembered.as_ref().map(|(points, history)| points.point(history, i));
+        let input = CellInput { averaged: None, remaining, point: point.as_mut(), advance: rows.advance };
+        let (of_cell, met) = rows.elements.corner_forces(rows.model, cell, rows.displacement, input);
+        if let (Some((points, history)), Some(point)) = (&mut remembered, &point)
+            && rows.advance.is_some()
+        {
+            points.put_back(point, met, i, history);
+        }
         for (corner, force) in numbers.into_iter().zip(of_cell.force) {
             for axis in 0..3 {
                 let place = forces.place(corner, axis, i);
