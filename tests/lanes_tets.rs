@@ -223,7 +223,7 @@ fn a_collapsed_cell_is_caught_as_in_f64() {
 fn an_imported_mesh_runs_in_lanes_and_says_so() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/forearm.toml");
     let mut scene = Scene::load(&path, &[]).unwrap();
-    assert_eq!(unknown_to_lanes(&scene).as_deref(), Some("fibres"));
+    assert_eq!(unknown_to_lanes(&scene).as_deref(), Some("fibres in tetrahedra"));
     scene.effects.fibres = None;
     let first = |choice: EngineChoice| {
         let mut simulation = Simulation::new(scene.clone(), choice).unwrap();

@@ -368,8 +368,8 @@ impl CpuEngine {
             let measure = |cell: usize| elements.measure(model, cell, &state.displacement, of(cell), states);
             (0..model.mesh.cell_count()).into_par_iter().map(measure).collect()
         };
-        let in_lanes = |lanes: &LaneCells| lanes.measure(model, elements, &state.displacement, &state.stiffness);
-        let measures = self.lanes.as_ref().and_then(in_lanes).unwrap_or_else(in_f64);
+        let in_lanes = |lanes: &mut LaneCells| lanes.measure(model, elements, &state.displacement, states);
+        let measures = self.lanes.as_mut().and_then(in_lanes).unwrap_or_else(in_f64);
         let dissipated = self.dissipated();
         let sums = &mut self.sums;
         let mut energies = [0.0; 3];

@@ -189,9 +189,9 @@ pub mod in_lanes {
         equivalent: N,
     }
 
-    /// `A + B + A B`, of which `I + A` and `I + B` are the factors.
+    /// `A + B + A B`: the product of `I + A` and `I + B`, less I. He of H and G - I.
     #[inline(always)]
-    fn composed<N: Number>(a: &Tensor<N>, b: &Tensor<N>) -> Tensor<N> {
+    pub fn composed<N: Number>(a: &Tensor<N>, b: &Tensor<N>) -> Tensor<N> {
         let mut out = product(a, b);
         for column in 0..3 {
             for row in 0..3 {

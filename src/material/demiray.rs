@@ -8,6 +8,7 @@
 //! `mu0 = mu`. Source: Demiray 1972; isochoric split: `src/material/mod.rs`; continuation: this project.
 
 use super::law::{Constant, Constants, Form, Law, Search};
+use super::regular::Exponential;
 use super::{InvariantLaw, Isochoric, Slopes, Verdict};
 
 pub const LAW: Law = Law {
@@ -29,7 +30,7 @@ pub const LAW: Law = Law {
 const LEAST_FITTED_B: f64 = 1e-3;
 
 /// Exponent at which exponential laws continue as polynomials.
-pub const LARGEST_EXPONENT: f64 = 10.0;
+pub const LARGEST_EXPONENT: f64 = super::regular::LARGEST_EXPONENT;
 
 /// `exp(x) - 1` with its first and second derivative; second-order Taylor polynomial beyond `LARGEST_EXPONENT`.
 pub fn capped_exponential(x: f64) -> (f64, f64, f64) {
@@ -77,6 +78,10 @@ impl InvariantLaw for Demiray {
     fn slopes(&self, e: f64) -> Slopes {
         let (_, first, second) = capped_exponential(self.b * e);
         Slopes { w1: 0.5 * self.mu * first, w2: 0.0, w11: 0.5 * self.mu * self.b * second }
+    }
+
+    fn exponential(&self) -> Option<Exponential<f64>> {
+        Some(Exponential { mu: self.mu, b: self.b })
     }
 
     fn is_capped(&self, e: impl FnOnce() -> f64) -> bool {

@@ -6,7 +6,7 @@ use super::kinematics::{
     J_CONTINUATION, Measure, cofactor, invariants, is_measure_continued, isochoric_measure, jacobian_minus_one,
 };
 use super::law::IsochoricLaw;
-use super::regular::Polynomial;
+use super::regular::{Exponential, Polynomial};
 use super::{Continuation, LARGEST_STRETCH, Mode, TangentBound, Verdict};
 
 /// Degrees m of `J^-m I1` and `J^-m I2`.
@@ -29,6 +29,10 @@ pub trait InvariantLaw {
     fn slopes(&self, i1: f64) -> Slopes;
     /// Its constants where it is a polynomial, for [`regular`](super::regular).
     fn polynomial(&self) -> Option<Polynomial> {
+        None
+    }
+    /// Its constants where it is an exponential, for [`regular`](super::regular).
+    fn exponential(&self) -> Option<Exponential<f64>> {
         None
     }
     /// Whether it depends on `I1bar`, and on `I2bar`.
@@ -152,6 +156,10 @@ impl<L: InvariantLaw> IsochoricLaw for L {
 
     fn polynomial(&self) -> Option<Polynomial> {
         InvariantLaw::polynomial(self)
+    }
+
+    fn exponential(&self) -> Option<Exponential<f64>> {
+        InvariantLaw::exponential(self)
     }
 
     fn nominal_stress(&self, mode: Mode, x: f64) -> f64 {

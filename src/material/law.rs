@@ -6,7 +6,7 @@
 
 use glam::DMat3;
 
-use super::regular::Polynomial;
+use super::regular::{Exponential, Polynomial};
 use super::stretches::Powers;
 use super::{Continuation, Isochoric, LAWS, Mode, TangentBound};
 
@@ -158,6 +158,10 @@ pub trait IsochoricLaw {
     fn polynomial(&self) -> Option<Polynomial> {
         None
     }
+    /// Its constants where it is an exponential of `I1bar`.
+    fn exponential(&self) -> Option<Exponential<f64>> {
+        None
+    }
     /// Its constants where it is a sum of powers of the stretches.
     fn powers(&self) -> Option<Powers<f64>> {
         None
@@ -250,6 +254,12 @@ macro_rules! laws {
             fn polynomial(&self) -> Option<Polynomial> {
                 match self {
                     $(Isochoric::$Law(l) => IsochoricLaw::polynomial(l)),+
+                }
+            }
+
+            fn exponential(&self) -> Option<Exponential<f64>> {
+                match self {
+                    $(Isochoric::$Law(l) => IsochoricLaw::exponential(l)),+
                 }
             }
 

@@ -39,7 +39,7 @@ pub use mode::Mode;
 
 use glam::{DMat3, DVec3};
 use kinematics::{cofactor, double_dot, jacobian_minus_one};
-use regular::Polynomial;
+use regular::{Exponential, Polynomial};
 use stretches::Powers;
 
 use crate::units::four_digits;

@@ -19,6 +19,8 @@ use crate::number::{Number, Tensor};
 pub const LEAST_J: f64 = 0.4;
 /// See [`LEAST_J`].
 pub const LARGEST_J: f64 = 2.2;
+/// Beyond this exponent an exponential law is continued as a polynomial, see [`super::demiray`].
+pub(super) const LARGEST_EXPONENT: f64 = 10.0;
 
 /// `W_iso = c1 e + c2 e^2 + c3 e^3 + c01 (I2bar - 3)` with `e = I1bar - 3` [Pa]: neo-Hooke, Mooney-Rivlin and Yeoh.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -69,10 +71,26 @@ impl<N: Number> Constants<N> {
     }
 }
 
-/// An elastic law: its polynomial part, and its powers of the stretches, if any lane has such.
+/// `W_iso = mu/(2 b) (exp(b e) - 1)` with `e = I1bar - 3`: shear modulus [Pa] and exponent; a lane of another law has mu = 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Exponential<N> {
+    pub mu: N,
+    pub b: N,
+}
+
+impl Exponential<f64> {
+    /// In every lane of a number of the kind of `n`.
+    #[inline(always)]
+    pub fn in_lanes<N: Number>(&self, n: N) -> Exponential<N> {
+        Exponential { mu: n.of(self.mu), b: n.of(self.b) }
+    }
+}
+
+/// An elastic law: its polynomial part, and its exponential and its powers of the stretches, if any lane has such.
 #[derive(Debug, Clone, Copy)]
 pub struct LawInLanes<N> {
     pub polynomial: Constants<N>,
+    pub exponential: Option<Exponential<N>>,
     pub powers: Option<Powers<N>>,
 }
 
@@ -82,6 +100,8 @@ pub struct LawAnswer<N> {
     pub state: Regular<N>,
     /// P_iso [Pa].
     pub stress: Tensor<N>,
+    /// The polynomial that its slopes are those of, for the bound of the tangent.
+    pub slopes: Constants<N>,
     /// Part of the straight bound of the tangent that powers of the stretches have [Pa].
     pub of_powers: N,
 }
@@ -92,7 +112,8 @@ impl<N: Number> LawInLanes<N> {
     pub fn answer(&self, h: &Tensor<N>) -> Option<LawAnswer<N>> {
         let state = Regular::new(*h)?;
         let none = state.dj.of(0.0);
-        let mut stress = state.stress(&self.polynomial, none);
+        let slopes = self.slopes_at(&state)?;
+        let mut stress = state.stress(&slopes, none);
         let mut of_powers = none;
         if let Some(powers) = &self.powers {
             let (added, bound) = state.stress_and_bound_of_powers(powers)?;
@@ -103,7 +124,43 @@ impl<N: Number> LawInLanes<N> {
                 }
             }
         }
-        Some(LawAnswer { state, stress, of_powers })
+        Some(LawAnswer { state, stress, slopes, of_powers })
+    }
+
+    /// The polynomial with the slopes w1 and w11 of an exponential in this state; `None` where a lane has left the exponential for what
+    /// continues it.
+    #[inline(always)]
+    pub fn slopes_at(&self, state: &Regular<N>) -> Option<Constants<N>> {
+        let Some(Exponential { mu, b }) = self.exponential else { return Some(self.polynomial) };
+        let n = state.dj;
+        let e = state.first_less_three();
+        let x = b * e;
+        if !x.is_within(-1.0, LARGEST_EXPONENT) {
+            return None;
+        }
+        // w1 of it and w11/2.
+        let w1 = n.of(0.5) * mu * (x.exponential() + n.of(1.0));
+        let half = n.of(0.5) * b * w1;
+        let polynomial = self.polynomial;
+        Some(Constants {
+            c1: polynomial.c1 + (w1 - n.of(2.0) * half * e),
+            c2: polynomial.c2 + half,
+            is_linear: false,
+            ..polynomial
+        })
+    }
+
+    /// W_iso [J/m^3] without powers of the stretches; `None` as of [`LawInLanes::slopes_at`].
+    #[inline(always)]
+    pub fn energy(&self, state: &Regular<N>) -> Option<N> {
+        let n = state.dj;
+        let polynomial = state.energy(&self.polynomial, n.of(0.0));
+        let Some(Exponential { mu, b }) = self.exponential else { return Some(polynomial) };
+        let x = b * state.first_to_all_digits();
+        if !x.is_within(-1.0, LARGEST_EXPONENT) {
+            return None;
+        }
+        Some((n.of(0.5) * mu.over(b)).mul_add(x.exponential(), polynomial))
     }
 }
 
@@ -201,6 +258,34 @@ impl<N: Number> Regular<N> {
         (&self.h, &self.strain)
     }
 
+    /// I1bar - 3 = J^(-2/3) (e1 + 3 - 3 J^(2/3)): the strain of a law in which it is no factor of the stress is not small where it matters.
+    #[inline(always)]
+    fn first_less_three(&self) -> N {
+        let n = self.dj;
+        self.root * self.root * (self.e1 + n.of(3.0)) - n.of(3.0)
+    }
+
+    /// The same to the digits of its own size.
+    #[inline(always)]
+    fn first_to_all_digits(&self) -> N {
+        let (one, two) = (self.dj.of(1.0), self.dj.of(2.0));
+        let [d1, less, r2, r] = self.of_shape();
+        r2 * (less * less).mul_add(two * r + one, d1)
+    }
+
+    /// d1, r - 1, J^(-2/3) and r = J^(1/3).
+    #[inline(always)]
+    fn of_shape(&self) -> [N; 4] {
+        let Regular { h, dj, j, root, .. } = *self;
+        let (one, two) = (dj.of(1.0), dj.of(2.0));
+        let d1 = dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]) - two * self.dj_second;
+        let r2 = root * root;
+        let r = j * r2;
+        // r - 1, of r^3 - 1.
+        let less = dj.over(r.mul_add(r, r) + one);
+        [d1, less, r2, r]
+    }
+
     /// Slopes w1, w2 and w11 of the law.
     #[inline(always)]
     fn slopes(&self, law: &Constants<N>) -> [N; 3] {
@@ -208,8 +293,7 @@ impl<N: Number> Regular<N> {
         if law.is_linear {
             return [law.c1, law.c01, n.of(0.0)];
         }
-        // I1bar - 3 = J^(-2/3) (e1 + 3 - 3 J^(2/3)): the strain of a polynomial law is not small where it matters.
-        let e = self.root * self.root * (self.e1 + n.of(3.0)) - n.of(3.0);
+        let e = self.first_less_three();
         let (twice, thrice) = (n.of(2.0) * law.c2, n.of(3.0) * law.c3);
         let w1 = e.mul_add(e.mul_add(thrice, twice), law.c1);
         [w1, law.c01, e.mul_add(n.of(2.0) * thrice, twice)]
@@ -271,14 +355,10 @@ impl<N: Number> Regular<N> {
     /// W_iso + 1/2 kappa (J - 1)^2 [J/m^3], to the digits of its own size however small the strain.
     #[inline(always)]
     pub fn energy(&self, law: &Constants<N>, bulk_modulus: N) -> N {
-        let Regular { h, dj, j, root, .. } = *self;
+        let Regular { dj, .. } = *self;
         let n = dj;
         let (one, two) = (n.of(1.0), n.of(2.0));
-        let d1 = dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]) - two * self.dj_second;
-        let r2 = root * root;
-        let r = j * r2;
-        // r - 1, of r^3 - 1.
-        let less = dj.over(r.mul_add(r, r) + one);
+        let [d1, less, r2, r] = self.of_shape();
         let squared = less * less;
         let e = r2 * squared.mul_add(two * r + one, d1);
         let mut w = e * law.c1;

@@ -142,33 +142,42 @@ fn regions_and_all_effects_together() {
     let used: std::collections::BTreeSet<u8> = model.cell_material.iter().copied().collect();
     assert_eq!(used.len(), 5, "regions without a cell: {used:?}");
     let dt = 2e-6;
+    let mut lanes = CpuEngine::in_lanes(model.clone(), dt);
+    assert!(lanes.info().adapter.contains("lanes of f32"), "{}", lanes.info().adapter);
+    beside_f64("lanes", &mut lanes, &model, dt);
     let Some(mut gpu) = gpu_engine(&model, dt, 20) else { return };
-    let mut cpu = CpuEngine::new(model.clone(), dt);
-    shake(&mut gpu, &mut cpu, 0.15, 7);
-    // A blow, and what the histories make of it in 80 steps.
+    beside_f64("gpu", &mut gpu, &model, dt);
+}
+
+/// A blow, and what the histories make of it in 80 steps, on this engine and in f64.
+fn beside_f64(engine: &str, other: &mut dyn Engine, model: &Model, dt: f64) {
+    let mut cpu = CpuEngine::new(Arc::new(Model::clone(model)), dt);
+    shake(other, &mut cpu, 0.15, 7);
     let (mut a, mut b) = (0, 0);
     let mut totals = [[0.0; 3]; 2];
     for _ in 0..4 {
-        let found = advance(&mut gpu, &model, dt, &mut a, 20);
-        let expected = advance(&mut cpu, &model, dt, &mut b, 20);
+        let found = advance(other, model, dt, &mut a, 20);
+        let expected = advance(&mut cpu, model, dt, &mut b, 20);
         for (total, s) in totals.iter_mut().zip([&found, &expected]) {
             total[0] += s.energy.plastic;
             total[1] += s.energy.damage;
             total[2] = s.energy.viscous;
         }
-        close("elastic energy", found.energy.elastic, expected.energy.elastic, 1e-3);
-        assert_eq!((found.health.return_failures, expected.health.return_failures), (0, 0));
-        at_most("damage", (found.health.largest_damage - expected.health.largest_damage).abs(), 1e-3);
+        close(&format!("{engine}: elastic energy"), found.energy.elastic, expected.energy.elastic, 1e-3);
+        assert_eq!((found.health.return_failures, expected.health.return_failures), (0, 0), "{engine}");
+        let apart = (found.health.largest_damage - expected.health.largest_damage).abs();
+        at_most(&format!("{engine}: damage"), apart, 1e-3);
     }
     for (name, i) in [("plastic", 0), ("damage", 1), ("viscous", 2)] {
         assert!(totals[1][i] > 0.0, "{name}: nothing happened");
-        close(&format!("{name} dissipation"), totals[0][i], totals[1][i], 5e-3);
+        close(&format!("{engine}: {name} dissipation"), totals[0][i], totals[1][i], 5e-3);
     }
-    let (found, expected) = (gpu.read_state().unwrap(), cpu.read_state().unwrap());
-    at_most("displacement", relative_difference(&found.displacement, &expected.displacement), 1e-4);
+    let (found, expected) = (other.read_state().unwrap(), cpu.read_state().unwrap());
+    let apart = relative_difference(&found.displacement, &expected.displacement);
+    at_most(&format!("{engine}: displacement"), apart, 1e-4);
     let alpha = |s: &stylet::engine::State| s.points.iter().map(|p| p.plastic.alpha).fold(0.0, f64::max);
-    close("largest plastic strain", alpha(&found), alpha(&expected), 1e-3);
-    at_most("internal forces of the states", force_difference(&mut gpu, &mut cpu), 1e-3);
+    close(&format!("{engine}: largest plastic strain"), alpha(&found), alpha(&expected), 1e-3);
+    at_most(&format!("{engine}: internal forces of the states"), force_difference(other, &mut cpu), 1e-3);
 }
 
 /// In 32 bits as well, what must cancel at F = I cancels to the last bit, for every law and with all effects.

@@ -16,7 +16,8 @@ use super::shapes::BentColumns;
 use super::{LaneMaterial, WIDEST, materials_of, threads_for};
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
-use crate::engine::elements::{CellMeasure, Elements};
+use crate::engine::elements::{CellMeasure, CellStates, Elements};
+use crate::material::regular::Exponential;
 use crate::material::stretches::Powers;
 use crate::material_point::PointState;
 use crate::mesh::BlockMesh;
@@ -26,9 +27,9 @@ use crate::model::Model;
 pub(super) const PLACE: usize = 6;
 /// f32 per row of cells in [`LaneBlock::lines`]: force of every axis on four lines of nodes, and the bound of all.
 pub(super) const LINES: usize = 13;
-/// f32 per row of cells in [`Grid::mixed`]: c1, c2, c3, c01, bulk modulus, hourglass modulus, 1 where a cell holds tissue, and mu and alpha of
-/// powers of the stretches.
-pub(super) const MIXED: usize = 9;
+/// f32 per row of cells in [`Grid::mixed`]: c1, c2, c3, c01, bulk modulus, hourglass modulus, 1 where a cell holds tissue, mu and b of an
+/// exponential, mu and alpha of powers of the stretches.
+pub(super) const MIXED: usize = 11;
 /// What varies along x: an entry per cell, zeros behind the last and for gaps.
 #[derive(Debug, Default)]
 pub(super) struct EdgesX {
@@ -77,7 +78,8 @@ pub(super) struct Grid {
     /// True where no material has c2 or c3, and where one has c01.
     pub is_linear: bool,
     pub has_c01: bool,
-    /// True where one has powers of the stretches.
+    /// True where one is an exponential, and where one has powers of the stretches.
+    pub has_exponential: bool,
     pub has_powers: bool,
     pub quartic: f64,
     /// 1 for cells where open faces meet, in rows of `stride`; empty: none.
@@ -143,6 +145,7 @@ impl LaneBlock {
                 bent: BentColumns::new(block, stride),
                 is_linear: materials.iter().all(|m| m.law.is_linear()),
                 has_c01: materials.iter().any(|m| m.law.c01 != 0.0),
+                has_exponential: materials.iter().any(|m| m.exponential.is_some()),
                 has_powers: materials.iter().any(|m| m.powers.is_some()),
                 mixed,
                 materials,
@@ -221,11 +224,6 @@ impl LaneBlock {
         team.map(nodes.numbers.chunks_mut(part * NODE * stride), |i, nodes| gather_rows(grid, lines, i * part, nodes));
     }
 
-    /// True where material points do more than the elastic law.
-    pub fn has_points(&self) -> bool {
-        self.points.is_some()
-    }
-
     /// Takes in what the points remember.
     pub fn take_points(&mut self, states: &[PointState]) {
         let LaneBlock { grid, team, points, histories, .. } = self;
@@ -243,21 +241,28 @@ impl LaneBlock {
         team.map(rows, |_, (row, states)| points.give(row, states)).into_iter().sum()
     }
 
-    /// Energies and Jacobians of all cells.
+    /// Energies and Jacobians of all cells, whose points have given the states what they have become.
     pub fn measure(
-        &self,
+        &mut self,
         model: &Model,
         elements: &Elements,
         displacement: &[DVec3],
-        stiffness: &[f64],
+        states: CellStates,
     ) -> Vec<CellMeasure> {
-        let LaneBlock { grid, team, places, .. } = self;
+        let LaneBlock { grid, team, places, points, histories, .. } = self;
         let [nx, ny, nz] = grid.cells;
-        let stiffness = left_by_a_path(stiffness);
-        let rows = CellRows { grid, places, model, elements, displacement, stiffness, points: None, advance: None };
+        let (stiffness, points) = (left_by_a_path(states.stiffness), points.as_ref());
+        let rows = CellRows { grid, places, model, elements, displacement, stiffness, points, advance: None };
         let part = team.part(ny * nz);
         let mut measures = vec![CellMeasure::default(); nx * ny * nz];
-        team.map(measures.chunks_mut(part * nx), |i, measures| rows.measure(i * part, measures));
+        let work = |i: usize, (measures, histories): (&mut [CellMeasure], &mut [f32])| {
+            rows.measure(i * part, measures, histories, states.points);
+        };
+        let measured = measures.chunks_mut(part * nx);
+        match points.map_or(0, Points::row_length) {
+            0 => team.map(measured.map(|measures| (measures, &mut [][..])), work),
+            length => team.map(measured.zip(histories.chunks_mut(part * length)), work),
+        };
         measures
     }
 
@@ -300,13 +305,16 @@ fn mixed_rows(model: &Model, block: &BlockMesh, materials: &[LaneMaterial], stri
     for (row, values) in mixed.chunks_exact_mut(MIXED * stride).enumerate() {
         // Nothing is divided by an exponent of zero, behind the last cell and where another law is.
         values[(MIXED - 1) * stride..].fill(2.0);
+        values[(MIXED - 3) * stride..(MIXED - 2) * stride].fill(1.0);
         for i in 0..nx {
             let cell = row * nx + i;
             let m = &materials[model.material_index(cell)];
             let holds = if block.is_empty(cell) { 0.0 } else { 1.0 };
-            let Powers { mu, alpha } = m.powers.unwrap_or(Powers { mu: 0.0, alpha: 2.0 });
-            let numbers = [m.law.c1, m.law.c2, m.law.c3, m.law.c01, m.bulk_modulus, m.hourglass, holds, mu, alpha];
-            for (number, value) in numbers.into_iter().enumerate() {
+            let of_law = [m.law.c1, m.law.c2, m.law.c3, m.law.c01, m.bulk_modulus, m.hourglass, holds];
+            let Exponential { mu, b } = m.exponential.unwrap_or(Exponential { mu: 0.0, b: 1.0 });
+            let powers = m.powers.unwrap_or(Powers { mu: 0.0, alpha: 2.0 });
+            let others = [mu, b, powers.mu, powers.alpha];
+            for (number, value) in of_law.into_iter().chain(others).enumerate() {
                 values[number * stride + i] = value as f32;
             }
         }

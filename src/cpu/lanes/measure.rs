@@ -8,22 +8,24 @@ use pulp::{Simd, WithSimd};
 use super::block::Grid;
 use super::corners::{HOURGLASS, SIGNS};
 use super::number::Lanes;
-use super::rows::{CellRows, MaterialLanes, Vector, differences, hadamard};
+use super::points::{Around, PointEnergy, Points, VectorPoints};
+use super::rows::{CellRows, MaterialLanes, Row, Vector, differences, hadamard};
 use super::shapes::{Boxes, Prisms, Shape};
 use crate::engine::elements::{CellMeasure, CellStates};
 use crate::material::regular::Regular;
+use crate::material_point::PointState;
 use crate::number::Number;
 
 /// Jacobian at a corner below which a vector is measured in f64: whether a cell has turned inside out is not left to f32.
 const LEAST_CORNER_J: f64 = 0.02;
 
-/// f32 of a row in [`RowMeasures`]: elastic and hourglass energy, J, and the least J of the corners.
-const NUMBERS: usize = 4;
+/// f32 per cell: elastic and hourglass energy, J, the least J of the corners, energy that Prony terms hold, damage.
+const NUMBERS: usize = 6;
 
 impl CellRows<'_> {
-    /// Measures of the cells of the rows from `first` on.
-    pub fn measure(&self, first: usize, measures: &mut [CellMeasure]) {
-        self.grid.arch.dispatch(MeasuredRows { rows: self, first, measures });
+    /// Measures of the cells of the rows from `first` on; `histories`: what their points remember; `states`: the same of all cells.
+    pub fn measure(&self, first: usize, measures: &mut [CellMeasure], histories: &mut [f32], states: &[PointState]) {
+        self.grid.arch.dispatch(MeasuredRows { rows: self, first, measures, histories, states });
     }
 }
 
@@ -31,6 +33,8 @@ struct MeasuredRows<'a> {
     rows: &'a CellRows<'a>,
     first: usize,
     measures: &'a mut [CellMeasure],
+    histories: &'a mut [f32],
+    states: &'a [PointState],
 }
 
 impl WithSimd for MeasuredRows<'_> {
@@ -38,7 +42,7 @@ impl WithSimd for MeasuredRows<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let MeasuredRows { rows, first, measures } = self;
+        let MeasuredRows { rows, first, measures, histories, states } = self;
         let (stride, [nx, ny, _]) = (rows.grid.stride, rows.grid.cells);
         let mut intact = vec![1.0f32; stride];
         let mut numbers = vec![0.0f32; NUMBERS * stride];
@@ -52,40 +56,133 @@ impl WithSimd for MeasuredRows<'_> {
                     measures[cells].fill(CellMeasure::of_nothing());
                     continue;
                 };
-                let grid = rows.grid;
-                let is_known = match &grid.bent {
-                    None => {
-                        let boxes = Boxes::new(simd, grid, i, at);
-                        lane_measure(simd, grid, &boxes, &material, &vector, &mut numbers)
-                    }
-                    Some(columns) => {
-                        let prisms = Prisms::new(simd, grid, columns, i, at);
-                        lane_measure(simd, grid, &prisms, &material, &vector, &mut numbers)
+                let is_known = match rows.points {
+                    None => shaped_measure(simd, rows, (i, at), &material, &Elastic, &vector, &mut numbers),
+                    Some(points) => {
+                        let length = points.row_length();
+                        let history = &mut histories[number * length..(number + 1) * length];
+                        let of_vector = points_of(simd, rows, (points, history), &row, i, &material);
+                        shaped_measure(simd, rows, (i, at), &material, &of_vector, &vector, &mut numbers)
                     }
                 };
-                if is_known {
-                    for cell in cells {
-                        let value = |number: usize| f64::from(numbers[number * stride + cell]);
-                        measures[cell] = CellMeasure {
-                            elastic: value(0),
-                            hourglass: value(1),
-                            jacobian: value(2),
-                            corner_jacobian: value(3),
-                            ..CellMeasure::default()
-                        };
-                    }
-                } else {
-                    one_by_one(rows, row.first_cell(), cells, measures);
+                if !is_known {
+                    one_by_one(rows, row.first_cell(), cells, measures, states);
+                    continue;
+                }
+                for cell in cells {
+                    let value = |number: usize| f64::from(numbers[number * stride + cell]);
+                    let held = value(4);
+                    measures[cell] = CellMeasure {
+                        elastic: value(0),
+                        hourglass: value(1),
+                        viscous: states.get(row.first_cell() + cell).map_or(0.0, |point| {
+                            rows.model.mesh.cell_volume(row.first_cell() + cell) * point.viscous_work - held
+                        }),
+                        held,
+                        jacobian: value(2),
+                        corner_jacobian: value(3),
+                        damage: value(5),
+                    };
                 }
             }
         }
     }
 }
 
+/// The points of a vector that is measured.
+#[inline(always)]
+fn points_of<'a, 'b, S: Simd>(
+    simd: S,
+    rows: &CellRows,
+    (points, history): (&'a Points, &'b mut [f32]),
+    row: &Row,
+    i: usize,
+    material: &MaterialLanes<S>,
+) -> VectorPoints<'a, 'b, S> {
+    let kind = |i: usize| rows.model.material_index(row.first_cell() + i);
+    VectorPoints::new(simd, points, history, (i, rows.grid.cells[0]), material.holds.is_none(), kind)
+}
+
+/// What the material of a vector stores.
+trait Stores<S: Simd> {
+    /// `None` where a lane has left the range of these forms.
+    fn energy(
+        &self,
+        simd: S,
+        material: &MaterialLanes<S>,
+        state: &Regular<Lanes<S>>,
+        around: &Around<S>,
+    ) -> Option<PointEnergy<S>>;
+}
+
+/// The elastic law alone.
+struct Elastic;
+
+impl<S: Simd> Stores<S> for Elastic {
+    #[inline(always)]
+    fn energy(
+        &self,
+        simd: S,
+        material: &MaterialLanes<S>,
+        state: &Regular<Lanes<S>>,
+        around: &Around<S>,
+    ) -> Option<PointEnergy<S>> {
+        let zero = Lanes::splat(simd, 0.0);
+        let stored = match material.law.exponential {
+            None => state.energy(&material.law.polynomial, material.bulk),
+            Some(_) => {
+                let half = Lanes::splat(simd, 0.5);
+                (half * material.bulk * state.dj).mul_add(state.dj, material.law.energy(state)?)
+            }
+        };
+        Some(PointEnergy { stored: around.kept * stored, held: zero, damage: zero, intact: around.kept })
+    }
+}
+
+impl<S: Simd> Stores<S> for VectorPoints<'_, '_, S> {
+    #[inline(always)]
+    fn energy(
+        &self,
+        simd: S,
+        material: &MaterialLanes<S>,
+        state: &Regular<Lanes<S>>,
+        around: &Around<S>,
+    ) -> Option<PointEnergy<S>> {
+        VectorPoints::energy(self, simd, &material.law, state, around)
+    }
+}
+
+/// [`lane_measure`] of the cells from `i` on of the row at `at`.
+#[inline(always)]
+fn shaped_measure<S: Simd>(
+    simd: S,
+    rows: &CellRows,
+    (i, at): (usize, [usize; 2]),
+    material: &MaterialLanes<S>,
+    stores: &impl Stores<S>,
+    vector: &Vector,
+    numbers: &mut [f32],
+) -> bool {
+    let grid = rows.grid;
+    match &grid.bent {
+        None => lane_measure(simd, grid, &Boxes::new(simd, grid, i, at), material, stores, vector, numbers),
+        Some(columns) => {
+            let prisms = Prisms::new(simd, grid, columns, i, at);
+            lane_measure(simd, grid, &prisms, material, stores, vector, numbers)
+        }
+    }
+}
+
 /// The same in f64.
 #[cold]
-fn one_by_one(rows: &CellRows, first_cell: usize, cells: std::ops::Range<usize>, measures: &mut [CellMeasure]) {
-    let states = CellStates { points: &[], stiffness: rows.stiffness };
+fn one_by_one(
+    rows: &CellRows,
+    first_cell: usize,
+    cells: std::ops::Range<usize>,
+    measures: &mut [CellMeasure],
+    points: &[PointState],
+) {
+    let states = CellStates { points, stiffness: rows.stiffness };
     for i in cells {
         measures[i] = rows.elements.measure(rows.model, first_cell + i, rows.displacement, None, states);
     }
@@ -98,6 +195,7 @@ fn lane_measure<S: Simd>(
     grid: &Grid,
     cells: &impl Shape<S>,
     material: &MaterialLanes<S>,
+    stores: &impl Stores<S>,
     at: &Vector,
     numbers: &mut [f32],
 ) -> bool {
@@ -143,15 +241,24 @@ fn lane_measure<S: Simd>(
     if !least.is_within(LEAST_CORNER_J, f64::from(f32::MAX)) {
         return false;
     }
-    let intact = Lanes::load(simd, at.intact, at.i) * holds;
     let [volume, edge, inverse_square] = cells.sizes();
+    let around = Around {
+        length: edge,
+        kept: Lanes::load(simd, at.intact, at.i) * holds,
+        other_energy: zero,
+        bulk_modulus: material.bulk,
+    };
+    let Some(PointEnergy { stored, held, damage, intact }) = stores.energy(simd, material, &state, &around) else {
+        return false;
+    };
     let q2 = q2 * Lanes::splat(simd, 1.0 / 64.0);
     let folding = Lanes::splat(simd, 0.5 * grid.quartic as f32) * q2 * inverse_square;
-    let elastic = intact * volume * state.energy(&material.law.polynomial, material.bulk);
     let hourglass = intact * Lanes::splat(simd, 0.5) * material.hourglass * edge * q2 * (one + folding);
-    elastic.store(numbers, at.i);
+    (volume * stored).store(numbers, at.i);
     hourglass.store(numbers, stride + at.i);
     (state.dj + one).store(numbers, 2 * stride + at.i);
     least.store(numbers, 3 * stride + at.i);
+    (volume * held).store(numbers, 4 * stride + at.i);
+    damage.store(numbers, 5 * stride + at.i);
     true
 }

@@ -24,10 +24,10 @@ use self::tets::LaneTets;
 use super::integrate_nodes::{NodeStep, NodeSums};
 use super::team::Team;
 use crate::effects::TissueMaterial;
-use crate::engine::elements::{CellForces, CellMeasure, Elements};
+use crate::engine::elements::{CellForces, CellMeasure, CellStates, Elements};
 use crate::material::Isochoric;
 use crate::material::law::IsochoricLaw;
-use crate::material::regular::Polynomial;
+use crate::material::regular::{Exponential, Polynomial};
 use crate::material::stretches::Powers;
 use crate::material_point::{Material, PointState};
 use crate::mesh::Mesh;
@@ -40,18 +40,20 @@ const WIDEST: usize = 16;
 /// Constants of a material, as a vector needs them.
 #[derive(Debug, Clone, Copy)]
 struct LaneMaterial {
-    /// Its polynomial part and its powers of the stretches: one of them is all of it.
+    /// Its polynomial part, its exponential and its powers of the stretches: one of them is all of it.
     law: Polynomial,
+    exponential: Option<Exponential<f64>>,
     powers: Option<Powers<f64>>,
+    has_fibres: bool,
     bulk_modulus: f64,
     /// kappa 3.11 mu0 [Pa].
     hourglass: f64,
 }
 
 impl LaneMaterial {
-    /// Its law, where it is a polynomial.
+    /// Its law, where it is a polynomial and nothing else.
     fn polynomial(&self) -> Option<Polynomial> {
-        self.powers.is_none().then_some(self.law)
+        (self.powers.is_none() && self.exponential.is_none() && !self.has_fibres).then_some(self.law)
     }
 }
 
@@ -129,15 +131,14 @@ impl LaneCells {
 
     /// Energies and Jacobians of all cells in the state of the last forces; `None`: these lanes leave that to f64.
     pub fn measure(
-        &self,
+        &mut self,
         model: &Model,
         elements: &Elements,
         displacement: &[DVec3],
-        stiffness: &[f64],
+        states: CellStates,
     ) -> Option<Vec<CellMeasure>> {
         match self {
-            LaneCells::Block(cells) if cells.has_points() => None,
-            LaneCells::Block(cells) => Some(cells.measure(model, elements, displacement, stiffness)),
+            LaneCells::Block(cells) => Some(cells.measure(model, elements, displacement, states)),
             LaneCells::Tets(_) => None,
         }
     }
@@ -197,7 +198,7 @@ pub fn unknown_to_lanes(scene: &Scene) -> Option<String> {
     let mut tissues = std::iter::once(&scene.material).chain(scene.regions.iter().map(|region| &region.material));
     let known = |tissue: &TissueMaterial| {
         let material = Material::of(tissue, &scene.effects);
-        known_effects(&material, scene.mesh.is_some()).and_then(|()| known_law(&material)).map(drop)
+        known_effects(&material, scene.mesh.is_some()).and_then(|()| known_law(&material.law.isochoric))
     };
     tissues.try_for_each(known).err()
 }
@@ -205,19 +206,28 @@ pub fn unknown_to_lanes(scene: &Scene) -> Option<String> {
 fn materials_of(model: &Model, elements: &Elements) -> Result<Vec<LaneMaterial>, String> {
     let material = |(index, m): (usize, &Material)| {
         known_effects(m, model.mesh.as_tets().is_some())?;
-        let ((law, powers), bulk_modulus) = (known_law(m)?, m.law.bulk_modulus);
-        Ok(LaneMaterial { law, powers, bulk_modulus, hourglass: elements.hourglass_of(index) })
+        let law = &m.law.isochoric;
+        known_law(law)?;
+        Ok(LaneMaterial {
+            law: law.polynomial().unwrap_or_default(),
+            exponential: law.exponential(),
+            powers: law.powers(),
+            has_fibres: m.fibres.is_some(),
+            bulk_modulus: m.law.bulk_modulus,
+            hourglass: elements.hourglass_of(index),
+        })
     };
     model.materials.iter().enumerate().map(material).collect()
 }
 
-/// Effects that lanes know: all of the program's in a block, none in tetrahedra.
+/// What lanes know in a block and not in tetrahedra, and effects that they know nowhere.
 fn known_effects(material: &Material, of_tetrahedra: bool) -> Result<(), String> {
     let effects = [
         (of_tetrahedra && material.plasticity.is_some(), "plasticity in tetrahedra"),
         (of_tetrahedra && material.viscoelastic.is_some(), "viscoelasticity in tetrahedra"),
         (of_tetrahedra && material.damage.is_some(), "damage in tetrahedra"),
         (of_tetrahedra && material.fibres.is_some(), "fibres in tetrahedra"),
+        (of_tetrahedra && material.law.isochoric.exponential().is_some(), "the law demiray in tetrahedra"),
         (!material.own.is_empty(), "effects of a program's own"),
     ];
     match effects.into_iter().find(|(is_on, _)| *is_on) {
@@ -226,16 +236,14 @@ fn known_effects(material: &Material, of_tetrahedra: bool) -> Result<(), String>
     }
 }
 
-fn known_law(material: &Material) -> Result<(Polynomial, Option<Powers<f64>>), String> {
-    let law = &material.law.isochoric;
-    match (law.polynomial(), law.powers()) {
-        (Some(polynomial), powers) => Ok((polynomial, powers)),
-        (None, Some(powers)) => Ok((Polynomial::default(), Some(powers))),
-        (None, None) => Err(match law {
-            Isochoric::Ogden(_) => format!("the law {} with a negative exponent", law.key()),
-            _ => format!("the law {}", law.key()),
-        }),
+fn known_law(law: &Isochoric) -> Result<(), String> {
+    if law.polynomial().is_some() || law.exponential().is_some() || law.powers().is_some() {
+        return Ok(());
     }
+    Err(match law {
+        Isochoric::Ogden(_) => format!("the law {} with a negative exponent", law.key()),
+        _ => format!("the law {}", law.key()),
+    })
 }
 
 /// Threads that so many cells are worth: a stage of a few hundred cells is done before another thread has joined.

@@ -10,7 +10,7 @@ use pulp::Simd;
 use super::number::Lanes;
 use crate::effects::damage::DamageInLanes;
 use crate::effects::fibres::FibresInLanes;
-use crate::effects::plasticity::in_lanes::{Flowing, Yield, return_mapping};
+use crate::effects::plasticity::in_lanes::{Flowing, Yield, composed, return_mapping};
 use crate::effects::viscoelastic::{LARGEST_TERM_COUNT, held_by_strain, second_piola_kirchhoff, take_out};
 use crate::material::regular::{LawAnswer, LawInLanes, Regular};
 use crate::material_point::{Material, PointState};
@@ -32,13 +32,16 @@ struct Constants {
     fibres: [f32; 5],
     damage: [f32; 4],
     ratios: [f32; LARGEST_TERM_COUNT],
+    /// 1/(4 mu0 g) [1/Pa].
+    compliances: [f32; LARGEST_TERM_COUNT],
 }
 
 impl Constants {
     fn of(material: &Material) -> Self {
-        let mut ratios = [0.0; LARGEST_TERM_COUNT];
-        for (ratio, term) in ratios.iter_mut().zip(material.viscoelastic.iter().flat_map(|v| &v.terms)) {
-            *ratio = term.ratio as f32;
+        let (mut ratios, mut compliances) = ([0.0; LARGEST_TERM_COUNT], [0.0; LARGEST_TERM_COUNT]);
+        for (n, term) in material.viscoelastic.iter().flat_map(|v| &v.terms).enumerate() {
+            ratios[n] = term.ratio as f32;
+            compliances[n] = (0.25 / (material.law.shear_modulus() * term.ratio.max(1e-12))) as f32;
         }
         let shear_modulus = material.law.shear_modulus() as f32;
         Constants {
@@ -61,6 +64,7 @@ impl Constants {
                 None => [NEVER, 0.0, 1.0, 1.0],
             },
             ratios,
+            compliances,
         }
     }
 }
@@ -242,6 +246,16 @@ pub(super) struct PointAnswer<S: Simd> {
     pub intact: Lanes<S>,
 }
 
+/// Energies of the points per rest volume, and what is left of them.
+pub(super) struct PointEnergy<S: Simd> {
+    /// Stored, with what the Prony terms hold, and that alone [J/m^3].
+    pub stored: Lanes<S>,
+    pub held: Lanes<S>,
+    /// d, and the part of the stiffness that is left.
+    pub damage: Lanes<S>,
+    pub intact: Lanes<S>,
+}
+
 /// What surrounds the points of a vector.
 pub(super) struct Around<S: Simd> {
     /// Edges of the cells [m], and the stiffness that a path left of them.
@@ -341,6 +355,64 @@ impl<'a, 'b, S: Simd> VectorPoints<'a, 'b, S> {
         Lanes::load(simd, &values, 0)
     }
 
+    /// Energies of the points in the state of H, of a path that left `kept` of their stiffness; `None` where a lane has left the range of these
+    /// forms.
+    #[inline(always)]
+    pub fn energy(
+        &self,
+        simd: S,
+        law: &LawInLanes<Lanes<S>>,
+        state: &Regular<Lanes<S>>,
+        around: &Around<S>,
+    ) -> Option<PointEnergy<S>> {
+        let points = self.points;
+        let zero = Lanes::splat(simd, 0.0);
+        let one = Lanes::splat(simd, 1.0);
+        let (h, twice_strain) = state.strain();
+        let (mut elastic, mut alpha) = (*state, zero);
+        if points.has_plasticity {
+            let mut g = [[zero; 3]; 3];
+            for a in 0..3 {
+                for b in 0..3 {
+                    g[a][b] = self.load(simd, 3 * a + b);
+                }
+            }
+            alpha = self.load(simd, PLASTIC - 1);
+            elastic = Regular::new(composed(h, &g))?;
+        }
+        let half = Lanes::splat(simd, 0.5);
+        let mut stored = law.energy(&elastic)? + half * around.bulk_modulus * state.dj * state.dj;
+        if points.has_fibres {
+            let mut unused = [[zero; 3]; 3];
+            let [_, energy] = self.fibres.add(state, &state.cofactor(), &mut unused)?;
+            stored = stored + energy;
+        }
+        let mut held = zero;
+        if points.terms > 0 {
+            let mut sum = [zero; SYMMETRIC];
+            for n in 0..SYMMETRIC {
+                sum[n] = self.load(simd, points.viscous() + n);
+            }
+            stored = stored - held_by_strain(&sum, twice_strain);
+            for term in 0..points.terms {
+                let compliance = self.of_materials(simd, |kind| points.constants[kind].compliances[term]);
+                let mut squares = zero;
+                for n in 0..SYMMETRIC {
+                    let q = self.load(simd, points.viscous() + SYMMETRIC * (1 + term) + n);
+                    let twice = if n < 3 { q } else { q + q };
+                    squares = q.mul_add(twice, squares);
+                }
+                held = held + compliance * squares;
+            }
+        }
+        let damage = match points.has_damage {
+            true => self.damage.degradation(alpha, around.length),
+            false => zero,
+        };
+        let intact = around.kept * (one - damage);
+        Some(PointEnergy { stored: intact * (stored + held), held: intact * held, damage, intact })
+    }
+
     /// Stress in the state of H, with histories brought forward as [`Points::prepare`] said; `None` where a lane has left the range of these
     /// forms: then nothing has changed.
     #[inline(always)]
@@ -357,7 +429,7 @@ impl<'a, 'b, S: Simd> VectorPoints<'a, 'b, S> {
         let (h, twice_strain) = state.strain();
         let mut flow = Flowing { inverse_flow: [[zero; 3]; 3], alpha: zero, dissipation: zero, failed: zero };
         let mut before = zero;
-        let LawAnswer { state: elastic, mut stress, of_powers } = match points.has_plasticity {
+        let LawAnswer { state: elastic, mut stress, slopes, of_powers } = match points.has_plasticity {
             true => {
                 for a in 0..3 {
                     for b in 0..3 {
@@ -371,7 +443,7 @@ impl<'a, 'b, S: Simd> VectorPoints<'a, 'b, S> {
             false => law.answer(h)?,
         };
         let cof = state.cofactor();
-        let [mut straight, turned] = elastic.tangent_bound(&law.polynomial, around.bulk_modulus);
+        let [mut straight, turned] = elastic.tangent_bound(&slopes, around.bulk_modulus);
         straight = straight + of_powers;
         let mut of_fibres = zero;
         if points.has_fibres {
@@ -430,8 +502,7 @@ impl<'a, 'b, S: Simd> VectorPoints<'a, 'b, S> {
             }
             let half = Lanes::splat(simd, 0.5);
             let volumetric = half * around.bulk_modulus * state.dj * state.dj;
-            let energy =
-                elastic.energy(&law.polynomial, zero) + volumetric + of_fibres - held_by_strain(&sum, twice_strain);
+            let energy = law.energy(&elastic)? + volumetric + of_fibres - held_by_strain(&sum, twice_strain);
             lost = around.kept * grown * (energy + around.other_energy);
         }
         // Nothing is written before this line.

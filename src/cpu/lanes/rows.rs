@@ -14,7 +14,7 @@ use super::points::{Around, Points, VectorPoints};
 use super::shapes::{Boxes, Prisms, Shape};
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, Elements};
-use crate::material::regular::{Constants, LawInLanes, Regular, dot};
+use crate::material::regular::{Constants, Exponential, LawInLanes, Regular, dot};
 use crate::material::stretches::Powers;
 use crate::mesh::CORNERS;
 use crate::model::Model;
@@ -173,7 +173,7 @@ fn cell_row<S: Simd>(simd: S, rows: &CellRows, at: [usize; 2], forces: &mut RowF
             nothing(simd, &vector, forces);
             continue;
         };
-        let answers = Elastic { of_powers: Lanes::splat(simd, 0.0) };
+        let answers = Elastic { slopes: material.law.polynomial, of_powers: Lanes::splat(simd, 0.0) };
         let is_known = match &grid.bent {
             None => lane_forces(simd, grid, &Boxes::new(simd, grid, i, at), &material, answers, &vector, forces),
             Some(columns) => {
@@ -242,6 +242,7 @@ trait Answer<S: Simd> {
 
 /// The elastic law alone.
 struct Elastic<S: Simd> {
+    slopes: Constants<Lanes<S>>,
     of_powers: Lanes<S>,
 }
 
@@ -254,7 +255,8 @@ impl<S: Simd> Answer<S> for Elastic<S> {
         state: &Regular<Lanes<S>>,
         around: &Around<S>,
     ) -> Option<(Tensor<Lanes<S>>, Lanes<S>)> {
-        let mut p = state.stress(&material.law.polynomial, material.bulk * state.dj);
+        self.slopes = material.law.slopes_at(state)?;
+        let mut p = state.stress(&self.slopes, material.bulk * state.dj);
         if let Some(powers) = &material.law.powers {
             let (added, bound) = state.stress_and_bound_of_powers(powers)?;
             self.of_powers = bound;
@@ -269,7 +271,7 @@ impl<S: Simd> Answer<S> for Elastic<S> {
 
     #[inline(always)]
     fn tangent(&self, material: &MaterialLanes<S>, state: &Regular<Lanes<S>>) -> [Lanes<S>; 2] {
-        let [straight, turned] = state.tangent_bound(&material.law.polynomial, material.bulk);
+        let [straight, turned] = state.tangent_bound(&self.slopes, material.bulk);
         [straight + self.of_powers, turned]
     }
 }
@@ -336,12 +338,15 @@ impl<S: Simd> MaterialLanes<S> {
     #[inline(always)]
     fn uniform(simd: S, material: &LaneMaterial) -> Self {
         let zero = Lanes::splat(simd, 0.0);
-        let mut powers = None;
+        let (mut exponential, mut powers) = (None, None);
+        if let Some(of_material) = &material.exponential {
+            exponential = Some(of_material.in_lanes(zero));
+        }
         if let Some(of_material) = &material.powers {
             powers = Some(of_material.in_lanes(zero));
         }
         MaterialLanes {
-            law: LawInLanes { polynomial: material.law.in_lanes(zero), powers },
+            law: LawInLanes { polynomial: material.law.in_lanes(zero), exponential, powers },
             bulk: Lanes::splat(simd, material.bulk_modulus as f32),
             hourglass: Lanes::splat(simd, material.hourglass as f32),
             holds: None,
@@ -361,12 +366,16 @@ impl<S: Simd> MaterialLanes<S> {
             is_linear: grid.is_linear,
             has_c01: grid.has_c01,
         };
+        let exponential = match grid.has_exponential {
+            true => Some(Exponential { mu: Lanes::load(simd, row, number(7)), b: Lanes::load(simd, row, number(8)) }),
+            false => None,
+        };
         let powers = match grid.has_powers {
-            true => Some(Powers { mu: Lanes::load(simd, row, number(7)), alpha: Lanes::load(simd, row, number(8)) }),
+            true => Some(Powers { mu: Lanes::load(simd, row, number(9)), alpha: Lanes::load(simd, row, number(10)) }),
             false => None,
         };
         MaterialLanes {
-            law: LawInLanes { polynomial, powers },
+            law: LawInLanes { polynomial, exponential, powers },
             bulk: Lanes::load(simd, row, number(4)),
             hourglass: Lanes::load(simd, row, number(5)),
             holds: Some(Lanes::load(simd, row, number(6))),

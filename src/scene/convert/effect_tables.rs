@@ -8,6 +8,7 @@ use crate::effects::cohesive::AXES;
 use crate::effects::parameters::Table;
 use crate::effects::puncture::{PathWord, SchemeWord};
 use crate::effects::{self, EffectSet, TissueMaterial};
+use crate::material::demiray::LARGEST_EXPONENT;
 use crate::needle::beam::Section;
 use crate::needle::free_path::MOST_REGIONS;
 use crate::needle::{Motion, Tool};
@@ -167,7 +168,7 @@ impl Check<'_> {
             };
             let whose = index.map_or("the tissue".into(), |i| format!("region `{}`", regions[i].name));
             match material.steady(needle) {
-                Some(Ok(_)) => {}
+                Some(Ok(steady)) => self.opened_fibres(effects, material, &at, steady.radius / steady.hole_radius),
                 None => self.problems.report(
                     &at,
                     format!("the scheme opening takes its forces from the toughness, and {whose} has none"),
@@ -187,6 +188,31 @@ impl Check<'_> {
                     );
                 }
             }
+        }
+    }
+
+    /// Fibres at the wall of an opened path, which is stretched so many times, must not be beyond the exponential of their law: what continues
+    /// it there would store more than the whole needle gives.
+    fn opened_fibres(&mut self, effects: &EffectSet, material: &TissueMaterial, at: &str, stretch: f64) {
+        let Some(fibres) = effects.fibres.map(|common| material.fibres.unwrap_or(common)).filter(|f| f.k1 > 0.0) else {
+            return;
+        };
+        let strain = stretch * stretch - 1.0;
+        let (exponent, most) = (fibres.k2 * strain * strain, LARGEST_EXPONENT);
+        if exponent > most {
+            let key = if material.fibres.is_some() { format!("{at}.fibres.k2") } else { "fibres.k2".into() };
+            self.problems.report(
+                &key,
+                format!(
+                    "the scheme opening would stretch these fibres {stretch:.1} times beside the path, where the exponent of their law is \
+                     {exponent:.0}"
+                ),
+                format!("an exponent k2 e^2 of at most {most}"),
+                format!(
+                    "write k2 of at most {:.1e}, a tear_stretch of the material, or leave puncture.scheme out for the scheme ring",
+                    most / (strain * strain)
+                ),
+            );
         }
     }
 

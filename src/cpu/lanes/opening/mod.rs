@@ -207,7 +207,7 @@ impl LaneOpening {
             let law = material.polynomial().unwrap_or_default();
             [law.c1, law.c2, law.c3, law.c01, material.bulk_modulus]
         };
-        let is_polynomial = |cell: u32| materials[model.material_index(cell as usize)].powers.is_none();
+        let is_polynomial = |cell: u32| materials[model.material_index(cell as usize)].polynomial().is_some();
         // Cell by cell in the order in which they are cut, so that what is open stands together.
         let mut ordered: Vec<(u32, usize, usize)> = Vec::new();
         for (station, points) in plan.stations.iter().enumerate() {
