@@ -62,11 +62,15 @@ pub struct EffectReport {
     pub all_over_bare: f64,
 }
 
+/// Mass scaling of the scenes of the bench.
+const SCALED: f64 = 1000.0;
+
 /// Constitutive effects whose thresholds are so low that a swinging block passes them.
 fn with_effects(effects: &mut EffectSet, keys: &[&str], low: bool) {
     for key in keys {
         match *key {
-            "gravity" => effects.gravity = Some(gravity::Params { acceleration: DVec3::NEG_Z * 9.81 }),
+            // The density carries the factor of mass scaling: under a thousand times its weight the block would be crushed.
+            "gravity" => effects.gravity = Some(gravity::Params { acceleration: DVec3::NEG_Z * (9.81 / SCALED) }),
             "plasticity" => {
                 let yield_stress = if low { 50.0 } else { 23.4e3 };
                 effects.plasticity = Some(plasticity::Params { yield_stress, hardening: 1e4 });
@@ -90,7 +94,7 @@ fn subject(keys: &[&str], low: bool, place: &Place) -> Result<Subject> {
     if !keys.contains(&"mass_scaling") {
         // The uniform factor sets the step; without it the same step is kept by the density.
         scene.effects.mass_scaling = None;
-        scene.material.density *= 1000.0;
+        scene.material.density *= SCALED;
     }
     if !keys.contains(&"friction") {
         scene.effects.friction = None;

@@ -218,7 +218,7 @@ impl IsochoricLaw for Ogden {
     }
 
     fn powers(&self) -> Option<Powers<f64>> {
-        (self.alpha > 0.0).then_some(Powers { mu: self.mu, alpha: self.alpha })
+        (self.alpha != 0.0).then_some(Powers { mu: self.mu, alpha: self.alpha })
     }
 
     /// The closed forms in the stretches; those in the invariants are at [`crate::material::fit`], too.

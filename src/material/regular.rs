@@ -150,17 +150,22 @@ impl<N: Number> LawInLanes<N> {
         })
     }
 
-    /// W_iso [J/m^3] without powers of the stretches; `None` as of [`LawInLanes::slopes_at`].
+    /// W_iso + 1/2 kappa (J - 1)^2 [J/m^3]; `None` where a lane has left the range of the law.
     #[inline(always)]
-    pub fn energy(&self, state: &Regular<N>) -> Option<N> {
+    pub fn energy(&self, state: &Regular<N>, bulk_modulus: N) -> Option<N> {
         let n = state.dj;
-        let polynomial = state.energy(&self.polynomial, n.of(0.0));
-        let Some(Exponential { mu, b }) = self.exponential else { return Some(polynomial) };
-        let x = b * state.first_to_all_digits();
-        if !x.is_within(-1.0, LARGEST_EXPONENT) {
-            return None;
+        let mut energy = state.energy(&self.polynomial, bulk_modulus);
+        if let Some(Exponential { mu, b }) = self.exponential {
+            let x = b * state.first_to_all_digits();
+            if !x.is_within(-1.0, LARGEST_EXPONENT) {
+                return None;
+            }
+            energy = (n.of(0.5) * mu.over(b)).mul_add(x.exponential(), energy);
         }
-        Some((n.of(0.5) * mu.over(b)).mul_add(x.exponential(), polynomial))
+        if let Some(powers) = &self.powers {
+            energy = energy + state.energy_of_powers(powers)?;
+        }
+        Some(energy)
     }
 }
 
@@ -377,6 +382,12 @@ impl<N: Number> Regular<N> {
     pub fn stress_and_bound_of_powers(&self, powers: &Powers<N>) -> Option<(Tensor<N>, N)> {
         let stretches = Stretches::new(self.strain, powers)?;
         Some(stretches.stress_and_bound(powers, &self.h, &self.cofactor_less_one, self.dj))
+    }
+
+    /// W_iso of powers of the stretches [J/m^3]; `None` where a lane has left their range.
+    #[inline(always)]
+    pub fn energy_of_powers(&self, powers: &Powers<N>) -> Option<N> {
+        Some(Stretches::new(self.strain, powers)?.energy(powers, self.dj))
     }
 
     /// Bound of the isochoric tangent, straight and turned, of `InvariantLaw::tangent_bound` [Pa].

@@ -128,13 +128,7 @@ impl<S: Simd> Stores<S> for Elastic {
         around: &Around<S>,
     ) -> Option<PointEnergy<S>> {
         let zero = Lanes::splat(simd, 0.0);
-        let stored = match material.law.exponential {
-            None => state.energy(&material.law.polynomial, material.bulk),
-            Some(_) => {
-                let half = Lanes::splat(simd, 0.5);
-                (half * material.bulk * state.dj).mul_add(state.dj, material.law.energy(state)?)
-            }
-        };
+        let stored = material.law.energy(state, material.bulk)?;
         Some(PointEnergy { stored: around.kept * stored, held: zero, damage: zero, intact: around.kept })
     }
 }
@@ -200,12 +194,6 @@ fn lane_measure<S: Simd>(
     numbers: &mut [f32],
 ) -> bool {
     let stride = grid.stride;
-    // Energies of powers of the stretches are left to f64.
-    if let Some(powers) = &material.law.powers
-        && !powers.mu.is_within(0.0, 0.0)
-    {
-        return false;
-    }
     let zero = Lanes::splat(simd, 0.0);
     let one = Lanes::splat(simd, 1.0);
     let holds = match material.holds {

@@ -237,13 +237,10 @@ fn known_effects(material: &Material, of_tetrahedra: bool) -> Result<(), String>
 }
 
 fn known_law(law: &Isochoric) -> Result<(), String> {
-    if law.polynomial().is_some() || law.exponential().is_some() || law.powers().is_some() {
-        return Ok(());
+    match law.polynomial().is_some() || law.exponential().is_some() || law.powers().is_some() {
+        true => Ok(()),
+        false => Err(format!("the law {}", law.key())),
     }
-    Err(match law {
-        Isochoric::Ogden(_) => format!("the law {} with a negative exponent", law.key()),
-        _ => format!("the law {}", law.key()),
-    })
 }
 
 /// Threads that so many cells are worth: a stage of a few hundred cells is done before another thread has joined.

@@ -125,7 +125,7 @@ impl NodeLines {
         let (width, stride) = (self.width, self.stride);
         // Copies that are tied stand in other lines.
         let any = |node: usize| self.at(node);
-        let is_plain = step.gravity == DVec3::ZERO && step.model.node_load.is_empty();
+        let is_plain = step.model.node_load.is_empty();
         let part = team.part(places.len());
         let nodes = displacement.chunks_mut(part * width).zip(velocity.chunks_mut(part * width));
         let lines = places.chunks_mut(part).zip(self.numbers.chunks(part * NODE * stride));
@@ -177,20 +177,28 @@ impl<'a> NodeLine<'a> {
     }
 }
 
-/// Arrays of a line, with room for a vector behind it: per component kick, new velocity, mass and raised part of it, both the share of a
-/// tied copy; nodes that are not plain, as they were.
+/// Arrays of a line, with room for a vector behind it: per component kick, new velocity, mass, raised part of it and weight, these the share
+/// of a tied copy; nodes that are not plain, as they were.
 struct Scratch {
     kick: Vec<f64>,
     new: Vec<f64>,
     mass: Vec<f64>,
     raised: Vec<f64>,
+    weight: Vec<f64>,
     others: Vec<(usize, DVec3, DVec3)>,
 }
 
 impl Scratch {
     fn new(width: usize) -> Self {
         let zeros = vec![0.0; 3 * width + WIDEST];
-        Scratch { kick: zeros.clone(), new: zeros.clone(), mass: zeros.clone(), raised: zeros, others: Vec::new() }
+        Scratch {
+            kick: zeros.clone(),
+            new: zeros.clone(),
+            mass: zeros.clone(),
+            raised: zeros.clone(),
+            weight: zeros,
+            others: Vec::new(),
+        }
     }
 }
 
@@ -215,8 +223,9 @@ impl WithSimd for PlainLine<'_, '_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let PlainLine { step, first, line, u, v, scratch, sums } = self;
-        let NodeStep { model, dt, .. } = *step;
-        let Scratch { kick, new, mass, raised, others } = scratch;
+        let NodeStep { model, dt, gravity, .. } = *step;
+        let Scratch { kick, new, mass, raised, weight, others } = scratch;
+        let falls = gravity != DVec3::ZERO;
         others.clear();
         let count = u.len();
         let masses = &model.node_mass[first..first + count];
@@ -261,8 +270,18 @@ impl WithSimd for PlainLine<'_, '_> {
                 continue;
             }
             let by = dt / all;
+            let force = if falls { force + gravity * own } else { force };
             *kick = [force.x * by, force.y * by, force.z * by];
             (*mass, *raised) = ([share * all; 3], [share * (all - own); 3]);
+        }
+        if falls {
+            // Of what is moved here; what is not has no mass in its place.
+            for ((weight, own), mass) in
+                weight.as_chunks_mut::<3>().0.iter_mut().zip(masses).zip(mass.as_chunks::<3>().0)
+            {
+                *weight = if mass[0] > 0.0 { (gravity * *own).to_array() } else { [0.0; 3] };
+            }
+            weight[3 * count..].fill(0.0);
         }
         let alpha = model.scene.solver.mass_damping;
         let (a, c) = (1.0 - 0.5 * alpha * dt, 1.0 / (1.0 + 0.5 * alpha * dt));
@@ -272,13 +291,16 @@ impl WithSimd for PlainLine<'_, '_> {
         new[..old.len()].copy_from_slice(old);
         new[old.len()..].fill(0.0);
         let zero = simd.splat_f64s(0.0);
-        let (mut damped, mut gained, mut fastest) = (zero, zero, zero);
+        let (mut damped, mut gained, mut fastest, mut fallen) = (zero, zero, zero, zero);
         let (a_s, c_s, half) = (simd.splat_f64s(a), simd.splat_f64s(c), simd.splat_f64s(0.5));
         for at in (0..old.len()).step_by(lanes) {
             let before: S::f64s = load::<S>(new, at);
             let after = simd.mul_f64s(simd.mul_add_f64s(before, a_s, load::<S>(kick, at)), c_s);
             let mid = simd.mul_f64s(half, simd.add_f64s(before, after));
             damped = simd.mul_add_f64s(load::<S>(mass, at), simd.mul_f64s(mid, mid), damped);
+            if falls {
+                fallen = simd.mul_add_f64s(load::<S>(weight, at), mid, fallen);
+            }
             // after^2 - before^2 = 2 mid (after - before)
             let grown = simd.mul_f64s(mid, simd.sub_f64s(after, before));
             gained = simd.mul_add_f64s(load::<S>(raised, at), grown, gained);
@@ -298,6 +320,9 @@ impl WithSimd for PlainLine<'_, '_> {
         sums.raised += more;
         sums.damping += alpha * dt * damped;
         sums.raised_energy += gained;
+        if falls {
+            sums.work += dt * simd.reduce_sum_f64s(fallen);
+        }
         for ((place, old), new) in places.iter_mut().zip(old).zip(new.iter()) {
             *old = *new;
             *place += *new * dt;

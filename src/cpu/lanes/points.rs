@@ -381,7 +381,7 @@ impl<'a, 'b, S: Simd> VectorPoints<'a, 'b, S> {
             elastic = Regular::new(composed(h, &g))?;
         }
         let half = Lanes::splat(simd, 0.5);
-        let mut stored = law.energy(&elastic)? + half * around.bulk_modulus * state.dj * state.dj;
+        let mut stored = law.energy(&elastic, zero)? + half * around.bulk_modulus * state.dj * state.dj;
         if points.has_fibres {
             let mut unused = [[zero; 3]; 3];
             let [_, energy] = self.fibres.add(state, &state.cofactor(), &mut unused)?;
@@ -494,15 +494,9 @@ impl<'a, 'b, S: Simd> VectorPoints<'a, 'b, S> {
         let mut lost = zero;
         let grown = degraded[1] - degraded[0];
         if points.has_damage && !grown.is_within(0.0, 0.0) {
-            // Energies of powers of the stretches are left to f64.
-            if let Some(powers) = &law.powers
-                && !powers.mu.is_within(0.0, 0.0)
-            {
-                return None;
-            }
             let half = Lanes::splat(simd, 0.5);
             let volumetric = half * around.bulk_modulus * state.dj * state.dj;
-            let energy = law.energy(&elastic)? + volumetric + of_fibres - held_by_strain(&sum, twice_strain);
+            let energy = law.energy(&elastic, zero)? + volumetric + of_fibres - held_by_strain(&sum, twice_strain);
             lost = around.kept * grown * (energy + around.other_energy);
         }
         // Nothing is written before this line.
