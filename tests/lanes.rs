@@ -245,13 +245,14 @@ const SCENES: [(&str, &[&str]); 19] = [
     ("effects/plasticity.toml", &[]),
     ("effects/viscoelastic.toml", &[]),
     ("effects/fibres.toml", &[]),
-    ("effects/gravity.toml", &[]),
+    ("muscle_biopsy.toml", &["tissue.cell_size_mm=1.6", UNDER_GRAVITY, "motion.phase.0.depth_mm=5.0", FAST]),
     // Points that f64 carries, for the fibres.
     ("opening.toml", &["tissue.cell_size_mm=1.6", WITH_FIBRES, "fibres.k2=0.001", "motion.phase.0.depth_mm=5.0", FAST]),
     ("muscle_biopsy.toml", &["tissue.cell_size_mm=1.6", WITH_ALL, SLOW_FAILURE, "motion.phase.0.depth_mm=5.0", FAST]),
 ];
 
 const SLOW_FAILURE: &str = "damage={failure_displacement_mm=2.0}";
+const UNDER_GRAVITY: &str = "effects=[\"puncture\", \"friction\", \"mass_scaling\", \"gravity\"]";
 const WITH_FIBRES: &str = "effects=[\"puncture\", \"friction\", \"mass_scaling\", \"fibres\"]";
 const WITH_ALL: &str =
     "effects=[\"puncture\", \"friction\", \"mass_scaling\", \"fibres\", \"plasticity\", \"damage\", \"viscoelastic\"]";
@@ -385,15 +386,14 @@ fn goes_on_in_lanes_only(small: &dyn Fn() -> Scene) {
 
 #[test]
 fn what_lanes_do_not_know_is_told_and_computed_in_f64() {
-    for (name, word) in [("forearm.toml", "fibres in tetrahedra")] {
-        let scene = scene(name, &[]);
-        let mesh = Mesh::of_scene(&scene);
-        let unknown = unknown_to_lanes(&scene).unwrap_or_else(|| panic!("{name}: known"));
-        assert!(unknown.contains(word), "{name}: {unknown}");
-        let engine = CpuEngine::in_lanes(Arc::new(Model::new(scene, mesh)), 1e-7);
-        let told = &engine.info().adapter;
-        assert!(told.contains("f64: lanes do not know") && told.contains(word), "{name}: {told}");
-    }
+    let tears = "effects=[\"mass_scaling\", \"gravity\", \"plasticity\", \"damage\"]";
+    let slowly = "damage={failure_displacement_mm=20.0}";
+    let torn = scene("forearm.toml", &[tears, slowly]);
+    assert_eq!(unknown_to_lanes(&torn).as_deref(), Some("damage in tetrahedra"));
+    let mesh = Mesh::of_scene(&torn);
+    let engine = CpuEngine::in_lanes(Arc::new(Model::new(torn, mesh)), 1e-7);
+    let told = &engine.info().adapter;
+    assert!(told.contains("f64: lanes do not know damage in tetrahedra"), "{told}");
     // Every law of the table is known.
     let mut other = block([4.0; 3], 1.0);
     for entry in &stylet::material::LAWS {

@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use stylet::cpu::{CpuEngine, unknown_to_lanes};
-use stylet::effects::{TissueMaterial, gravity};
+use stylet::effects::{TissueMaterial, fibres, gravity, plasticity, viscoelastic};
 use stylet::engine::stable_dt::wave_speed_bound;
 use stylet::engine::{Engine, State, StepInput};
+use stylet::material::demiray::Demiray;
 use stylet::material::ogden::Ogden;
 use stylet::material::yeoh::Yeoh;
 use stylet::material::{ElasticLaw, Isochoric};
@@ -52,6 +53,20 @@ fn with_layer(isochoric: Isochoric) -> Scene {
     scene
 }
 
+/// The layered block whose tissue flows, relaxes and has fibres, each material its own way.
+fn with_effects() -> Scene {
+    let mut scene = layered();
+    scene.effects.plasticity = Some(plasticity::Params { yield_stress: 400.0, hardening: 3.0e3 });
+    scene.effects.fibres =
+        Some(fibres::Params { direction: DVec3::new(1.0, 0.4, -0.3).normalize(), k1: 2.0e3, k2: 0.6 });
+    let terms = [(0.3, 2e-3), (0.2, 4e-2)].map(|(ratio, time)| viscoelastic::Term { ratio, time });
+    scene.effects.viscoelastic = Some(viscoelastic::Params { terms: terms.to_vec() });
+    let layer = &mut scene.regions[0].material;
+    layer.plasticity = Some(plasticity::Params { yield_stress: 700.0, hardening: 1.0e3 });
+    layer.fibres = Some(fibres::Params { direction: DVec3::Y, k1: 0.0, k2: 1.0 });
+    scene
+}
+
 fn model(scene: Scene, mesh: TetMesh) -> Arc<Model> {
     Arc::new(Model::new(scene, Mesh::Tets(Arc::new(mesh))))
 }
@@ -81,6 +96,7 @@ fn forces_and_bounds_are_those_of_the_f64_engine() {
         (layered(), [1, 1, 1]),
         (ogden.clone(), [5, 4, 6]),
         (ogden, [3, 3, 3]),
+        (with_layer(Isochoric::Demiray(Demiray { mu: 6000.0, b: 4.0 })), [5, 4, 6]),
     ] {
         let model = model(scene, distorted(cells));
         let [mut exact, mut lanes] = both(&model, 1e-6);
@@ -125,9 +141,8 @@ fn a_wrong_bulk_modulus_does_not_pass_the_comparison() {
     assert!(difference(5.0025e5) > 1e-5, "{:.1e} would pass", difference(5.0025e5));
 }
 
-/// The layered block under gravity, held below, its top face pressed down and turned.
-fn pressed(cells: [usize; 3]) -> Arc<Model> {
-    let mut scene = layered();
+/// A block under gravity, held below, its top face pressed down and turned.
+fn pressed(mut scene: Scene, cells: [usize; 3]) -> Arc<Model> {
     scene.effects.gravity = Some(gravity::Params { acceleration: DVec3::new(0.0, 3.0, -9.81) });
     for face in [Face::ZMin, Face::ZMax] {
         scene.faces[face as usize] = held(true, true, true);
@@ -139,9 +154,16 @@ fn pressed(cells: [usize; 3]) -> Arc<Model> {
 
 #[test]
 fn a_moving_face_under_gravity_does_what_it_does_in_f64() {
-    let model = pressed([6, 5, 7]);
-    let dt = 0.5 * wave_speed_bound(&model);
-    let mut engines = both(&model, dt);
+    for (what, scene) in [("elastic", layered()), ("with effects", with_effects())] {
+        println!("{what}");
+        does_what_it_does_in_f64(&pressed(scene, [6, 5, 7]), what == "with effects");
+    }
+}
+
+fn does_what_it_does_in_f64(model: &Arc<Model>, flows: bool) {
+    let dt = 0.5 * wave_speed_bound(model);
+    let mut engines = both(model, dt);
+    let mut dissipated = [[0.0; 2]; 2];
     let (mut peak, mut apart, mut imbalance) = (0.0f64, 0.0f64, 0.0f64);
     let (mut step, frames) = (0, 30);
     let steps = (0.03 / dt / frames as f64).ceil() as usize;
@@ -149,19 +171,32 @@ fn a_moving_face_under_gravity_does_what_it_does_in_f64() {
         let begin = step;
         let [exact, found] = engines.each_mut().map(|engine| {
             step = begin;
-            advance(engine, &model, dt, &mut step, steps)
+            advance(engine, model, dt, &mut step, steps)
         });
+        for (total, sums) in dissipated.iter_mut().zip([&exact, &found]) {
+            *total = [total[0] + sums.energy.plastic, sums.energy.viscous];
+            assert_eq!(sums.health.return_failures, 0);
+        }
         for face in [Face::ZMin, Face::ZMax] {
             peak = peak.max(exact.reactions[face as usize].length());
             apart = apart.max((exact.reactions[face as usize] - found.reactions[face as usize]).length());
         }
         imbalance = imbalance.max((exact.energy.elastic - found.energy.elastic).abs() / exact.energy.elastic);
-        assert!((exact.health.min_j - found.health.min_j).abs() < 1e-5);
+        // Flow ends in f32 where the overstress is worth 2e-6 of strain.
+        let allowed = if flows { 1e-4 } else { 1e-5 };
+        at_most("least J apart", (exact.health.min_j - found.health.min_j).abs(), allowed);
         assert_eq!(exact.health.inverted_cells, found.health.inverted_cells);
     }
-    assert!(peak > 0.1, "nothing happens: {peak} N");
-    at_most("reactions apart, of the peak", apart / peak, 1e-4);
-    at_most("elastic energy apart", imbalance, 1e-4);
+    assert!(peak > 0.02, "nothing happens: {peak} N");
+    for (name, i) in [("flow", 0), ("relaxation", 1)] {
+        let [exact, found] = dissipated.map(|of| of[i]);
+        assert_eq!(exact > 0.0, flows, "{name}: {exact} J");
+        at_most(&format!("dissipated by {name}, apart"), (found - exact).abs() / exact.max(1e-30), 1e-3);
+    }
+    // Flow begins in f32 where the stress is a thousandth beyond the yield stress: both forces lag by as much where it comes and goes.
+    let allowed = if flows { 2e-3 } else { 1e-4 };
+    at_most("reactions apart, of the peak", apart / peak, allowed);
+    at_most("elastic energy apart", imbalance, allowed);
     let [exact, found] = engines.map(|mut engine| engine.read_state().unwrap().displacement);
     println!("peak {peak:.3} N, displacement up to {:.2e} m", largest(&exact));
     at_most("displacement apart, of the largest", relative_difference(&found, &exact), 1e-4);
@@ -170,14 +205,19 @@ fn a_moving_face_under_gravity_does_what_it_does_in_f64() {
 #[test]
 fn no_bit_hangs_on_the_number_of_threads() {
     // Cells enough for as many threads.
-    let model = pressed([8, 8, 8]);
-    let dt = 0.5 * wave_speed_bound(&model);
+    for scene in [layered(), with_effects()] {
+        hangs_on_no_number_of_threads(&pressed(scene, [8, 8, 8]));
+    }
+}
+
+fn hangs_on_no_number_of_threads(model: &Arc<Model>) {
+    let dt = 0.5 * wave_speed_bound(model);
     let state = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let [_, mut engine] = both(&model, dt);
+            let [_, mut engine] = both(model, dt);
             let mut step = 0;
-            let sums: Vec<_> = (0..4).map(|_| advance(&mut engine, &model, dt, &mut step, 25)).collect();
+            let sums: Vec<_> = (0..4).map(|_| advance(&mut engine, model, dt, &mut step, 25)).collect();
             (engine.read_state().unwrap(), sums)
         })
     };
@@ -190,7 +230,7 @@ fn no_bit_hangs_on_the_number_of_threads() {
 
 #[test]
 fn a_collapsed_cell_is_caught_as_in_f64() {
-    let model = pressed([5, 4, 6]);
+    let model = pressed(layered(), [5, 4, 6]);
     let dt = 0.2 * wave_speed_bound(&model);
     let mut engines = both(&model, dt);
     // An inner node goes through the face across from it.
@@ -222,9 +262,8 @@ fn a_collapsed_cell_is_caught_as_in_f64() {
 #[test]
 fn an_imported_mesh_runs_in_lanes_and_says_so() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/forearm.toml");
-    let mut scene = Scene::load(&path, &[]).unwrap();
-    assert_eq!(unknown_to_lanes(&scene).as_deref(), Some("fibres in tetrahedra"));
-    scene.effects.fibres = None;
+    let scene = Scene::load(&path, &[]).unwrap();
+    assert_eq!(unknown_to_lanes(&scene), None);
     let first = |choice: EngineChoice| {
         let mut simulation = Simulation::new(scene.clone(), choice).unwrap();
         simulation.next_frame().unwrap().unwrap();

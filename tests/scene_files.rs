@@ -1381,6 +1381,25 @@ fn opening_scene(material: &str, text: &str) -> Result<Scene, String> {
 }
 
 #[test]
+fn fibres_beside_an_opened_path_stay_within_their_exponential() {
+    let load = |changes: &[&str]| {
+        let effects = "effects=[\"puncture\", \"friction\", \"mass_scaling\", \"fibres\"]";
+        let changes: Vec<String> = [effects].iter().chain(changes).map(|c| c.to_string()).collect();
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/opening.toml");
+        Scene::load(&path, &changes).map_err(|error| error.to_string())
+    };
+    // The wall is stretched 9.3 times: 0.05 (9.3^2 - 1)^2 = 363.
+    let refused = load(&[]).unwrap_err();
+    for part in ["stretch these fibres 9.3 times", "is 363", "fibres.k2 of at most 1.4e-3", "tear_stretch"] {
+        assert!(refused.contains(part), "{part}: {refused}");
+    }
+    assert!(load(&["fibres.k2=0.001"]).is_ok());
+    assert!(load(&["fibres.k1_kpa=0"]).is_ok());
+    // Tissue that tears has a wider slit.
+    assert!(load(&["material.tear_stretch=3.0"]).is_ok());
+}
+
+#[test]
 fn the_scheme_opening_takes_its_numbers_from_the_toughness() {
     let segment = |scene: &Scene| {
         let model = stylet::model::Model::new(scene.clone(), stylet::mesh::Mesh::of_scene(scene));

@@ -59,6 +59,17 @@ pub fn engines(model: &Arc<Model>, dt: f64, max_steps: usize) -> Vec<(&'static s
     engines
 }
 
+/// How far apart an effect that changes nothing may leave a run of this engine: f64 not at all. Shaders with and without it are two programs,
+/// which a software driver leaves `of_shaders` apart; a hardware driver fuses products and sums in each as it likes (H100: 1.2e-5 after 5000
+/// steps), and lanes sum up in another order (1.6e-5 of a small force).
+pub fn neutral(engine: &str, of_shaders: f64) -> f64 {
+    match engine {
+        "cpu" => 1e-12,
+        "gpu" if gpu().is_some_and(|gpu| gpu.is_software()) => of_shaders,
+        _ => 3e-5,
+    }
+}
+
 pub fn gpu_engine(model: &Arc<Model>, dt: f64, max_steps: usize) -> Option<GpuEngine> {
     gpu().map(|gpu| GpuEngine::new(model.clone(), gpu, dt, max_steps).unwrap())
 }

@@ -92,6 +92,6 @@ fn a_yield_stress_out_of_reach_changes_nothing() {
         let b = pull(b.as_mut(), &without, dt, 8, 600).pop().unwrap();
         let force = |s: &Sample| s.sums.reactions[Face::ZMax as usize].z;
         // Not to the last bit: P goes through G^T = I in one case.
-        close(name, force(&a), force(&b), if name == "gpu" { 1e-5 } else { 1e-12 });
+        close(name, force(&a), force(&b), neutral(name, 1e-5));
     }
 }

@@ -113,9 +113,7 @@ fn no_share_is_no_relaxation() {
     for ((name, mut a), (_, mut b)) in engines(&with, dt, 1000).into_iter().zip(engines(&without, dt, 1000)) {
         let a = pull(a.as_mut(), &with, dt, 5, 1000).pop().unwrap();
         let b = pull(b.as_mut(), &without, dt, 5, 1000).pop().unwrap();
-        // Two shaders are two programs: a hardware driver fuses products and sums differently in each (H100: 1.2e-5 after 5000 steps).
-        let rounding = if gpu().is_some_and(|gpu| gpu.is_software()) { 1e-6 } else { 3e-5 };
-        close(name, a.nominal, b.nominal, if name == "gpu" { rounding } else { 1e-12 });
+        close(name, a.nominal, b.nominal, neutral(name, 1e-6));
     }
 }
 

@@ -151,19 +151,20 @@ impl Points {
 
     /// Gives the points of a row of cells what they have become, and how many returns failed in this frame.
     pub fn give(&self, row: PointRow, points: &mut [PointState]) -> u32 {
-        let mut failed = 0.0;
-        for (i, point) in points.iter_mut().enumerate() {
-            self.get(row, i, point);
-            let mut booked = [0.0; BOOKED];
-            for (number, value) in booked.iter_mut().enumerate() {
-                *value = f64::from(std::mem::take(&mut row[(self.booked() + number) * self.stride + i]));
-            }
-            point.plastic_dissipation += booked[0];
-            point.damage_dissipation += booked[1];
-            point.viscous_work += booked[2];
-            failed += booked[3];
+        points.iter_mut().enumerate().map(|(i, point)| self.give_one(row, i, point)).sum()
+    }
+
+    /// The same of the point in the place `i` of a row.
+    pub fn give_one(&self, row: PointRow, i: usize, point: &mut PointState) -> u32 {
+        self.get(row, i, point);
+        let mut booked = [0.0; BOOKED];
+        for (number, value) in booked.iter_mut().enumerate() {
+            *value = f64::from(std::mem::take(&mut row[(self.booked() + number) * self.stride + i]));
         }
-        failed as u32
+        point.plastic_dissipation += booked[0];
+        point.damage_dissipation += booked[1];
+        point.viscous_work += booked[2];
+        booked[3] as u32
     }
 
     /// One point in f64, without what was booked before.
@@ -202,7 +203,8 @@ impl Points {
         }
     }
 
-    fn set(&self, point: &PointState, i: usize, row: PointRow) {
+    /// Takes in the point in the place `i` of a row.
+    pub fn set(&self, point: &PointState, i: usize, row: PointRow) {
         let mut put = |number: usize, value: f64| row[number * self.stride + i] = value as f32;
         if self.has_plasticity {
             let flow = point.plastic.inverse_flow.to_cols_array();

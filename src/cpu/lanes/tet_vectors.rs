@@ -8,12 +8,13 @@ use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
 use super::number::Lanes;
+use super::points::{Around, Points, VectorPoints};
 use super::tets::{GRADIENT, NO_CELL, Place, SHAPE, TetShapes};
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, CellShape, Elements};
 use crate::material::kinematics::jacobian_minus_one;
 use crate::material::regular::LEAST_J;
-use crate::material::regular::{Regular, dot};
+use crate::material::regular::{LawInLanes, Regular, dot};
 use crate::material_point::Volumetric;
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -129,30 +130,39 @@ pub(super) struct Forces<'a> {
     pub model: &'a Model,
     pub elements: &'a Elements,
     pub displacement: &'a [DVec3],
+    /// What material points need beside the elastic law; `None`: nothing.
+    pub points: Option<&'a Points>,
+    /// Step [s] and number of the step that histories are brought forward to; `None`: they stay.
+    pub advance: Option<(f64, u64)>,
 }
 
 impl Forces<'_> {
-    /// Forces and bounds on the corners of the groups from `first` on.
-    pub fn compute(&self, first: usize, forces: &mut [[f32; 4]]) {
-        self.shapes.arch.dispatch(ForcedGroups { input: self, first, forces });
+    /// Forces and bounds on the corners of the groups from `first` on; `histories`: what their points remember.
+    pub fn compute(&self, first: usize, forces: &mut [[f32; 4]], histories: &mut [f32]) {
+        self.shapes.arch.dispatch(ForcedGroups { input: self, first, forces, histories });
     }
 
-    /// The same of slots, one by one in f64, with these means of the pressures at their corners.
+    /// The same of the slots from `i` on in the group that begins with `first`, one by one in f64, with these means of the pressures at their
+    /// corners.
     #[cold]
-    fn one_by_one(&self, first: usize, means: &[f32], forces: &mut [[f32; 4]]) {
-        let cells = self.shapes.cells[first..].iter().zip(&self.shapes.remaining[first..]);
-        let slots = cells.zip(means).zip(forces.chunks_exact_mut(4));
-        for (((cell, remaining), mean), forces) in slots.filter(|(((cell, _), _), _)| **cell != NO_CELL) {
+    fn one_by_one(&self, (first, i): (usize, usize), means: &[f32], forces: &mut [[f32; 4]], history: &mut [f32]) {
+        let cells = self.shapes.cells[first + i..].iter().zip(&self.shapes.remaining[first + i..]);
+        let slots = (i..).zip(cells.zip(means).zip(forces.chunks_exact_mut(4)));
+        for (i, (((cell, remaining), mean), forces)) in slots.filter(|(_, (((cell, _), _), _))| **cell != NO_CELL) {
             let remaining = f64::from(*remaining);
             let cell = *cell as usize;
             let shape = CellShape::new(&self.model.mesh, cell);
             let dj = jacobian_minus_one(shape.displacement_gradient(&shape.gather(self.displacement)));
             let flat = (1.0 + dj - self.elements.flat_below()).min(0.0);
             let stress = f64::from(*mean) + remaining * self.model.material(cell).law.bulk_modulus * flat;
-            // The energy serves histories, which lanes do not know.
+            // The energy serves damage, which lanes do not know here.
             let averaged = Some(Volumetric { stress, energy: 0.0 });
-            let input = CellInput { averaged, remaining, point: None, advance: None };
-            let (of_cell, _) = self.elements.corner_forces(self.model, cell, self.displacement, input);
+            let mut point = self.points.map(|points| points.point(history, i));
+            let input = CellInput { averaged, remaining, point: point.as_mut(), advance: self.advance };
+            let (of_cell, met) = self.elements.corner_forces(self.model, cell, self.displacement, input);
+            if let (Some(points), Some(point), true) = (self.points, &point, self.advance.is_some()) {
+                points.put_back(point, met, i, history);
+            }
             for (corner, numbers) in forces.iter_mut().enumerate() {
                 let [x, y, z] = of_cell.force[corner].as_vec3().to_array();
                 *numbers = [x, y, z, of_cell.bound[corner] as f32];
@@ -165,6 +175,7 @@ struct ForcedGroups<'a> {
     input: &'a Forces<'a>,
     first: usize,
     forces: &'a mut [[f32; 4]],
+    histories: &'a mut [f32],
 }
 
 impl WithSimd for ForcedGroups<'_> {
@@ -172,14 +183,17 @@ impl WithSimd for ForcedGroups<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let ForcedGroups { input, first, forces } = self;
+        let ForcedGroups { input, first, forces, histories } = self;
         let Forces { shapes, gradients, pressures, .. } = *input;
         let mut means = [0.0f32; WIDEST];
         let mut rows = [0.0f32; 16 * WIDEST];
         let groups = forces.as_chunks_mut::<{ 4 * WIDEST }>().0;
         for group in 0..groups.len() {
             let forces = &mut groups[group];
-            let material = &shapes.materials[shapes.group_material[first + group] as usize];
+            let kind = shapes.group_material[first + group] as usize;
+            let material = &shapes.materials[kind];
+            let length = input.points.map_or(0, Points::row_length);
+            let history = &mut histories[group * length..(group + 1) * length];
             let first = (first + group) * WIDEST;
             let corners = &shapes.corners[first..first + WIDEST];
             for i in 0..WIDEST {
@@ -198,14 +212,20 @@ impl WithSimd for ForcedGroups<'_> {
             let mut exact = [false; WIDEST];
             let mut i = 0;
             while i < WIDEST {
-                exact[i] = !lane_forces(simd, material, &of_group, i, &mut rows);
+                exact[i] = !match input.points {
+                    None => lane_forces::<S, false>(simd, material, &of_group, i, None, &mut rows),
+                    Some(points) => {
+                        let points = VectorPoints::new(simd, points, history, (i, WIDEST), true, |_| kind);
+                        lane_forces::<S, true>(simd, material, &of_group, i, Some(points), &mut rows)
+                    }
+                };
                 i += Lanes::<S>::COUNT;
             }
             transpose(&rows, forces);
             for i in 0..WIDEST {
                 if exact[i] {
                     let end = i + Lanes::<S>::COUNT;
-                    input.one_by_one(first + i, &means[i..end], &mut forces[4 * i..4 * end]);
+                    input.one_by_one((first, i), &means[i..end], &mut forces[4 * i..4 * end], history);
                 }
             }
         }
@@ -235,9 +255,17 @@ fn transpose(rows: &[f32; 16 * WIDEST], forces: &mut [[f32; 4]; 4 * WIDEST]) {
     }
 }
 
-/// Forces and bounds of a vector; false where a cell has left the range of these forms.
+/// Forces and bounds of a vector; false where a cell has left the range of these forms. `points`: with `POINTS`, where material points do
+/// more than the elastic law.
 #[inline(always)]
-fn lane_forces<S: Simd>(simd: S, material: &LaneMaterial, group: &Group, i: usize, rows: &mut [f32]) -> bool {
+fn lane_forces<S: Simd, const POINTS: bool>(
+    simd: S,
+    material: &LaneMaterial,
+    group: &Group,
+    i: usize,
+    points: Option<VectorPoints<S>>,
+    rows: &mut [f32],
+) -> bool {
     let zero = Lanes::splat(simd, 0.0);
     let mut h = [[zero; 3]; 3];
     let mut gradient = [[zero; 3]; 3];
@@ -249,7 +277,15 @@ fn lane_forces<S: Simd>(simd: S, material: &LaneMaterial, group: &Group, i: usiz
     }
     let Some(state) = Regular::new(h) else { return false };
     let volume = Lanes::load(simd, group.constants, VOLUME * WIDEST + i);
-    let law = material.law.in_lanes(volume);
+    let (mut exponential, mut powers) = (None, None);
+    if let Some(of_material) = &material.exponential {
+        exponential = Some(of_material.in_lanes(volume));
+    }
+    if let Some(of_material) = &material.powers {
+        powers = Some(of_material.in_lanes(volume));
+    }
+    let all = LawInLanes { polynomial: material.law.in_lanes(volume), exponential, powers };
+    let Some(law) = all.slopes_at(&state) else { return false };
     let mut pressure = Lanes::load(simd, group.means, i);
     // The mean pressure carries over from neighbours that may be intact.
     let law_left = match group.weakened {
@@ -261,11 +297,29 @@ fn lane_forces<S: Simd>(simd: S, material: &LaneMaterial, group: &Group, i: usiz
         let own = volume.of(material.bulk_modulus) * Lanes::load(simd, group.remaining, i);
         pressure = own.mul_add(flat, pressure);
     }
-    let mut p = state.stress(&law_left, pressure);
+    let bulk = Lanes::splat(simd, material.bulk_modulus as f32);
+    let mut p = [[zero; 3]; 3];
+    let (mut straight, mut turned) = (zero, zero);
+    if POINTS {
+        let Some(mut points) = points else { return false };
+        let kept = Lanes::load(simd, group.remaining, i);
+        let around = Around { length: zero, kept, other_energy: zero, bulk_modulus: bulk };
+        let Some(answer) = points.answer(simd, &all, &state, &around) else { return false };
+        [straight, turned] = answer.tangent;
+        let cof = state.cofactor();
+        for b in 0..3 {
+            for axis in 0..3 {
+                p[b][axis] = cof[b][axis].mul_add(pressure, answer.intact * answer.stress[b][axis]);
+            }
+        }
+    } else {
+        p = state.stress(&law_left, pressure);
+    }
     let mut of_powers = zero;
-    if let Some(powers) = &material.powers {
-        let powers = powers.in_lanes(volume);
-        let Some((added, bound)) = state.stress_and_bound_of_powers(&powers) else { return false };
+    if let Some(powers) = &all.powers
+        && !POINTS
+    {
+        let Some((added, bound)) = state.stress_and_bound_of_powers(powers) else { return false };
         of_powers = bound;
         let left = if group.weakened { Lanes::load(simd, group.remaining, i) } else { Lanes::splat(simd, 1.0) };
         for b in 0..3 {
@@ -280,9 +334,10 @@ fn lane_forces<S: Simd>(simd: S, material: &LaneMaterial, group: &Group, i: usiz
             (force[corner][axis] * volume).store(rows, (4 * corner + axis) * WIDEST + i);
         }
     }
-    let bulk = Lanes::splat(simd, material.bulk_modulus as f32);
-    let [straight, turned] = state.tangent_bound(&law, bulk);
-    let straight = straight + of_powers;
+    if !POINTS {
+        [straight, turned] = state.tangent_bound(&law, bulk);
+        straight = straight + of_powers;
+    }
     let cof = at_corners(state.cofactor(), gradient);
     let (mut turning, mut shearing) = ([zero; 4], [zero; 4]);
     for corner in 0..4 {

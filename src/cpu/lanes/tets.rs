@@ -10,11 +10,13 @@ use glam::DVec3;
 use pulp::Arch;
 
 use super::nodes::NodeLines;
+use super::points::Points;
 use super::tet_vectors::{Deformed, Forces};
 use super::{LaneMaterial, WIDEST, materials_of, threads_for};
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
 use crate::engine::elements::{Elements, cells_of_nodes};
+use crate::material_point::PointState;
 use crate::mesh::TetMesh;
 use crate::model::Model;
 
@@ -191,13 +193,19 @@ pub struct LaneTets {
     /// Force (with the sign of f_int) and bound of the four corners of every slot.
     forces: Vec<[f32; 4]>,
     nodes: NodeLines,
+    /// Material points that do more than the elastic law, and what they remember, in a row per group.
+    points: Option<Points>,
+    histories: Vec<f32>,
 }
 
 impl LaneTets {
     pub fn new(model: &Model, mesh: &TetMesh, elements: &Elements) -> Result<Self, String> {
         let shapes = TetShapes::new(model, mesh, materials_of(model, elements)?);
         let (slots, nodes) = (shapes.cells.len(), mesh.positions.len());
+        let points = Points::new(&model.materials, WIDEST);
         Ok(LaneTets {
+            histories: vec![0.0; points.as_ref().map_or(0, Points::row_length) * slots / WIDEST],
+            points,
             team: Team::new(threads_for(mesh.tets.len())),
             places: vec![Place::default(); nodes],
             gradients: vec![0.0; slots * GRADIENT],
@@ -231,27 +239,71 @@ impl LaneTets {
         let words =
             2 * cells.len() + slots.len() + 4 * corners.len() + constants.len() + group_material.len() + offsets.len();
         let changing = self.gradients.len() + self.changes.len() + self.pressures.len() + 4 * self.forces.len();
-        4 * (words + around.len() + stiffness.len() + changing)
+        4 * (words + around.len() + stiffness.len() + changing + self.histories.len())
             + size_of_val(self.places.as_slice())
             + self.nodes.bytes()
     }
 
-    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it).
-    pub fn compute(&mut self, model: &Model, elements: &Elements, displacement: &[DVec3], stiffness: &[f64]) {
+    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it). `advance`:
+    /// step [s] and number of the step that histories are brought forward to.
+    pub fn compute(
+        &mut self,
+        model: &Model,
+        elements: &Elements,
+        displacement: &[DVec3],
+        stiffness: &[f64],
+        advance: Option<(f64, u64)>,
+    ) {
         self.shapes.weaken(model, stiffness);
-        let LaneTets { shapes, team, places, gradients, changes, pressures, forces, nodes } = self;
+        let LaneTets { shapes, team, places, gradients, changes, pressures, forces, nodes, points, histories } = self;
+        if let Some(points) = points {
+            points.prepare(&model.materials, advance);
+        }
+        let points = points.as_ref();
         let part = team.part(shapes.group_material.len());
         let parts = gradients.chunks_mut(part * WIDEST * GRADIENT).zip(changes.chunks_mut(part * WIDEST));
         let deformed = Deformed { shapes, places, displacement, mesh: &model.mesh };
         team.map(parts.collect::<Vec<_>>(), |i, (gradients, changes)| deformed.compute(i * part, gradients, changes));
         let of_nodes = team.part(pressures.len());
         team.map(pressures.chunks_mut(of_nodes), |i, p| shapes.average(changes, i * of_nodes, p));
-        let of_cells = Forces { shapes, gradients, pressures, model, elements, displacement };
-        team.map(forces.chunks_mut(part * WIDEST * 4), |i, forces| of_cells.compute(i * part, forces));
+        let of_cells = Forces { shapes, gradients, pressures, model, elements, displacement, points, advance };
+        let parts = forces.chunks_mut(part * WIDEST * 4);
+        let work = |i: usize, (forces, histories): (&mut [[f32; 4]], &mut [f32])| {
+            of_cells.compute(i * part, forces, histories);
+        };
+        match points.map_or(0, Points::row_length) {
+            0 => team.map(parts.map(|forces| (forces, &mut [][..])), work),
+            length => team.map(parts.zip(histories.chunks_mut(part * length)), work),
+        };
         let forces = forces.as_slice();
         let line = super::nodes::NODE * LINE;
         let part = team.part(nodes.numbers.len() / line);
         team.map(nodes.numbers.chunks_mut(part * line), |i, numbers| shapes.gather(forces, i * part, numbers));
+    }
+
+    /// Takes in what the points remember.
+    pub fn take_points(&mut self, states: &[PointState]) {
+        let LaneTets { shapes, points, histories, .. } = self;
+        let Some(points) = points.as_ref().filter(|points| points.row_length() > 0) else { return };
+        for (row, cells) in histories.chunks_mut(points.row_length()).zip(shapes.cells.chunks(WIDEST)) {
+            row.fill(0.0);
+            for (i, cell) in cells.iter().enumerate().filter(|(_, cell)| **cell != NO_CELL) {
+                points.set(&states[*cell as usize], i, row);
+            }
+        }
+    }
+
+    /// Gives the points what they have become and booked since; how many returns failed.
+    pub fn give_points(&mut self, states: &mut [PointState]) -> u32 {
+        let LaneTets { shapes, points, histories, .. } = self;
+        let Some(points) = points.as_ref().filter(|points| points.row_length() > 0) else { return 0 };
+        let mut failed = 0;
+        for (row, cells) in histories.chunks_mut(points.row_length()).zip(shapes.cells.chunks(WIDEST)) {
+            for (i, cell) in cells.iter().enumerate().filter(|(_, cell)| **cell != NO_CELL) {
+                failed += points.give_one(row, i, &mut states[*cell as usize]);
+            }
+        }
+        failed
     }
 
     /// Takes in a displacement that the last step did not make.

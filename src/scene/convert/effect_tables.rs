@@ -209,7 +209,7 @@ impl Check<'_> {
                 ),
                 format!("an exponent k2 e^2 of at most {most}"),
                 format!(
-                    "write k2 of at most {:.1e}, a tear_stretch of the material, or leave puncture.scheme out for the scheme ring",
+                    "write {key} of at most {:.1e}, a tear_stretch of the material, or leave puncture.scheme out for the scheme ring",
                     most / (strain * strain)
                 ),
             );
