@@ -248,8 +248,8 @@ mod tests {
                 assert_eq!(bound.turned, 0.0);
                 let energy = law.isochoric_energy(h);
                 let found = state.energy_of_powers(&powers).unwrap();
-                // The law itself has the sum of its powers to 1e-15, and what volume takes from them cancels here.
-                let allowed = 1e-10 * energy + 1e-13 * MU;
+                // The series ends where f32 does, and what volume alone makes of its terms cancels.
+                let allowed = 1e-10 * energy + 1e-11 * MU;
                 assert!((found - energy).abs() < allowed, "alpha {alpha} at {h}: energy {found} {energy}");
             }
         }

@@ -89,7 +89,7 @@ fn no_stiffness_is_no_fibre_and_the_account_closes() {
         let a = pull(a.as_mut(), &bare, dt, 10, 500).pop().unwrap();
         let b = pull(b.as_mut(), &neutral, dt, 10, 500).pop().unwrap();
         let c = pull(c.as_mut(), &fibrous, dt, 10, 500).pop().unwrap();
-        close(name, b.nominal, a.nominal, neutral(name, 1e-6));
+        close(name, b.nominal, a.nominal, crate::common::neutral(name, 1e-6));
         let s = &c.sums;
         let accounted = s.energy.elastic + s.energy.hourglass + s.energy.kinetic + s.energy.half_step + c.damping;
         at_most(&format!("{name}: imbalance"), (c.work - accounted).abs() / c.work, 2e-3);
