@@ -164,8 +164,7 @@ impl<'a> CellRows<'a> {
 /// Forces and bounds of one row.
 #[inline(always)]
 fn cell_row<S: Simd>(simd: S, rows: &CellRows, at: [usize; 2], forces: &mut RowForces, intact: &mut [f32]) {
-    let grid = rows.grid;
-    let nx = grid.cells[0];
+    let nx = rows.grid.cells[0];
     let row = rows.row(at, intact);
     for i in (0..nx).step_by(Lanes::<S>::COUNT) {
         let (vector, material) = rows.vector(simd, &row, i, intact);
@@ -174,14 +173,7 @@ fn cell_row<S: Simd>(simd: S, rows: &CellRows, at: [usize; 2], forces: &mut RowF
             continue;
         };
         let answers = Elastic { slopes: material.law.polynomial, of_powers: Lanes::splat(simd, 0.0) };
-        let is_known = match &grid.bent {
-            None => lane_forces(simd, grid, &Boxes::new(simd, grid, i, at), &material, answers, &vector, forces),
-            Some(columns) => {
-                let prisms = Prisms::new(simd, grid, columns, i, at);
-                lane_forces(simd, grid, &prisms, &material, answers, &vector, forces)
-            }
-        };
-        if !is_known {
+        if !shaped_forces(simd, rows.grid, at, &material, answers, &vector, forces) {
             cells_one_by_one(rows, row.first_cell, i..(i + Lanes::<S>::COUNT).min(nx), None, forces);
         }
     }
@@ -197,8 +189,7 @@ fn row_of_points<S: Simd>(
     forces: &mut RowForces,
     intact: &mut [f32],
 ) {
-    let grid = rows.grid;
-    let nx = grid.cells[0];
+    let nx = rows.grid.cells[0];
     let row = rows.row(at, intact);
     let kind = |i: usize| rows.model.material_index(row.first_cell + i);
     for i in (0..nx).step_by(Lanes::<S>::COUNT) {
@@ -212,16 +203,29 @@ fn row_of_points<S: Simd>(
             points: VectorPoints::new(simd, points, history, (i, nx), is_uniform, kind),
             tangent: [Lanes::splat(simd, 0.0); 2],
         };
-        let is_known = match &grid.bent {
-            None => lane_forces(simd, grid, &Boxes::new(simd, grid, i, at), &material, answers, &vector, forces),
-            Some(columns) => {
-                let prisms = Prisms::new(simd, grid, columns, i, at);
-                lane_forces(simd, grid, &prisms, &material, answers, &vector, forces)
-            }
-        };
-        if !is_known {
+        if !shaped_forces(simd, rows.grid, at, &material, answers, &vector, forces) {
             let cells = i..(i + Lanes::<S>::COUNT).min(nx);
             cells_one_by_one(rows, row.first_cell, cells, Some((points, history)), forces);
+        }
+    }
+}
+
+/// [`lane_forces`] of a vector of the row at `at`.
+#[inline(always)]
+fn shaped_forces<S: Simd>(
+    simd: S,
+    grid: &Grid,
+    at: [usize; 2],
+    material: &MaterialLanes<S>,
+    answers: impl Answer<S>,
+    vector: &Vector,
+    forces: &mut RowForces,
+) -> bool {
+    match &grid.bent {
+        None => lane_forces(simd, grid, &Boxes::new(simd, grid, vector.i, at), material, answers, vector, forces),
+        Some(columns) => {
+            let prisms = Prisms::new(simd, grid, columns, vector.i, at);
+            lane_forces(simd, grid, &prisms, material, answers, vector, forces)
         }
     }
 }
