@@ -260,6 +260,10 @@ fn bound_table() -> String {
 /// What a stage does, and where it exists.
 fn stage_text(stage: Stage) -> [&'static str; 2] {
     match stage {
+        Stage::PathMeans => [
+            "means of the displacement on the sections",
+            "`puncture`, scheme opening, hardware (else in `advance_tip`)",
+        ],
         Stage::AdvanceTip => {
             ["tip springs, threshold, advance of the tip; sections of an opened path", "`puncture`, planned path"]
         }
@@ -281,6 +285,9 @@ fn stage_text(stage: Stage) -> [&'static str; 2] {
         }
         Stage::OpeningPoints => ["forces of the points beside the path", "`puncture`, scheme opening"],
         Stage::OpeningCells => ["what opening adds to the cells around the path", "`puncture`, scheme opening"],
+        Stage::PathSums => {
+            ["what acts on the sections", "`puncture`, scheme opening, hardware (else in `opening_reactions`)"]
+        }
         Stage::OpeningReactions => ["normal force, friction, reaction on needle and tip", "`puncture`, scheme opening"],
         Stage::OpeningNodes => ["all of it on the nodes", "`puncture`, scheme opening"],
         Stage::MeasureOpening => ["energy of opening and its sums", "`puncture`, scheme opening"],

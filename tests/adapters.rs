@@ -133,6 +133,45 @@ fn arrays_in_textures_and_in_buffers_give_the_same_forces() {
     }
 }
 
+/// Hardware gets more threads for short stages (`Grain`): other orders of the same sums. Run here on whatever adapter there is.
+#[test]
+fn many_threads_and_few_give_the_same_forces() {
+    let Some(gpu) = common::gpu() else { return };
+    for (file, overrides) in [
+        ("scenes/opening.toml", &["motion.phase.0.speed_mm_s=10.0"][..]),
+        (
+            "scenes/opening.toml",
+            &[
+                "motion.phase.0.speed_mm_s=10.0",
+                "tissue.cell_size_mm=0.9",
+                "effects=[\"puncture\", \"friction\", \"mass_scaling\", \"flexible_needle\"]",
+            ],
+        ),
+    ] {
+        let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();
+        let run = |wide: bool| {
+            let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(file).as_path(), &overrides).unwrap();
+            let mut simulation = Simulation::on(scene, Some(Gpu { wide, ..gpu.clone() })).unwrap();
+            let forces: Vec<f64> = (0..60).map(|_| simulation.next_frame().unwrap().unwrap().force.axial).collect();
+            (forces, simulation.engine().read_state().unwrap())
+        };
+        let ((few, few_state), (many, many_state)) = (run(false), run(true));
+        let peak = few.iter().copied().fold(0.0, f64::max);
+        assert!(peak > 0.1, "{file}: {peak} N");
+        for (a, b) in few.iter().zip(&many) {
+            assert!((a - b).abs() < 1e-4 * peak, "{file}: {a} and {b} N");
+        }
+        let far = few_state
+            .displacement
+            .iter()
+            .zip(&many_state.displacement)
+            .map(|(a, b)| a.distance(*b))
+            .fold(0.0, f64::max);
+        assert!(far < 1e-7, "{file}: {far} m");
+        assert_ne!(few, many, "{file}: the same stages ran");
+    }
+}
+
 /// Linux leaves two workers on one processor for long; each is given its own (src/gpu/workers.rs).
 #[test]
 #[cfg(target_os = "linux")]

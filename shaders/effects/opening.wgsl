@@ -36,7 +36,8 @@ struct OpeningStation {
     centre_rate: vec4<f32>,
     // Distance behind the tip [m], part that is cut, its rate [1/m], slope of the radius.
     place: vec4<f32>,
-    // Radius where all is cut [m], stretch of the stick spring [m]; yw unused.
+    // Radius where all is cut [m], mean displacement of the disc along the path [m] (adapters with many lanes only), stretch of the
+    // stick spring [m]; w unused.
     rubbing: vec4<f32>,
     // Derivatives of the energy: by the centre [N] and by rc [N]; by the rates of both [J].
     by_centre: vec4<f32>,

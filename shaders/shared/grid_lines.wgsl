@@ -15,3 +15,16 @@ fn find_cell(x: f32, offset: u32, count: u32) -> u32 {
     }
     return low;
 }
+
+// The same for one that hardly moves: `guess` is where it was or nearly was. A search is a chain of accesses, each waiting for the last.
+fn find_cell_near(x: f32, offset: u32, count: u32, guess: u32) -> u32 {
+    let at = min(guess, count - 2u);
+    let low = at == 0u || grid_lines[offset + at] <= x;
+    let high = at == count - 2u || x < grid_lines[offset + at + 1u];
+    // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
+    var cell = at;
+    for (var once = select(0u, 1u, low && high); once == 0u; once++) {
+        cell = find_cell(x, offset, count);
+    }
+    return cell;
+}

@@ -2,18 +2,24 @@
 // Equations: src/needle/opening.rs and CpuEngine::stations_now.
 #import effects/opening
 
+#ifndef WIDE
 @group(1) @binding(22) var<storage, read> path_entries: array<OpeningEntry>;
+#endif
 // Sections, and behind them one per run of cells: the mean of the sections in these.
 @group(3) @binding(20) var<storage, read_write> path_stations: array<OpeningStation>;
 
-// By one workgroup of 64; `coordinate`: material coordinate of the tip; `shift`: by what the dimple brings it forward [m].
+// By one workgroup of LANES; `coordinate`: material coordinate of the tip; `shift`: by what the dimple brings it forward [m].
 fn place_sections(lane: u32, coordinate: f32, shift: f32) {
-    let t = opening.direction.xyz;
     let count = opening.counts.x;
     let spacing = opening.numbers.x;
     let tip_length = opening.entry.w;
-    for (var i = lane; i < count; i += 64u) {
+    for (var i = lane; i < count; i += LANES) {
         let depth = path_stations[i].depth;
+#ifdef WIDE
+        // By stage path_means.
+        let middle = path_stations[i].centre.xyz;
+        let moved = path_stations[i].rubbing.y;
+#else
         let lists = path_stations[i].lists;
         var middle = vec3<f32>(0.0);
         var moved = 0.0;
@@ -21,8 +27,10 @@ fn place_sections(lane: u32, coordinate: f32, shift: f32) {
             let entry = path_entries[e];
             let u = vec3<f32>(node_displacement[entry.index].xyz) * DISPLACEMENT_UNIT;
             middle += u * entry.first;
-            moved += dot(u, t) * entry.second;
+            moved += dot(u, opening.direction.xyz) * entry.second;
         }
+        middle = across(middle);
+#endif
         let behind = step_input.depth - depth.x - moved - shift;
         let part = (coordinate - depth.y) / spacing + 0.5;
         let cut = clamp(part, 0.0, 1.0);
@@ -33,19 +41,19 @@ fn place_sections(lane: u32, coordinate: f32, shift: f32) {
         let bend = clamp((tip_length - behind) / spacing + 0.5, 0.0, 1.0);
         let full = select(shaft - 0.5 * steep * spacing * bend * bend, steep * max(behind, 0.0), bend == 1.0);
         let slope = select(0.0, steep * bend, behind > 0.0);
-        path_stations[i].centre = vec4<f32>(across(middle), full * cut);
+        path_stations[i].centre = vec4<f32>(middle, full * cut);
         path_stations[i].place = vec4<f32>(behind, cut, rate, slope);
         path_stations[i].rubbing.x = full;
     }
     storageBarrier();
-    for (var i = lane; i < count; i += 64u) {
+    for (var i = lane; i < count; i += LANES) {
         let before = max(i, 1u) - 1u;
         let behind = min(i + 1u, count - 1u);
         let by = 1.0 / (spacing * f32(behind - before));
         path_stations[i].centre_rate = (path_stations[behind].centre - path_stations[before].centre) * by;
     }
     storageBarrier();
-    for (var run = lane; run < opening.sums.y; run += 64u) {
+    for (var run = lane; run < opening.sums.y; run += LANES) {
         let within = path_stations[count + run].lists;
         var centre = vec4<f32>(0.0);
         var rate = vec4<f32>(0.0);

@@ -46,14 +46,18 @@ fn within_block(X: vec3<f32>) -> vec3<f32> {
     return clamp(X, low, high);
 }
 
+// Cell of the last place that was looked for: the next one is near it.
+var<private> near_cell: vec3<u32>;
+
 fn grid_place(X: vec3<f32>) -> GridPlace {
     let y0 = NODES_X;
     let z0 = y0 + NODES_Y;
     let cell = vec3<u32>(
-        find_cell(X.x, 0u, NODES_X),
-        find_cell(X.y, y0, NODES_Y),
-        find_cell(X.z, z0, NODES_Z),
+        find_cell_near(X.x, 0u, NODES_X, near_cell.x),
+        find_cell_near(X.y, y0, NODES_Y, near_cell.y),
+        find_cell_near(X.z, z0, NODES_Z, near_cell.z),
     );
+    near_cell = cell;
     let low = vec3<f32>(grid_lines[cell.x], grid_lines[y0 + cell.y], grid_lines[z0 + cell.z]);
     let high = vec3<f32>(grid_lines[cell.x + 1u], grid_lines[y0 + cell.y + 1u], grid_lines[z0 + cell.z + 1u]);
     let width = high - low;
@@ -262,6 +266,7 @@ fn move_tip() {
 fn advance_free_tip(@builtin(local_invocation_index) lane: u32) {
     let anchor = min(lane, ANCHOR_COUNT - 1u);
     let spring = puncture.tip_stiffness / f32(ANCHOR_COUNT);
+    near_cell = tip_anchor_loads[anchor].cell.xyz;
     if (lane == 0u) {
         free_tip.advance = 0.0;
         moved = 0.0;

@@ -25,7 +25,11 @@ var<workgroup> losses: array<f32, ANCHOR_COUNT>;
 var<workgroup> distances: array<f32, ANCHOR_COUNT>;
 var<workgroup> coordinate: f32;
 #ifdef OPENING
+#ifdef WIDE
+const LANES: u32 = 256u;
+#else
 const LANES: u32 = 64u;
+#endif
 // On all anchors alike; their mean distance before the advance [m].
 var<workgroup> mean_before: f32;
 var<workgroup> touch: SurfaceTouch;
@@ -48,20 +52,24 @@ struct AnchorPlace {
     stretch: f32,
 }
 
+// Where the anchor was when it was last looked for.
+var<private> near_cell: vec3<u32>;
+
 fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     let t = step_input.direction.xyz;
     let X = tip_anchors[anchor].surface.xyz + t * a;
     let y0 = NODES_X;
     let z0 = NODES_X + NODES_Y;
 #ifdef BORE
-    let cell = vec3<u32>(tip_anchors[anchor].column.xy, find_cell(X.z, z0, NODES_Z));
+    let cell = vec3<u32>(tip_anchors[anchor].column.xy, find_cell_near(X.z, z0, NODES_Z, near_cell.z));
 #else
     let cell = vec3<u32>(
-        find_cell(X.x, 0u, NODES_X),
-        find_cell(X.y, y0, NODES_Y),
-        find_cell(X.z, z0, NODES_Z),
+        find_cell_near(X.x, 0u, NODES_X, near_cell.x),
+        find_cell_near(X.y, y0, NODES_Y, near_cell.y),
+        find_cell_near(X.z, z0, NODES_Z, near_cell.z),
     );
 #endif
+    near_cell = cell;
     let low = vec3<f32>(grid_lines[cell.x], grid_lines[y0 + cell.y], grid_lines[z0 + cell.z]);
     let high = vec3<f32>(grid_lines[cell.x + 1u], grid_lines[y0 + cell.y + 1u], grid_lines[z0 + cell.z + 1u]);
     let width = high - low;
@@ -106,6 +114,9 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
     let spreading = opening_record.now.z;
 #endif
     var threshold = tip_threshold(before, speed) + resistance;
+#ifndef TETRAHEDRA
+    near_cell = tip_anchor_loads[anchor].cell.xyz;
+#endif
     var place = place_anchor(anchor, before);
     if (lane < ANCHOR_COUNT) {
         gaps[lane] = place.gap;

@@ -1,4 +1,5 @@
-// Stage measure_cells: energies, Jacobians and inverted cells; every thread sums over many cells, the host over threads.
+// Stage measure_cells: energies, Jacobians and inverted cells; every thread sums over many cells, the host over threads, or over
+// workgroups where the adapter has many lanes.
 #import shared/params
 #import shared/thread_index
 #import shared/displacement
@@ -24,12 +25,39 @@ fn book_history(sums: ptr<function, CellSums>, cell: u32, volume: f32, held: f32
 }
 #endif
 
+#ifdef WIDE
+var<workgroup> gathered: array<CellSums, 64>;
+
+fn both(a: CellSums, b: CellSums) -> CellSums {
+    return CellSums(
+        a.elastic + b.elastic,
+        a.hourglass + b.hourglass,
+        min(a.min_jacobian, b.min_jacobian),
+        min(a.min_corner_jacobian, b.min_corner_jacobian),
+        a.inverted_cells + b.inverted_cells,
+        select(a.inverted_cell, b.inverted_cell, b.inverted_cells > 0u),
+        a.overstretched_cells + b.overstretched_cells,
+        a.deleted_cells + b.deleted_cells,
+        a.flow + b.flow,
+        a.degradation + b.degradation,
+        a.relaxation + b.relaxation,
+        min(a.least_intact, b.least_intact),
+        a.failures + b.failures,
+        a.folded_cells + b.folded_cells,
+        0u,
+        0u,
+    );
+}
+#endif
+
 @compute @workgroup_size(64)
 fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let thread = thread_index(id, groups);
+#ifndef WIDE
     if (thread >= MEASURE_THREADS) {
         return;
     }
+#endif
     var sums: CellSums;
     sums.min_jacobian = 1e30;
     sums.min_corner_jacobian = 1e30;
@@ -37,7 +65,8 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
 #ifdef OWN
     var own_sum = vec4<f32>(0.0);
 #endif
-    for (var index = thread; index < CELL_COUNT; index += MEASURE_THREADS) {
+    // A wrapped dispatch may have more threads.
+    for (var index = thread; index < CELL_COUNT && thread < MEASURE_THREADS; index += MEASURE_THREADS) {
         let cell = measured_cell(index);
         let energy = cell.energy;
         sums.elastic += energy.elastic;
@@ -63,8 +92,25 @@ fn measure_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
             sums.inverted_cell = index;
         }
     }
+#ifdef WIDE
+    let lane = thread % 64u;
+    gathered[lane] = sums;
+    workgroupBarrier();
+    for (var half = 32u; half > 0u; half /= 2u) {
+        if (lane < half) {
+            gathered[lane] = both(gathered[lane], gathered[lane + half]);
+        }
+        workgroupBarrier();
+    }
+    if (lane == 0u && thread < MEASURE_THREADS) {
+        cell_sums[thread / 64u] = gathered[0];
+    }
+#else
     cell_sums[thread] = sums;
+#endif
 #ifdef OWN
-    tell_own_supply(thread, own_sum);
+    if (thread < MEASURE_THREADS) {
+        tell_own_supply(thread, own_sum);
+    }
 #endif
 }

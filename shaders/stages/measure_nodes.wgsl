@@ -22,14 +22,42 @@ fn not_finite(v: vec3<f32>) -> bool {
     return any((bitcast<vec3<u32>>(v) & vec3<u32>(0x7f800000u)) == vec3<u32>(0x7f800000u));
 }
 
+#ifdef WIDE
+var<workgroup> gathered: array<NodeSums, 64>;
+
+fn both(a: NodeSums, b: NodeSums) -> NodeSums {
+    return NodeSums(
+        a.kinetic + b.kinetic,
+        a.damping + b.damping,
+        a.work + b.work,
+        a.moment_x + b.moment_x,
+        a.moment_y + b.moment_y,
+        a.moment_z + b.moment_z,
+        max(a.max_speed, b.max_speed),
+        a.raised_mass + b.raised_mass,
+        a.out_of_range + b.out_of_range,
+        a.clamped_nodes + b.clamped_nodes,
+        a.raised_energy + b.raised_energy,
+        a.clamped_energy + b.clamped_energy,
+        max(a.step_ratio, b.step_ratio),
+        a.half_step + b.half_step,
+        0u,
+        0u,
+    );
+}
+#endif
+
 @compute @workgroup_size(64)
 fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let thread = thread_index(id, groups);
+#ifndef WIDE
     if (thread >= MEASURE_THREADS) {
         return;
     }
+#endif
     var sums: NodeSums;
-    for (var node = thread; node < NODE_COUNT; node += MEASURE_THREADS) {
+    // A wrapped dispatch may have more threads.
+    for (var node = thread; node < NODE_COUNT && thread < MEASURE_THREADS; node += MEASURE_THREADS) {
         let u = node_displacement[node];
         let v = node_velocity[node];
         let mass = node_mass[node];
@@ -59,5 +87,20 @@ fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         node_velocity[node] = vec4<f32>(v.xyz, 0.0);
         node_displacement[node] = vec4<i32>(u.xyz, 0);
     }
+#ifdef WIDE
+    let lane = thread % 64u;
+    gathered[lane] = sums;
+    workgroupBarrier();
+    for (var half = 32u; half > 0u; half /= 2u) {
+        if (lane < half) {
+            gathered[lane] = both(gathered[lane], gathered[lane + half]);
+        }
+        workgroupBarrier();
+    }
+    if (lane == 0u && thread < MEASURE_THREADS) {
+        node_sums[thread / 64u] = gathered[0];
+    }
+#else
     node_sums[thread] = sums;
+#endif
 }

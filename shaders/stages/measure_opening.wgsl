@@ -1,10 +1,13 @@
-// Stage measure_opening: energy that opening adds to the tissue, in 128 parts, and what the frame has summed.
+// Stage measure_opening: energy that opening adds to the tissue, in PARTS parts, and what the frame has summed.
 #import shared/opening_cell
+
+// As OPENING_PARTS in src/gpu/plan.rs.
+const PARTS: u32 = 1024u;
 
 struct OpeningTotals {
     record: OpeningRecord,
     // Elastic energy [J].
-    elastic: array<vec4<f32>, 32>,
+    elastic: array<array<vec4<f32>, 32>, 8>,
 }
 
 #ifdef FLEXIBLE_NEEDLE
@@ -20,7 +23,7 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
     let thread = id.x;
     let scale = 1.0 / opening.direction.w;
     var energy = 0.0;
-    for (var index = thread; index < opening.counts.y; index += 128u) {
+    for (var index = thread; index < opening.counts.y; index += PARTS) {
         let cluster = path_clusters[index];
         let end = opened_end(cluster.points.xy);
         let modes = cell_modes(cluster.cell.xyz);
@@ -35,7 +38,7 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
             energy += select(0.0, point.place.w, section.radius > 0.0) * opened_energy(cluster.cell.w, place, H);
         }
     }
-    for (var index = thread; index < opening.counts.z; index += 128u) {
+    for (var index = thread; index < opening.counts.z; index += PARTS) {
         let cell = near_cells[index];
         let mean = path_stations[opening.counts.x + cell.stations.x];
         for (var once = select(1u, 0u, mean.centre.w > 0.0); once == 0u; once++) {
@@ -58,10 +61,10 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
             energy += cell.place.w * volume * opened_energy(cell.cell.w, opened_place(section, eta, gradient), H);
         }
     }
-    opening_totals.elastic[thread / 4u][thread % 4u] = energy;
+    opening_totals.elastic[thread / 128u][thread / 4u % 32u][thread % 4u] = energy;
 #ifdef FLEXIBLE_NEEDLE
     // The loads are shared over the entries of the centre-line.
-    for (var entry = select(32u, 0u, thread == 0u); entry < 32u; entry++) {
+    for (var entry = thread; entry < 32u; entry += PARTS) {
         var load = vec4<f32>(0.0);
         for (var i = 0u; i < opening.counts.x; i++) {
             let share = max(0.0, 1.0 - abs(centre_line_entry(path_stations[i].place.x) - f32(entry)));

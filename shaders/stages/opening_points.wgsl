@@ -1,7 +1,15 @@
-// Stage opening_points: forces of the points beside the path, one thread per cluster: points in one cell.
+// Stage opening_points: forces of the points beside the path, PIECES threads per cluster: points in one cell.
 // Equations: src/needle/opening.rs and point_forces in src/cpu/opening.rs.
 #import shared/thread_index
 #import shared/opening_cluster
+
+#ifdef WIDE
+// As `pieces` in src/gpu/plan.rs. Hardware waits for one point after another; software would only do more.
+const PIECES: u32 = 8u;
+// What threads have for the modes of their cluster, w: for the bounds at its corners; its sums.
+var<workgroup> shares: array<vec4<f32>, 512>;
+var<workgroup> totals: array<vec4<f32>, 64>;
+#endif
 
 // f_int on the eight corners of a slot [N]; w: bound of the stiffness there [N/m].
 @group(3) @binding(21) var<storage, read_write> opening_corners: array<vec4<f32>>;
@@ -9,11 +17,25 @@
 
 @compute @workgroup_size(64)
 fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+#ifdef WIDE
+    // Threads beyond the last cluster have no points: all have to wait for each other below.
+    let thread = thread_index(id, groups);
+    let piece = thread % PIECES;
+    let index = min(thread / PIECES, opening.counts.y - 1u);
+    let cluster = path_clusters[index];
+    let held = cluster.points.y - cluster.points.x;
+    let first = cluster.points.x + held * piece / PIECES;
+    let end = select(first, opened_end(vec2<u32>(first, cluster.points.x + held * (piece + 1u) / PIECES)), thread / PIECES == index);
+#else
     let index = thread_index(id, groups);
     if (index >= opening.counts.y) {
         return;
     }
     let cluster = path_clusters[index];
+    let first = cluster.points.x;
+    // What is not opened is as its cells have it: no point at all.
+    let end = opened_end(cluster.points.xy);
+#endif
     let inverse = cluster.inverse.xyz;
     let scale = 1.0 / opening.direction.w;
     var f: CellModes;
@@ -21,10 +43,8 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     var lower = vec4<f32>(0.0);
     var upper = vec4<f32>(0.0);
     var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
-    // What is not opened is as its cells have it: no point at all.
-    let end = opened_end(cluster.points.xy);
     let modes = cell_modes(cluster.cell.xyz);
-    for (var i = cluster.points.x; i < end; i++) {
+    for (var i = first; i < end; i++) {
         let point = path_points[i];
         let station = path_stations[point.numbers.x];
         let section = PathSection(station.centre_rate.xyz, station.centre.w * scale, station.centre_rate.w);
@@ -67,8 +87,36 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
             sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
         }
     }
+#ifdef WIDE
+    let lane = thread % 64u;
+    shares[lane] = vec4<f32>(f.mean, lower.x);
+    shares[64u + lane] = vec4<f32>(f.x, lower.y);
+    shares[128u + lane] = vec4<f32>(f.y, lower.z);
+    shares[192u + lane] = vec4<f32>(f.z, lower.w);
+    shares[256u + lane] = vec4<f32>(f.xy, upper.x);
+    shares[320u + lane] = vec4<f32>(f.yz, upper.y);
+    shares[384u + lane] = vec4<f32>(f.zx, upper.z);
+    shares[448u + lane] = vec4<f32>(f.xyz, upper.w);
+    workgroupBarrier();
+    // A thread has as many modes and corners as there are threads to a cluster: one.
+    let own = lane - piece;
+    var total = vec4<f32>(0.0);
+    for (var other = 0u; other < PIECES; other++) {
+        total += shares[64u * piece + own + other];
+    }
+    totals[lane] = total;
+    workgroupBarrier();
+    f = CellModes(
+        totals[own].xyz, totals[own + 1u].xyz, totals[own + 2u].xyz, totals[own + 3u].xyz,
+        totals[own + 4u].xyz, totals[own + 5u].xyz, totals[own + 6u].xyz, totals[own + 7u].xyz,
+    );
+    if (thread / PIECES == index) {
+        opening_corners[8u * index + piece] = vec4<f32>(force_on_corner(f, piece), total.w);
+    }
+#else
     for (var c = 0u; c < 4u; c++) {
         opening_corners[8u * index + c] = vec4<f32>(force_on_corner(f, c), lower[c]);
         opening_corners[8u * index + c + 4u] = vec4<f32>(force_on_corner(f, c + 4u), upper[c]);
     }
+#endif
 }

@@ -19,11 +19,17 @@
 @group(3) @binding(22) var<storage, read_write> opening_sums: array<OpeningSum>;
 @group(3) @binding(23) var<storage, read_write> opening_record: OpeningRecord;
 
+#ifdef WIDE
+const LANES: u32 = 256u;
+#else
+const LANES: u32 = 64u;
+#endif
+
 // Per thread: forces along and across, and what else the record sums.
-var<workgroup> parts: array<vec4<f32>, 64>;
-var<workgroup> lateral: array<vec4<f32>, 64>;
-var<workgroup> torque: array<vec4<f32>, 64>;
-var<workgroup> bent: array<f32, 64>;
+var<workgroup> parts: array<vec4<f32>, LANES>;
+var<workgroup> lateral: array<vec4<f32>, LANES>;
+var<workgroup> torque: array<vec4<f32>, LANES>;
+var<workgroup> bent: array<f32, LANES>;
 
 // Part of a station that is on the shaft.
 fn on_shaft(i: u32) -> f32 {
@@ -31,13 +37,28 @@ fn on_shaft(i: u32) -> f32 {
     return select(0.0, place.y, place.x >= opening.entry.w);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(LANES)
 fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
     let t = opening.direction.xyz;
     let count = opening.counts.x;
     let spacing = opening.numbers.x;
+#ifdef WIDE
+    // By stage path_sums, but for the runs: behind the points in the list of a station.
+    for (var i = lane; i < count; i += LANES) {
+        let lists = path_stations[i].lists;
+        var sum = OpeningSum(path_stations[i].by_centre, path_stations[i].by_rate);
+        for (var e = lists.w; e > lists.z && path_entries[e - 1u].index >= opening.sums.z; e--) {
+            let entry = path_entries[e - 1u];
+            let told = opening_sums[entry.index];
+            sum.by_centre += told.by_centre * entry.first;
+            sum.by_rate += told.by_rate * entry.first;
+        }
+        path_stations[i].by_centre = sum.by_centre;
+        path_stations[i].by_rate = sum.by_rate;
+    }
+#else
     // Cells around the same stations, once for all of these.
-    for (var run = lane; run < opening.sums.y; run += 64u) {
+    for (var run = lane; run < opening.sums.y; run += LANES) {
         let slots = path_entries[run];
         var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
         for (var slot = slots.index; slot < slots.index + u32(slots.first); slot++) {
@@ -48,7 +69,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         opening_sums[opening.sums.z + run] = sum;
     }
     storageBarrier();
-    for (var i = lane; i < count; i += 64u) {
+    for (var i = lane; i < count; i += LANES) {
         let lists = path_stations[i].lists;
         var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
         for (var e = lists.z; e < lists.w; e++) {
@@ -60,6 +81,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         path_stations[i].by_centre = sum.by_centre;
         path_stations[i].by_rate = sum.by_rate;
     }
+#endif
     storageBarrier();
     // along: spreading, friction, friction work, energy in springs; lateral: force across, resistance of the tip.
     var along = vec4<f32>(0.0);
@@ -68,7 +90,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
     // Sum of the normal forces on the shaft; work of the needle beside that of its motion as a whole [J].
     var squeezed = 0.0;
     var bend_work = 0.0;
-    for (var i = lane; i < count; i += 64u) {
+    for (var i = lane; i < count; i += LANES) {
         let now = path_stations[i];
         // By the centre and by rc with all that follows from them.
         var by = now.by_centre;
@@ -148,14 +170,22 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
     bent[lane] = bend_work;
     torque[lane] = vec4<f32>(turning, squeezed);
     workgroupBarrier();
-    if (lane == 0u) {
-        for (var i = 1u; i < 64u; i++) {
-            along += parts[i];
-            aside += lateral[i];
-            turning += torque[i].xyz;
-            squeezed += torque[i].w;
-            bend_work += bent[i];
+    // Halves onto halves.
+    for (var half = LANES / 2u; half > 0u; half /= 2u) {
+        if (lane < half) {
+            parts[lane] += parts[lane + half];
+            lateral[lane] += lateral[lane + half];
+            torque[lane] += torque[lane + half];
+            bent[lane] += bent[lane + half];
         }
+        workgroupBarrier();
+    }
+    if (lane == 0u) {
+        along = parts[0];
+        aside = lateral[0];
+        turning = torque[0].xyz;
+        squeezed = torque[0].w;
+        bend_work = bent[0];
         let dt = params.dt;
         let total = t * (along.x + along.y) + aside.xyz;
         let impulse = opening_record.impulse.xyz + total * dt;

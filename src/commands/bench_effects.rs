@@ -176,6 +176,7 @@ pub fn off_is_absent() -> Result<bool> {
             free_path: false,
             opening: false,
             drawn: true,
+            wide: false,
             empty_cells: false,
             tetrahedra: false,
             laws: BTreeSet::from([law.key]),

@@ -3,6 +3,8 @@
 /// One stage of the step. Name = file stem in `shaders/stages` = pipeline label = timing label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Stage {
+    /// Where the sections of an opened path are; on adapters with many lanes, elsewhere within the next one.
+    PathMeans,
     /// Tip law: springs between tip and anchors, threshold, advance of the material tip coordinate.
     AdvanceTip,
     /// Cells that the tip has passed lose stiffness; their energy is booked as cutting.
@@ -27,6 +29,8 @@ pub enum Stage {
     OpeningPoints,
     /// What opening adds to the cells around the path.
     OpeningCells,
+    /// What cells and points tell of the sections; on adapters with many lanes, elsewhere within the next one.
+    PathSums,
     /// What the sections of the path do to tissue, needle and tip; friction.
     OpeningReactions,
     /// All of it on the nodes.
@@ -55,7 +59,8 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 24] = [
+    pub const ALL: [Stage; 26] = [
+        Stage::PathMeans,
         Stage::AdvanceTip,
         Stage::SoftenPath,
         Stage::AdvanceFreeTip,
@@ -68,6 +73,7 @@ impl Stage {
         Stage::NeedleContact,
         Stage::OpeningPoints,
         Stage::OpeningCells,
+        Stage::PathSums,
         Stage::OpeningReactions,
         Stage::OpeningNodes,
         Stage::IndenterContact,
@@ -86,6 +92,7 @@ impl Stage {
     /// File stem and label.
     pub fn name(self) -> &'static str {
         match self {
+            Stage::PathMeans => "path_means",
             Stage::AdvanceTip => "advance_tip",
             Stage::SoftenPath => "soften_path",
             Stage::AdvanceFreeTip => "advance_free_tip",
@@ -98,6 +105,7 @@ impl Stage {
             Stage::NeedleContact => "needle_contact",
             Stage::OpeningPoints => "opening_points",
             Stage::OpeningCells => "opening_cells",
+            Stage::PathSums => "path_sums",
             Stage::OpeningReactions => "opening_reactions",
             Stage::OpeningNodes => "opening_nodes",
             Stage::IndenterContact => "indenter_contact",

@@ -42,7 +42,8 @@ pub const PARAMS: [(&str, &[&str]); 3] = [
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 19] = [
+pub const SCENE_DEFINES: [&str; 20] = [
+    "WIDE",
     "TIED",
     "INNER_BOUND",
     "SLIT",

@@ -25,6 +25,8 @@ pub struct Gpu {
     pub kernels: KernelCache,
     /// Whether arrays lie in textures, see [`super::texels`]; engines that are made later follow it.
     pub texels: bool,
+    /// Whether short stages get many threads, see [`super::plan::Grain`]; engines that are made later follow it.
+    pub wide: bool,
 }
 
 /// One line about an adapter.
@@ -160,15 +162,16 @@ impl Gpu {
                 note(format!("lost ({reason:?}): {text}"));
             }
         });
-        let texels = info.name.contains("llvmpipe");
-        Ok(Gpu { device, queue, info, failure, kernels: KernelCache::default(), texels })
+        let gpu = Self::shared(device, queue, info);
+        Ok(Gpu { failure, ..gpu })
     }
 
     /// A device that a host program has opened and goes on using: an engine on it submits to the same queue. It needs
     /// `wgpu::Limits::default()`; errors outside the engine's calls stay with the host, whose callbacks are not replaced.
     pub fn shared(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
         let texels = info.name.contains("llvmpipe");
-        Gpu { device, queue, info, failure: Arc::new(Mutex::new(None)), kernels: KernelCache::default(), texels }
+        let wide = info.device_type != wgpu::DeviceType::Cpu;
+        Gpu { device, queue, info, failure: Arc::new(Mutex::new(None)), kernels: KernelCache::default(), texels, wide }
     }
 
     /// Opens the first adapter of an instance that can draw on a surface; `WGPU_ADAPTER_NAME` names another.

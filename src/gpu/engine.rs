@@ -16,7 +16,7 @@ use super::kernel::{BindingKind, Compiled, Kernel};
 use super::layout::{Layout, strip_layers};
 use super::memory::{Memory, allocate};
 use super::pace::Pace;
-use super::plan::{Features, defines, measure_threads, mesh_numbers, stages, threads};
+use super::plan::{Features, Grain, defines, mesh_numbers, stages, threads};
 use super::structs::StepInput;
 use crate::engine::{Engine, EngineImage, EngineInfo, FramePlan, FrameSums, Health, Stage, State, foreign_image};
 use crate::error::{Error, Result};
@@ -56,6 +56,7 @@ pub struct GpuEngine {
     gpu: Gpu,
     info: EngineInfo,
     pub(super) layout: Layout,
+    pub(super) grain: Grain,
     dt: f64,
     pub(super) kernels: Vec<Kernel>,
     pub(super) buffers: BTreeMap<&'static str, Memory>,
@@ -90,12 +91,11 @@ impl GpuEngine {
     pub fn for_purpose(model: Arc<Model>, gpu: Gpu, dt: f64, max_steps: usize, drawn: bool) -> Result<Self> {
         let layers = strip_layers(model.mesh.cell_count(), gpu.is_software());
         let layout = Layout::new(&model.mesh, layers);
-        let features = Features { drawn, ..Features::of(&model) };
+        let grain = Grain::of(&model, gpu.wide);
+        let features = Features { drawn, wide: grain.wide, ..Features::of(&model) };
         let defines = defines(&model.effects, &features);
-        let measure_threads = measure_threads(&model);
-        let numbers = mesh_numbers(&model, &layout, measure_threads);
-        let source =
-            Source { model: &model, layout: &layout, dt, measure_threads, max_steps, opening: Default::default() };
+        let numbers = mesh_numbers(&model, &layout, grain);
+        let source = Source { model: &model, layout: &layout, dt, grain, max_steps, opening: Default::default() };
         // Composing, validating and compiling go side by side: they are most of the time to the first step.
         let compiled = stages(&model.effects, &features)
             .into_par_iter()
@@ -113,7 +113,7 @@ impl GpuEngine {
         let kernels = compiled
             .into_iter()
             .map(|r| {
-                let threads = threads(r.stage, &model, &layout, measure_threads);
+                let threads = threads(r.stage, &model, &layout, grain);
                 Kernel::new(&gpu.device, r, &buffers, size_of::<StepInput>() as u64, threads)
             })
             .collect::<Result<Vec<Kernel>>>()?;
@@ -147,6 +147,7 @@ impl GpuEngine {
             gpu,
             info,
             layout,
+            grain,
             dt,
             kernels,
             buffers,
@@ -287,7 +288,7 @@ impl GpuEngine {
             model: &self.model,
             layout: &self.layout,
             dt: self.dt,
-            measure_threads: measure_threads(&self.model),
+            grain: self.grain,
             max_steps: self.max_steps,
             opening: Default::default(),
         }
@@ -555,19 +556,19 @@ impl Engine for GpuEngine {
 
     fn retune(&mut self, model: Arc<Model>, dt: f64, steps: usize) -> Result<bool> {
         while self.collect_oldest(true)? {}
-        let features = |m: &Model| Features { drawn: self.kernels.iter().any(|k| k.stage.draws()), ..Features::of(m) };
+        let drawn = self.kernels.iter().any(|k| k.stage.draws());
+        let features = |m: &Model| Features { drawn, wide: self.grain.wide, ..Features::of(m) };
         let (old, new) = (features(&self.model), features(&model));
-        let measured = measure_threads(&model);
+        let grain = Grain::of(&model, self.gpu.wide);
         let fits = steps <= self.max_steps
             && defines(&model.effects, &new) == defines(&self.model.effects, &old)
-            && self.kernels.iter().all(|k| k.threads() == threads(k.stage, &model, &self.layout, measured));
+            && self.kernels.iter().all(|k| k.threads() == threads(k.stage, &model, &self.layout, grain));
         if !fits {
             return Ok(false);
         }
         let mut writes = Vec::new();
         let (layout, max_steps) = (&self.layout, self.max_steps);
-        let source =
-            Source { model: &model, layout, dt, measure_threads: measured, max_steps, opening: Default::default() };
+        let source = Source { model: &model, layout, dt, grain, max_steps, opening: Default::default() };
         for array in arrays::all() {
             let Some(buffer) = self.buffers.get(array.name) else { continue };
             let state = self.kept.contains(&array.name) && array.life != Life::Told;

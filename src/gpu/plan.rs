@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use super::arrays::{CONTACT_PARTS, FACE_PARTS, SEPARATION_PARTS, busy_nodes, free_cell_count, opening_counts};
+use super::arrays::{
+    CONTACT_PARTS, FACE_PARTS, SEPARATION_PARTS, busy_nodes, free_cell_count, opening_counts, section_counts,
+};
 use super::compose::Defines;
 use super::kernel::MeshNumbers;
 use super::layout::Layout;
@@ -33,6 +35,8 @@ pub struct Features {
     pub opening: bool,
     /// A window draws the fields.
     pub drawn: bool,
+    /// The adapter has more lanes than short stages have threads: those get more, see [`Grain`].
+    pub wide: bool,
     /// Keys of the elastic laws that occur.
     pub laws: BTreeSet<&'static str>,
 }
@@ -50,6 +54,7 @@ impl Features {
             free_path: model.puncture.as_ref().is_some_and(|p| p.free.is_some()),
             opening: model.opening().is_some(),
             drawn: false,
+            wide: false,
             laws: model.materials.iter().map(|m| m.law.isochoric.key()).collect(),
         }
     }
@@ -82,6 +87,7 @@ pub fn defines(effects: &EffectSet, features: &Features) -> Defines {
     define("BORE", features.bore && separates);
     define("SLIT", features.slit && separates);
     define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
+    define("WIDE", features.wide);
     define("OPENING", features.opening && effects.puncture.is_some() && !features.tetrahedra);
     // The bulk stiffness of a cell is not that of all others.
     let weakens = effects.damage.is_some() || effects.puncture.is_some();
@@ -119,6 +125,7 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
         | Stage::OpeningReactions
         | Stage::OpeningNodes
         | Stage::MeasureOpening => puncture && opening,
+        Stage::PathMeans | Stage::PathSums => puncture && opening && features.wide,
         Stage::IndenterContact => indentation,
         Stage::MeasureContact => puncture || indentation,
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
@@ -130,15 +137,43 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     Stage::ALL.into_iter().filter(wanted).collect()
 }
 
-/// Threads of the measuring stages: enough to fill a device, few enough that the sums are a short read-back.
-pub fn measure_threads(model: &Model) -> u32 {
-    (model.mesh.cell_count() as u32 / 16).clamp(64, 8192).next_multiple_of(64)
+/// How finely work is cut. Hardware waits for memory, and needs many threads to do something else meanwhile; a software adapter walks
+/// through all of them in turn, and pays for what they have in common once per thread.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Grain {
+    /// Many threads for few cells.
+    pub wide: bool,
+    /// Threads of the measuring stages: enough to fill a device.
+    pub measure_threads: u32,
 }
 
+impl Grain {
+    /// `wide`: as on hardware.
+    pub fn of(model: &Model, wide: bool) -> Self {
+        let cells = model.mesh.cell_count() as u32;
+        let threads = if wide { cells.min(65_536) } else { (cells / 16).min(8192) };
+        Grain { wide, measure_threads: threads.max(64).next_multiple_of(64) }
+    }
+
+    /// Sums that these tell: hardware adds those of a workgroup, so that the read-back is short.
+    pub fn measured_sums(self) -> u32 {
+        if self.wide { self.measure_threads / 64 } else { self.measure_threads }
+    }
+
+    /// Threads for each cluster of points beside an opened path and for each node there: PIECES in their stages.
+    pub fn pieces(self) -> usize {
+        if self.wide { 8 } else { 1 }
+    }
+}
+
+/// Threads of the stage measure_opening: PARTS there.
+pub const OPENING_PARTS: u32 = 1024;
+
 /// Threads that a stage needs.
-pub fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u32) -> u32 {
+pub fn threads(stage: Stage, model: &Model, layout: &Layout, grain: Grain) -> u32 {
     match stage {
-        Stage::AdvanceTip | Stage::AdvanceFreeTip => 32,
+        // One workgroup.
+        Stage::AdvanceTip | Stage::AdvanceFreeTip | Stage::OpeningReactions => 1,
         Stage::SoftenFreePath => free_cell_count(model),
         Stage::SoftenPath => model.puncture.as_ref().map_or(1, |p| p.cells.len() as u32),
         Stage::CellFields => model.mesh.cell_count() as u32,
@@ -146,14 +181,16 @@ pub fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u3
         Stage::MeasureDilatation | Stage::TetrahedronForces => model.mesh.cell_count() as u32,
         Stage::AveragePressure => model.mesh.node_count() as u32,
         Stage::ElementForces => layout.strips().busy_count(),
-        Stage::OpeningReactions => 64,
-        Stage::OpeningPoints => opening_counts(model)[0],
+        Stage::OpeningPoints => opening_counts(model)[0] * grain.pieces() as u32,
         Stage::OpeningCells => opening_counts(model)[1],
-        Stage::OpeningNodes => opening_counts(model)[2],
-        Stage::MeasureOpening => 128,
+        Stage::OpeningNodes => opening_counts(model)[2] * grain.pieces() as u32,
+        // A workgroup for each of what they sum.
+        Stage::PathMeans => 64 * section_counts(model)[0],
+        Stage::PathSums => 64 * section_counts(model).iter().sum::<u32>(),
+        Stage::MeasureOpening => OPENING_PARTS,
         Stage::NeedleContact | Stage::IndenterContact => model.contact_nodes.len() as u32,
         Stage::IntegrateNodes => 64 * busy_nodes(model).len() as u32,
-        Stage::MeasureCells | Stage::MeasureNodes => measure_threads,
+        Stage::MeasureCells | Stage::MeasureNodes => grain.measure_threads,
         Stage::CohesiveForces => model.separation.pairs.len() as u32,
         Stage::MeasureSeparation => SEPARATION_PARTS as u32,
         Stage::MeasureContact => CONTACT_PARTS as u32,
@@ -162,11 +199,11 @@ pub fn threads(stage: Stage, model: &Model, layout: &Layout, measure_threads: u3
 }
 
 /// What shaders/shared/mesh_numbers.wgsl leaves open.
-pub fn mesh_numbers(model: &Model, layout: &Layout, measure_threads: u32) -> MeshNumbers {
+pub fn mesh_numbers(model: &Model, layout: &Layout, grain: Grain) -> MeshNumbers {
     let mut numbers = MeshNumbers::from([
         ("CELL_COUNT", model.mesh.cell_count() as u32),
         ("NODE_COUNT", model.mesh.node_count() as u32),
-        ("MEASURE_THREADS", measure_threads),
+        ("MEASURE_THREADS", grain.measure_threads),
         ("CONTACT_COUNT", model.contact_nodes.len().max(1) as u32),
     ]);
     const FIXED: [&str; 6] = ["FIXED_X_MIN", "FIXED_X_MAX", "FIXED_Y_MIN", "FIXED_Y_MAX", "FIXED_Z_MIN", "FIXED_Z_MAX"];

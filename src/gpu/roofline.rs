@@ -10,7 +10,7 @@ use super::arrays::STEP_INPUT;
 use super::compose::Defines;
 use super::engine::GpuEngine;
 use super::kernel::{Kernel, MeshNumbers, reflect};
-use super::plan::{Features, defines, measure_threads, mesh_numbers};
+use super::plan::{Features, defines, mesh_numbers};
 use super::structs::StepInput;
 use crate::engine::Stage;
 use crate::error::{Error, Result};
@@ -49,9 +49,9 @@ impl GpuEngine {
     /// `Error::Shader`, where a source has changed since.
     pub fn loads(&self) -> Result<Vec<StageLoad>> {
         let model = &*self.model;
-        let measure_threads = measure_threads(model);
-        let defines = defines(&model.effects, &Features::of(model));
-        let numbers = mesh_numbers(model, &self.layout, measure_threads);
+        let features = Features { wide: self.grain.wide, ..Features::of(model) };
+        let defines = defines(&model.effects, &features);
+        let numbers = mesh_numbers(model, &self.layout, self.grain);
         let bytes = |names: &[String]| -> f64 {
             let size = |name: &String| match name.as_str() {
                 // A step reads its own.

@@ -294,7 +294,7 @@ shared_structs! {
     /// shaders/stages/measure_opening.wgsl
     struct OpeningTotals {
         record: OpeningRecord,
-        elastic: [[f32; 4]; 32],
+        elastic: [[[f32; 4]; 32]; 8],
     }
     /// shaders/stages/opening_nodes.wgsl
     struct OpeningNode {

@@ -30,6 +30,7 @@ fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
         free_path: false,
         opening: false,
         drawn: true,
+        wide: false,
         bore: false,
         slit: false,
         laws,
@@ -49,6 +50,7 @@ fn scenes() -> Vec<Features> {
     scenes.push(Features { free_path: true, ..scene(false, false) });
     scenes.push(Features { opening: true, ..scene(false, false) });
     scenes.push(Features { opening: true, regions: true, ..scene(true, true) });
+    scenes.push(Features { opening: true, wide: true, ..scene(false, false) });
     scenes.push(Features { bore: true, ..scene(false, false) });
     scenes.push(Features { slit: true, ..scene(true, true) });
     scenes.push(Features { free_path: true, regions: true, ..scene(true, true) });

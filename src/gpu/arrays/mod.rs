@@ -18,11 +18,12 @@ use std::cell::OnceCell;
 use glam::DVec3;
 
 use super::layout::Layout;
+use super::plan::Grain;
 use crate::engine::{FrameSums, State};
 use crate::model::Model;
 
 pub use mesh::{STEP_INPUT, STEP_STRIDE, busy_nodes, centre_line, displacement, step_input};
-pub use opening::opening_counts;
+pub use opening::{opening_counts, section_counts};
 pub use puncture::free_cell_count;
 pub use sums::{CONTACT_PARTS, FACE_PARTS, SEPARATION_PARTS};
 
@@ -70,8 +71,8 @@ pub struct Source<'a> {
     pub layout: &'a Layout,
     /// Time step [s].
     pub dt: f64,
-    /// Threads of the measuring stages.
-    pub measure_threads: u32,
+    /// How finely work is cut.
+    pub grain: Grain,
     /// Most steps of a frame.
     pub max_steps: usize,
     /// Tables of an opened path, made for the first array that asks.
@@ -80,7 +81,7 @@ pub struct Source<'a> {
 
 impl Source<'_> {
     fn opening(&self) -> &opening::Tables {
-        self.opening.get_or_init(|| opening::tables_of(self.model, self.layout))
+        self.opening.get_or_init(|| opening::tables_of(self.model, self.layout, self.grain))
     }
 
     fn nodes(&self) -> u64 {

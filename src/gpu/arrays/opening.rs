@@ -9,14 +9,15 @@ use super::super::structs::{
     OpeningCell, OpeningCluster, OpeningEntry, OpeningNode, OpeningParams, OpeningPoint, OpeningRecord, OpeningStation,
     OpeningSum, OpeningTotals,
 };
-use super::{Array, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
+use super::{Array, Source, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
 use crate::gpu::layout::Layout;
+use crate::gpu::plan::Grain;
 use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::Model;
 use crate::model::opening::{Cluster, NearCell, OpeningPlan};
 
 pub(super) const ARRAYS: &[Array] = &[
-    Array::constant("opening", |s| bytes_of(&[params(s.model, s.dt)])),
+    Array::constant("opening", |s| bytes_of(&[params(s)])),
     Array::constant("path_clusters", |s| bytes_of(&not_empty(&s.opening().clusters))),
     Array::constant("path_points", |s| bytes_of(&not_empty(&s.opening().points))),
     Array::constant("near_cells", |s| bytes_of(&not_empty(&s.opening().cells))),
@@ -37,7 +38,7 @@ pub(super) const ARRAYS: &[Array] = &[
         },
     ),
     Array::state("opening_corners", |s| zeros(8 * slot_count(s.model).max(1), 16)),
-    Array::state("opening_sums", |s| zeros(sum_count(s.model).max(1), size_of::<OpeningSum>())),
+    Array::state("opening_sums", |s| zeros(sum_count(s.model, s.grain).max(1), size_of::<OpeningSum>())),
     Array::state("opening_record", |_| zeros(1, size_of::<OpeningRecord>())).exchanged(
         |bytes, _, state| {
             for record in read_all::<OpeningRecord>(bytes) {
@@ -56,7 +57,7 @@ pub(super) const ARRAYS: &[Array] = &[
 fn add_totals(bytes: &[u8], out: &mut Sums) {
     let sums = &mut out.sums;
     for s in read_all::<OpeningTotals>(bytes) {
-        sums.energy.elastic += s.elastic.iter().flatten().map(|e| f64::from(*e)).sum::<f64>();
+        sums.energy.elastic += s.elastic.as_flattened().iter().flatten().map(|e| f64::from(*e)).sum::<f64>();
         sums.impulse += vector(s.record.impulse);
         // As the work of other contact, see `contact_totals`.
         sums.energy.half_step += out.has_steps * 0.5 * f64::from(s.record.impulse[3]);
@@ -93,15 +94,23 @@ fn bits(signs: [f64; 3]) -> usize {
     (0..3).map(|a| usize::from(signs[a] > 0.0) << a).sum()
 }
 
-/// Sums that clusters tell: one per station that they have points of.
-fn point_sums(opening: &OpeningPlan) -> usize {
-    let of = |c: &Cluster| 1 + c.points.windows(2).filter(|pair| pair[0].0 != pair[1].0).count();
+/// True where a sum ends with point `i` of a cluster: at the last one of a station, and of those that a thread has.
+fn sum_ends(cluster: &Cluster, i: usize, grain: Grain) -> bool {
+    let (count, pieces) = (cluster.points.len(), grain.pieces());
+    let piece_of = |i: usize| (0..pieces).take_while(|p| count * p / pieces <= i).count();
+    let next = cluster.points.get(i + 1);
+    next.is_none_or(|next| next.0 != cluster.points[i].0) || piece_of(i) != piece_of(i + 1)
+}
+
+/// Sums that clusters tell.
+fn point_sums(opening: &OpeningPlan, grain: Grain) -> usize {
+    let of = |c: &Cluster| (0..c.points.len()).filter(|i| sum_ends(c, *i, grain)).count();
     opening.clusters.iter().map(of).sum()
 }
 
 /// Sums of points, of cells, and of runs of cells.
-fn sum_count(model: &Model) -> u64 {
-    let count = |o: &OpeningPlan| point_sums(o) + o.cells.len() + runs_of(model).len();
+fn sum_count(model: &Model, grain: Grain) -> u64 {
+    let count = |o: &OpeningPlan| point_sums(o, grain) + o.cells.len() + runs_of(model).len();
     model.opening().map_or(0, |o| count(o) as u64)
 }
 
@@ -128,7 +137,8 @@ pub fn opening_counts(model: &Model) -> [u32; 3] {
     model.opening().map_or([0; 3], |o| [o.clusters.len(), o.cells.len(), o.nodes.len()].map(|n| n as u32))
 }
 
-fn params(model: &Model, dt: f64) -> OpeningParams {
+fn params(source: &Source) -> OpeningParams {
+    let Source { model, dt, grain, .. } = *source;
     let (Some(opening), Some(plan)) = (model.opening(), &model.puncture) else { return OpeningParams::zeroed() };
     let Some(contact) = &plan.contact else { return OpeningParams::zeroed() };
     let friction = model.effects.friction.unwrap_or_default();
@@ -151,8 +161,8 @@ fn params(model: &Model, dt: f64) -> OpeningParams {
         sums: [
             opening.averaged as u32,
             runs_of(model).len() as u32,
-            (point_sums(opening) + opening.cells.len()) as u32,
-            point_sums(opening) as u32,
+            (point_sums(opening, grain) + opening.cells.len()) as u32,
+            point_sums(opening, grain) as u32,
         ],
         surface: [
             contact.length as f32,
@@ -162,6 +172,11 @@ fn params(model: &Model, dt: f64) -> OpeningParams {
         ],
         dimple: contact.knots.map(|k| [k.root, k.depth, k.slope, k.stored].map(|x| x as f32)),
     }
+}
+
+/// Stations, and runs of cells.
+pub fn section_counts(model: &Model) -> [u32; 2] {
+    model.opening().map_or([0; 2], |o| [o.stations.len(), runs_of(model).len()].map(|n| n as u32))
 }
 
 /// Place of a cell in the grid with its material, its middle from the entry of the path, one over its edges.
@@ -179,15 +194,15 @@ struct Told {
     cut_from: BTreeMap<u32, f64>,
 }
 
-pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
+pub(super) fn tables_of(model: &Model, layout: &Layout, grain: Grain) -> Tables {
     let mut tables = Tables::default();
     let (Some(opening), Some(plan), Some(mesh)) = (model.opening(), &model.puncture, model.mesh.as_block()) else {
         return tables;
     };
     let runs = runs_of(model);
     // First, so that a run has the place of its number.
-    tables.entries = runs.iter().map(|run| run_entry(opening, *run)).collect();
-    let told = slots(&mut tables, model, opening, mesh, (plan.path.entry, &runs));
+    tables.entries = runs.iter().map(|run| run_entry(point_sums(opening, grain), *run)).collect();
+    let told = slots(&mut tables, model, opening, mesh, (plan.path.entry, &runs), grain);
     lists(&mut tables, opening, mesh, layout, &told);
     // Behind the stations, the means of those in a run of cells.
     tables.stations.extend(runs.iter().map(|(first, _)| {
@@ -197,10 +212,9 @@ pub(super) fn tables_of(model: &Model, layout: &Layout) -> Tables {
     tables
 }
 
-/// Sums of a run: the first, and their number.
-fn run_entry(opening: &OpeningPlan, (first, end): (usize, usize)) -> OpeningEntry {
-    let first_slot = point_sums(opening) + first;
-    OpeningEntry { index: first_slot as u32, first: (end - first) as f32, ..OpeningEntry::zeroed() }
+/// Sums of a run, of which points have `before`: the first, and their number.
+fn run_entry(before: usize, (first, end): (usize, usize)) -> OpeningEntry {
+    OpeningEntry { index: (before + first) as u32, first: (end - first) as f32, ..OpeningEntry::zeroed() }
 }
 
 /// Clusters and cells, one slot each, and runs of cells.
@@ -210,6 +224,7 @@ fn slots(
     opening: &OpeningPlan,
     mesh: &BlockMesh,
     (entry, runs): (DVec3, &[(usize, usize)]),
+    grain: Grain,
 ) -> Told {
     let mut told: Vec<Vec<(u32, f32)>> = vec![Vec::new(); opening.stations.len()];
     let mut corners: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -223,13 +238,14 @@ fn slots(
         }
     };
     let mut sum_slot = 0u32;
-    for Cluster { cell, points } in &opening.clusters {
+    for cluster in &opening.clusters {
+        let Cluster { cell, points } = cluster;
         let (place, middle, inverse) = cell_of(model, mesh, entry, *cell as usize);
         let first = tables.points.len() as u32;
         for (i, (station, index)) in points.iter().enumerate() {
             let point = &opening.stations[*station].points[*index];
             let local = point.local - 0.5;
-            let ends = points.get(i + 1).is_none_or(|next| next.0 != *station);
+            let ends = sum_ends(cluster, i, grain);
             tables.points.push(OpeningPoint {
                 place: [local.x as f32, local.y as f32, local.z as f32, point.volume as f32],
                 numbers: [*station as u32, sum_slot, u32::from(ends), 0],

@@ -28,7 +28,7 @@ pub(super) const ARRAYS: &[Array] = &[
 ];
 
 const STATES: Array = Array::state("own_states", |s| {
-    zeros(s.cells() * s.model.effects.own.len() as u64 + u64::from(s.measure_threads), size_of::<OwnState>())
+    zeros(s.cells() * s.model.effects.own.len() as u64 + u64::from(s.grain.measure_threads), size_of::<OwnState>())
 })
 .exchanged(
     |bytes, model, state| {

@@ -15,8 +15,8 @@ pub const SEPARATION_PARTS: usize = 64;
 pub const CONTACT_PARTS: usize = 64;
 
 pub(super) const ARRAYS: &[Array] = &[
-    Array::result("cell_sums", |s| zeros(s.measure_threads.into(), size_of::<CellSums>()), add_cells),
-    Array::result("node_sums", |s| zeros(s.measure_threads.into(), size_of::<NodeSums>()), add_nodes),
+    Array::result("cell_sums", |s| zeros(s.grain.measured_sums().into(), size_of::<CellSums>()), add_cells),
+    Array::result("node_sums", |s| zeros(s.grain.measured_sums().into(), size_of::<NodeSums>()), add_nodes),
     Array::result("contact_totals", |_| zeros(CONTACT_PARTS as u64, size_of::<ContactSums>()), add_contact),
     Array::result(
         "face_sums",
