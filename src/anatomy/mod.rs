@@ -9,6 +9,7 @@ mod layers;
 pub mod markups;
 mod metaimage;
 mod nifti;
+mod nifti_names;
 mod nrrd;
 pub mod surface;
 pub mod surface_nets;

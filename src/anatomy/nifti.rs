@@ -4,12 +4,14 @@
 //! is read here and not by the crate `nifti`, because that one reserves memory for all that a header promises before it looks at the
 //! data, and holds every value beside the labels.
 
+use std::collections::BTreeMap;
 use std::io::Read;
 
 use glam::{DMat3, DQuat, DVec3};
 
 use super::Labelled;
 use super::label_map::LabelMap;
+use super::nifti_names;
 use super::voxels::{self, Beside, Fault, Kind, Packing, Part, SEGMENT, Values, WRITE_AGAIN};
 use crate::{Error, Result};
 
@@ -79,6 +81,18 @@ pub(super) fn read(name: &str, bytes: &[u8], beside: Beside) -> Result<Labelled>
     }
     let needed = values.bytes().saturating_add(offset);
     packing(all).can_hold(all, needed).map_err(|fault| fault.at(header.place("dim")))?;
+    let mut names = BTreeMap::new();
+    if !in_pair {
+        let mut extensions = Vec::new();
+        let length = offset.saturating_sub(at).min(nifti_names::LONGEST);
+        source
+            .by_ref()
+            .take(length)
+            .read_to_end(&mut extensions)
+            .map_err(|reason| broken(&format!("the data cannot be unpacked: {reason}")))?;
+        at += extensions.len() as u64;
+        names = nifti_names::of_extensions(&extensions, big_endian, &mut notices);
+    }
     std::io::copy(&mut source.by_ref().take(offset.saturating_sub(at)), &mut std::io::sink())
         .map_err(|reason| broken(&format!("the data cannot be unpacked: {reason}")))?;
     let mut labels = voxels::room(count).map_err(|fault| fault.at(name))?;
@@ -92,7 +106,7 @@ pub(super) fn read(name: &str, bytes: &[u8], beside: Beside) -> Result<Labelled>
     if more {
         notices.push(format!("There is more data than the {count} values of dim; the rest is not read."));
     }
-    Ok(Labelled { map: LabelMap { size, steps, origin, labels, ..LabelMap::default() }, notices })
+    Ok(Labelled { map: LabelMap { size, steps, origin, labels, names }, notices })
 }
 
 /// The bytes of the image file of a pair.

@@ -27,6 +27,8 @@ pub(super) fn read(name: &str, bytes: &[u8], beside: Beside) -> Result<Labelled>
     let header = Header::of(name, bytes)?;
     let mut notices = Vec::new();
     header.tell_unknown(&mut notices);
+    // Before the axes: those of a space of four cannot be told from one of three and a list.
+    check_space(&header)?;
     let axes = Axes::of(&header)?;
     let (steps, origin) = geometry(&header, &axes, &mut notices)?;
     let segments = segments(&header, axes.layers)?;
@@ -463,15 +465,21 @@ fn geometry(header: &Header, axes: &Axes, notices: &mut Vec<String>) -> Result<(
     }
 }
 
+const PATIENT: &str = "save the volume in the space LPS or RAS of a patient, e.g. with 3D Slicer";
+
+fn check_space(header: &Header) -> Result<()> {
+    match header.field("spacedimension") {
+        Some(field) if field.value != "3" => {
+            Err(header.fail(field, format!("a space of `{}` axes is not read here", shown(&field.value)), PATIENT))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Signs of the axes of the file's space in RAS.
 fn space(header: &Header, notices: &mut Vec<String>) -> Result<DVec3> {
     const LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
-    let way_out = "save the volume in the space LPS or RAS of a patient, e.g. with 3D Slicer";
-    if let Some(field) = header.field("spacedimension")
-        && field.value != "3"
-    {
-        return Err(header.fail(field, format!("a space of `{}` axes is not read here", shown(&field.value)), way_out));
-    }
+    let way_out = PATIENT;
     let Some((field, word)) = header.word("space") else {
         notices.push(
             "The file names no space of a patient; its axes are taken as left, posterior, superior (LPS), as ITK does."

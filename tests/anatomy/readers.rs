@@ -359,6 +359,45 @@ fn nifti_forms_units_and_scales() {
 }
 
 #[test]
+fn nifti_tables_behind_the_header_name_labels() {
+    let extended = |text: &str| {
+        // Of a length that is a multiple of 16, as the format wants it, filled with zeros.
+        let length = (8 + text.len()).next_multiple_of(16);
+        let mut extension = [(length as i32).to_le_bytes(), 0_i32.to_le_bytes()].concat();
+        extension.extend(text.bytes());
+        extension.resize(length, 0);
+        nifti(|bytes| {
+            put(108, &(352.0 + length as f32).to_le_bytes())(bytes);
+            put(348, &[1])(bytes);
+            bytes.splice(352..352, extension.iter().copied());
+        })
+    };
+    // As TotalSegmentator writes it.
+    let table = "<?xml version=\"1.0\" encoding=\"UTF-8\"?> <CaretExtension>  <VolumeInformation Index=\"0\">   <LabelTable>\n\
+        <Label Key=\"0\" Red=\"0\"><![CDATA[background]]></Label>\n<Label Key=\"1\" Red=\"0.0\"><![CDATA[spleen]]></Label>\n\
+        <Label Key=\"2\"><![CDATA[kidney_right]]></Label><Label Key=\"70000\">beyond</Label><Label>none</Label>\n\
+        </LabelTable>  </VolumeInformation></CaretExtension>";
+    for bytes in [extended(table), gzip(&extended(table))] {
+        let Labelled { map, notices } = six(&bytes);
+        let names: Vec<(u16, &str)> = map.names.iter().map(|(label, name)| (*label, name.as_str())).collect();
+        assert_eq!(names, [(1, "spleen"), (2, "kidney_right")]);
+        assert!(notices.is_empty(), "{notices:?}");
+    }
+    // A table that is damaged is told and does no harm, nor does what is no table.
+    let cut = six(&extended(&table[..table.len() - 30]));
+    assert!(cut.map.names.is_empty() && cut.notices[0].contains("table of names"), "{:?}", cut.notices);
+    let entities = table.replace("?> ", "?><!DOCTYPE x [<!ENTITY e \"eeee\">]>");
+    assert!(six(&extended(&entities)).notices[0].contains("left out"));
+    let crowded = table.replace("Index", &(0..200).map(|n| format!("a{n}=\"\" ")).collect::<String>());
+    assert!(six(&extended(&crowded)).notices[0].contains("attributes"));
+    assert!(six(&extended("<other/>")).notices.is_empty());
+    // A length beyond the voxels.
+    let mut bytes = extended(table);
+    put(352, &i32::MAX.to_le_bytes())(&mut bytes);
+    assert!(six(&bytes).map.names.is_empty());
+}
+
+#[test]
 fn metaimages_by_hand() {
     let whole = six(&meta("", &SIX));
     assert!(whole.notices.is_empty(), "{:?}", whole.notices);

@@ -47,6 +47,11 @@ fn nrrd_that_cannot_be_is_refused() {
         ("space units: \"inch\" \"mm\" \"mm\"", "not known here"),
         ("space units: \"mm\"", "a unit for every axis"),
         ("-space:\nspace dimension: 2", "`2` axes"),
+        // As an older 3D Slicer wrote segmentations.
+        (
+            "-space:\nspace dimension: 4\nspace directions: (1,0,0,0) (0,1,0,0) (0,0,1,0) (0,0,0,1)",
+            "a space of `4` axes",
+        ),
         ("dimension: 2", "`2` axes"),
         ("-dimension:", "no `dimension`"),
         ("-type:", "no `type`"),

@@ -2,6 +2,8 @@
 //!
 //! The files of `tests/anatomy/files` were written by trimesh 5.2.0, meshio 5.3.5 and VTK 9.7.2, in millimetres.
 
+mod vtk_by_hand;
+
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -14,6 +16,8 @@ use stylet::anatomy::surface::check::check;
 use stylet::anatomy::surface::inside::Inside;
 use stylet::anatomy::surface::voxels::label_map;
 use stylet::anatomy::surface::{TriangleSurface, parse, read};
+
+use self::vtk_by_hand::{legacy_vtk, vtp};
 
 const MM: f64 = 1e-3;
 
@@ -161,24 +165,6 @@ fn ply(surface: &TriangleSurface, format: &str) -> Vec<u8> {
     bytes
 }
 
-fn vtp(surface: &TriangleSurface) -> Vec<u8> {
-    let points: Vec<String> = surface.points.iter().map(|x| format!("{} {} {}", x.x, x.y, x.z)).collect();
-    let corners: Vec<String> = surface.triangles.iter().map(|t| format!("{} {} {}", t[0], t[1], t[2])).collect();
-    let ends: Vec<String> = (1..=surface.triangles.len()).map(|n| (3 * n).to_string()).collect();
-    format!(
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\"><PolyData>\n\
-         <Piece NumberOfPoints=\"{}\" NumberOfPolys=\"{}\">\n<Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" \
-         format=\"ascii\">{}</DataArray></Points>\n<Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">{}\
-         </DataArray><DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">{}</DataArray></Polys></Piece></PolyData></VTKFile>",
-        points.len(),
-        corners.len(),
-        points.join("\n"),
-        corners.join("\n"),
-        ends.join(" ")
-    )
-    .into_bytes()
-}
-
 /// The surface in every format.
 fn everywhere(surface: &TriangleSurface) -> Vec<(&'static str, Vec<u8>)> {
     vec![
@@ -189,6 +175,8 @@ fn everywhere(surface: &TriangleSurface) -> Vec<(&'static str, Vec<u8>)> {
         ("little.ply", ply(surface, "binary_little_endian")),
         ("big.ply", ply(surface, "binary_big_endian")),
         ("text.vtp", vtp(surface)),
+        ("text.vtk", legacy_vtk(surface, false)),
+        ("binary.vtk", legacy_vtk(surface, true)),
     ]
 }
 
@@ -561,7 +549,15 @@ fn refusals_name_the_place() {
         ("garbage.stl", (0..500_u32).map(|n| (n * n % 251) as u8).collect(), "no surface of a kind that is read here"),
         ("text.txt", b"Dear reader,\nthis is a letter.\n".to_vec(), "no surface of a kind that is read here"),
         ("other.off", b"OFF\n8 6 12\n".to_vec(), "an OFF file"),
-        ("other.vtk", b"# vtk DataFile Version 3.0\n".to_vec(), "a VTK legacy file"),
+        ("cut.vtk", b"# vtk DataFile Version 3.0\n".to_vec(), "cut.vtk:2: "),
+        (
+            "grid.vtk",
+            patch(&legacy_vtk(&surface, false), "POLYDATA", "UNSTRUCTURED_GRID"),
+            "is not a surface but a mesh",
+        ),
+        ("index.vtk", patch(&legacy_vtk(&surface, false), "\n3 0 ", "\n3 99 "), "cell 0 names a point"),
+        ("contours.vtk", patch(&legacy_vtk(&surface, false), "POLYGONS", "LINES"), "80 lines and no triangle"),
+        ("contours.vtp", patch(&vtp(&surface), "NumberOfPolys", "NumberOfLines"), "80 lines and no triangle"),
         ("many.stl", many, "would promise 4294967295 triangles"),
         ("nan.stl", not_finite, "byte 146: corner 0 of triangle 1 stands at (NaN"),
         ("none.stl", b"solid a\nendsolid a\n".to_vec(), "no triangle is in the file"),

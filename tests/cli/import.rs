@@ -186,6 +186,28 @@ fn surfaces_and_meshes_become_label_maps() {
 }
 
 #[test]
+fn a_surface_whose_name_says_nothing_is_called_as_its_file() {
+    let place = Place::new();
+    let tetrahedron = "o Mesh1\nv 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    place.write("liver2.obj", tetrahedron);
+    let answer = place.call(&["import", "liver2.obj"]).ended(0);
+    for part in [
+        "liver2          4 yes    4 x 4 x 4 1.067e-2 liver",
+        "`Mesh1`, is called `liver2` as the file is",
+        "It is 6.928 mm across. If that is too small",
+    ] {
+        assert!(answer.stdout.contains(part), "no `{part}` in\n{}", answer.all());
+    }
+    // A name that says something stays, and so does one whose file says no more.
+    for (file, name, shown) in [("liver.obj", "skin", "skin "), ("thing.obj", "Mesh1", "Mesh1 ")] {
+        place.write(file, &tetrahedron.replace("Mesh1", name));
+        let answer = place.call(&["import", file, "--unit", "cm"]).ended(0);
+        assert!(answer.stdout.contains(shown) && !answer.stdout.contains("as the file is"), "{}", answer.all());
+        assert!(!answer.stdout.contains("across"), "{}", answer.all());
+    }
+}
+
+#[test]
 fn names_from_elsewhere_are_numbers_in_the_scene() {
     let place = Place::new();
     let without: String =

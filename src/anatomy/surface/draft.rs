@@ -35,6 +35,8 @@ pub(super) struct Draft {
     /// Polygons that were cut into triangles, and those with fewer than three corners.
     pub cut: usize,
     pub flat: usize,
+    /// Lines that stand beside the polygons.
+    pub lines: usize,
 }
 
 impl Draft {
@@ -52,6 +54,14 @@ impl Draft {
         }
         self.cut += usize::from(corners.len() > 3);
         triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
+    }
+
+    /// Adds a strip of triangles to the last part; every second one runs the other way round.
+    pub fn add_strip(&mut self, corners: &[u32]) {
+        for (n, corners) in corners.windows(3).enumerate() {
+            let [a, b, c] = [corners[0], corners[1], corners[2]];
+            self.add_polygon(&if n % 2 == 0 { [a, b, c] } else { [b, a, c] });
+        }
     }
 
     /// The surfaces in metres.
@@ -107,11 +117,16 @@ impl Draft {
             surfaces.push(surface);
         }
         if surfaces.is_empty() {
-            let message = match degenerate {
-                0 => format!("{name}: no triangle is in the file"),
-                n => format!("{name}: none of the {n} triangles has an area"),
+            let mut way_out = "export the surface again, as triangles";
+            let message = match (degenerate, self.lines) {
+                (0, 0) => format!("{name}: no triangle is in the file"),
+                (0, lines) => {
+                    way_out = "save the closed surface (in 3D Slicer: Segmentations, Representations, Closed surface) or a label map";
+                    format!("{name}: {lines} lines and no triangle are in the file: contours are no surface")
+                }
+                (n, _) => format!("{name}: none of the {n} triangles has an area"),
             };
-            return Err(Error::input(message, "export the surface again, as triangles"));
+            return Err(Error::input(message, way_out));
         }
         let mut notices = self.notices;
         if self.cut > 0 {

@@ -1,4 +1,4 @@
-//! Closed surfaces of triangles from other programs: STL, OBJ, PLY and VTK XML (`.vtp`), told apart by their content.
+//! Closed surfaces of triangles from other programs: STL, OBJ, PLY, VTK legacy (`.vtk`) and VTK XML (`.vtp`), told apart by their content.
 //!
 //! `bytes -> reader of the format -> Draft (what the file says) -> welded surfaces`, which [`check`] looks over, [`inside`] asks for
 //! points and [`voxels`] makes a label map of.
@@ -18,6 +18,7 @@ mod obj;
 mod ply;
 mod stl;
 mod tree;
+mod vtk;
 mod vtp;
 
 use std::path::Path;
@@ -109,6 +110,7 @@ pub fn parse(name: &str, bytes: &[u8], unit_m: f64) -> Result<Imported> {
         Format::TextStl => stl::text(name, bytes)?,
         Format::Obj => obj::read(name, bytes)?,
         Format::Ply => ply::read(name, bytes)?,
+        Format::Vtk => vtk::read(name, bytes)?,
         Format::Vtp => vtp::read(name, bytes)?,
     };
     draft.finish(name, unit_m)
@@ -121,10 +123,11 @@ enum Format {
     TextStl,
     Obj,
     Ply,
+    Vtk,
     Vtp,
 }
 
-const READ_HERE: &str = "export the surface as STL, OBJ, PLY or VTK XML (.vtp)";
+const READ_HERE: &str = "export the surface as STL, OBJ, PLY or VTK (.vtk, .vtp)";
 
 impl Format {
     /// The format of the content: extensions lie, and a binary STL file may begin as one in text.
@@ -142,12 +145,14 @@ impl Format {
         if begins(b"ply\n") || begins(b"ply\r") {
             return Ok(Format::Ply);
         }
+        if begins(b"# vtk") {
+            return Ok(Format::Vtk);
+        }
         if begins(b"<") && head.windows(8).any(|w| w == b"<VTKFile") {
             return Ok(Format::Vtp);
         }
         let known = [
-            (&b"# vtk"[..], "a VTK legacy file"),
-            (b"OFF", "an OFF file"),
+            (&b"OFF"[..], "an OFF file"),
             (b"PK\x03\x04", "an archive, such as 3MF"),
             (b"glTF", "a glTF file"),
             (b"NRRD", "a volume"),

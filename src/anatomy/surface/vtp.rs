@@ -46,6 +46,7 @@ fn add_piece(file: &VtuFile, piece: XmlNode, count: usize, left: &mut usize, dra
         Some(_) => file.count(piece, attribute),
     };
     let (polygons, strips) = (number("NumberOfPolys")?, number("NumberOfStrips")?);
+    draft.lines += number("NumberOfLines")?;
     if count == 0 || (polygons == 0 && strips == 0) {
         return Ok(());
     }
@@ -96,11 +97,7 @@ fn add_piece(file: &VtuFile, piece: XmlNode, count: usize, left: &mut usize, dra
                 }
             }
             if strip {
-                // Every second triangle of a strip runs the other way round.
-                for (n, corners) in cell.windows(3).enumerate() {
-                    let [a, b, c] = [corners[0], corners[1], corners[2]];
-                    draft.add_polygon(&if n % 2 == 0 { [a, b, c] } else { [b, a, c] });
-                }
+                draft.add_strip(&cell);
             } else {
                 draft.add_polygon(&cell);
             }

@@ -23,6 +23,8 @@ const HEAD: u64 = 4096;
 const MOST_ROWS: usize = 150;
 /// Diagonal of what is expected [m]; else the unit is probably another one.
 const EXPECTED: (f64, f64) = (1e-3, 2.0);
+/// Diagonal below which parts of a patient are few [m]: the numbers of the file may be cm.
+const SMALL: f64 = 20e-3;
 /// Layer of nothing around surfaces in their label map, in voxels.
 const MARGIN: f64 = 2.0;
 
@@ -91,6 +93,9 @@ fn kind_of(head: &[u8]) -> (Kind, &'static str) {
     if begins(b"*") {
         return (Kind::Mesh, "tetrahedral mesh (Abaqus)");
     }
+    if begins(b"# vtk") && holds(b"DATASET POLYDATA") {
+        return (Kind::Surface, "surface (VTK)");
+    }
     if begins(b"# vtk") {
         return (Kind::Mesh, "tetrahedral mesh (VTK)");
     }
@@ -144,9 +149,11 @@ impl Content {
                 } else {
                     notices.push("Coordinates are taken as RAS: the file does not say SPACE=LPS.".into());
                 }
-                What::Surfaces(
-                    read.surfaces.into_iter().map(|surface| checked(surface, is_lps, &mut notices)).collect(),
-                )
+                let mut surfaces = read.surfaces;
+                if let [only] = surfaces.as_mut_slice() {
+                    name_as_file(only, file, &mut notices);
+                }
+                What::Surfaces(surfaces.into_iter().map(|surface| checked(surface, is_lps, &mut notices)).collect())
             }
             Kind::Mesh => {
                 notices.push(format!("Coordinates are taken in {unit} (--unit), and as RAS."));
@@ -180,13 +187,18 @@ impl Content {
 
     fn notice_size(&mut self) {
         let is_mesh = matches!(self.what, What::Mesh(_));
-        let Some((low, high)) = self.bounds().filter(|_| is_mesh) else { return };
+        let states_none = !matches!(self.what, What::Labels(_));
+        let Some((low, high)) = self.bounds().filter(|_| states_none) else { return };
         let size = low.distance(high);
+        let mm = four_digits(size * 1e3);
         if !(EXPECTED.0..=EXPECTED.1).contains(&size) {
-            let mm = four_digits(size * 1e3);
+            let further = if is_mesh { "; a scene with this mesh needs accept_size = true" } else { "" };
             self.notices.push(format!(
-                "It is {mm} mm across, where 1 mm to 2 m are expected: --unit is probably another one; a scene with this mesh needs \
-                 accept_size = true."
+                "It is {mm} mm across, where 1 mm to 2 m are expected: --unit is probably another one{further}."
+            ));
+        } else if size < SMALL {
+            self.notices.push(format!(
+                "It is {mm} mm across. If that is too small, --unit is another one: cm makes it ten times as large."
             ));
         }
     }
@@ -253,6 +265,17 @@ fn name_by_file(map: &mut LabelMap, file: &Path, notices: &mut Vec<String>) -> b
         }
     ));
     false
+}
+
+/// The only surface of a file is called as the file is, where its own name says nothing (`Mesh1`) and that of the file something.
+fn name_as_file(only: &mut TriangleSurface, file: &Path, notices: &mut Vec<String>) {
+    let is_known = |name: &str| materials::of_label(Some(name)).kind != materials::Kind::Unknown;
+    let stem = super::scene::stem(file);
+    let own = short(&only.name);
+    if own != stem && !is_known(&own) && is_known(&stem) {
+        notices.push(format!("Its one surface, `{}`, is called `{stem}` as the file is.", text::name(&own, 40)));
+        only.name = stem;
+    }
 }
 
 /// A surface looked over, in RAS.
@@ -345,7 +368,7 @@ fn surfaces_text(surfaces: &[(TriangleSurface, Report)]) -> String {
 pub fn short(name: &str) -> String {
     let path = Path::new(name);
     match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
-        Some("stl" | "obj" | "ply" | "vtp") => {
+        Some("stl" | "obj" | "ply" | "vtp" | "vtk") => {
             path.file_stem().map_or_else(|| name.to_string(), |stem| stem.to_string_lossy().into_owned())
         }
         _ => name.to_string(),
@@ -413,6 +436,7 @@ mod tests {
         assert_eq!(title(b"$MeshFormat\n4.1 0 8\n"), "tetrahedral mesh (Gmsh)");
         assert_eq!(title(b"** by hand\n*NODE\n"), "tetrahedral mesh (Abaqus)");
         assert_eq!(title(b"# vtk DataFile Version 3.0\n"), "tetrahedral mesh (VTK)");
+        assert_eq!(title(b"# vtk DataFile Version 3.0\nmodel\nASCII\nDATASET POLYDATA\n"), "surface (VTK)");
         assert_eq!(title(b"<?xml?><VTKFile type=\"UnstructuredGrid\">"), "tetrahedral mesh (VTK XML)");
         assert_eq!(title(b"<?xml?><VTKFile type=\"PolyData\">"), "surface (VTK XML)");
         assert_eq!(title(b"ply\nformat ascii 1.0\n"), "surface (PLY)");

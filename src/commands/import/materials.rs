@@ -37,8 +37,25 @@ const WORDS: &[(&str, &str)] = &[
     ("cyst", "csf"),
     ("renal", "kidney"),
     ("hepatic", "liver"),
-    ("white matter", "brain"),
+    ("vertebral column", BONE),
+    ("spinal column", BONE),
+    ("spine", BONE),
+    ("cerebral white matter", "brain"),
+    ("cerebellum white matter", "brain"),
     ("cortex", "brain"),
+    ("ctx", "brain"),
+    ("gyrus", "brain"),
+    ("thalamus", "brain"),
+    ("caudate", "brain"),
+    ("putamen", "brain"),
+    ("pallidum", "brain"),
+    ("hippocampus", "brain"),
+    ("amygdala", "brain"),
+    ("accumbens", "brain"),
+    ("insula", "brain"),
+    ("lateral ventricle", "csf"),
+    ("3rd ventricle", "csf"),
+    ("4th ventricle", "csf"),
 ];
 
 /// Words for what no needle feels.
@@ -114,7 +131,9 @@ fn words(name: &str) -> Vec<String> {
     const SIDES: &[&str] = &["left", "right", "l", "r", "upper", "lower", "the", "of", "wall"];
     let plain = |c: char| if c.is_alphanumeric() { c } else { ' ' };
     let words: String = folded(name).chars().map(plain).collect();
-    let kept = words.split_whitespace().filter(|word| !SIDES.contains(word) && !word.chars().all(char::is_numeric));
+    // `liver2` is a liver, and `L3` beside a vertebra no word.
+    let bare = words.split_whitespace().map(|word| word.trim_end_matches(char::is_numeric));
+    let kept = bare.filter(|word| !word.is_empty() && !SIDES.contains(word));
     kept.map(|word| match word.strip_suffix('s') {
         Some(single) if word.len() > 4 && !single.ends_with(['s', 'u', 'i']) => single.to_string(),
         _ => word.to_string(),
@@ -157,13 +176,21 @@ mod tests {
             ("kidney cyst left", "csf"),
             ("vertebrae_L3", "bone"),
             ("Left Femur", "bone"),
+            ("lumbar vertebral column", "bone"),
+            ("vertebral artery", "artery"),
+            ("liver2", "liver"),
+            ("Left-Cerebral-White-Matter", "brain"),
+            ("Right-Thalamus-Proper", "brain"),
+            ("ctx-lh-precuneus", "brain"),
+            ("Left-Lateral-Ventricle", "csf"),
+            ("4th-Ventricle", "csf"),
         ] {
             let found = of_label(Some(name));
             assert_eq!((found.preset.name.as_str(), found.kind), (material, Kind::Known), "{name}");
             assert_eq!(found.is_rigid(), material == "bone", "{name}");
         }
         assert_eq!(of_label(Some("airway")).kind, Kind::Air);
-        for name in [None, Some("Segment_1"), Some("platysma"), Some(""), Some("7")] {
+        for name in [None, Some("Segment_1"), Some("Mesh1"), Some("platysma"), Some(""), Some("7")] {
             let found = of_label(name);
             assert_eq!((found.preset.name.as_str(), found.kind), (FALLBACK, Kind::Unknown), "{name:?}");
         }

@@ -28,7 +28,7 @@ use crate::simulation::EngineChoice;
 
 #[derive(Debug, Clone, Default, Args)]
 pub struct ImportArgs {
-    /// Label map (NRRD, NIfTI, MetaImage), closed surfaces (STL, OBJ, PLY, VTP) or tetrahedra (Gmsh, VTK, VTU, Abaqus)
+    /// Label map (NRRD, NIfTI, MetaImage), closed surfaces (STL, OBJ, PLY, VTK, VTP) or tetrahedra (Gmsh, VTK, VTU, Abaqus)
     pub file: PathBuf,
     /// Where the needle enters the skin, in the patient [RAS mm]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "target", conflicts_with = "markups")]

@@ -17,7 +17,7 @@ pub fn describe(summary: &Summary) -> String {
         summary.cells,
         summary.steps,
         summary.dt_s * 1e6,
-        summary.mass_scaling,
+        crate::units::four_digits(summary.mass_scaling),
         summary.simulated_s,
         summary.wall_s,
         summary.real_time_factor

@@ -11,7 +11,7 @@ mod include;
 mod raw;
 mod repair;
 pub(crate) mod source;
-mod vtk;
+pub(crate) mod vtk;
 pub(crate) mod vtu;
 
 use std::fmt;

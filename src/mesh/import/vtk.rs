@@ -1,8 +1,10 @@
-//! VTK legacy files (`.vtk`), text and binary (big-endian), versions 1 to 5.1.
+//! VTK legacy files (`.vtk`), text and binary (big-endian), versions 1 to 5.1: grids of tetrahedra, and in [`surface`] poly data.
 //!
 //! Source: "VTK File Formats" of the VTK documentation. Version 5 replaces the list of cells, each preceded by its
 //! length, by two arrays OFFSETS and CONNECTIVITY. Points and the region of each cell are kept; every other attribute
 //! is stepped over.
+
+pub(crate) mod surface;
 
 use glam::DVec3;
 
@@ -169,44 +171,62 @@ fn cell_class(kind: i64) -> Option<(ElementClass, &'static str)> {
 
 /// Reads the bytes of a `.vtk` file.
 pub(super) fn read(name: &str, bytes: &[u8]) -> Result<RawMesh> {
-    let mut source = Source::new(name, bytes);
-    let at = source.at();
-    let version = source.line().unwrap_or_default().trim_ascii();
-    if version.len() < 22 || !version[..22].eq_ignore_ascii_case(b"# vtk DataFile Version") {
-        return Err(source.broken(at, "the first line should be `# vtk DataFile Version ...`"));
-    }
-    // A free title.
-    source.line();
-    let at = source.at();
-    let encoding = source.line().unwrap_or_default().trim_ascii().to_ascii_uppercase();
-    let binary = match encoding.as_slice() {
-        b"ASCII" => false,
-        b"BINARY" => true,
-        other => return Err(source.broken(at, format!("`{}` stands where ASCII or BINARY should", excerpt(other)))),
-    };
-    let (at, word) = source.word("DATASET")?;
-    let (_, kind) = source.field("the kind of data set")?;
-    if !word.eq_ignore_ascii_case(b"DATASET") || !kind.eq_ignore_ascii_case(b"UNSTRUCTURED_GRID") {
-        return Err(source.fail(
-            at,
-            format!("`{} {}` is not an unstructured grid", excerpt(word), excerpt(kind)),
-            "save the mesh as an unstructured grid of tetrahedra (DATASET UNSTRUCTURED_GRID)",
-        ));
-    }
-    source.line();
-    source.binary = binary;
-    if !binary {
-        source.refuse_zeros()?;
-    }
-    let mut file = VtkFile { source, binary, grid: Grid::default(), starts: [None; 4], attribute_of: None };
+    let mut file = VtkFile::open(name, bytes, |kind| match kind.eq_ignore_ascii_case(b"UNSTRUCTURED_GRID") {
+        true => Ok(()),
+        false => Err(("an unstructured grid", GRID_WANTED)),
+    })?;
     file.sections()?;
     file.finish()
+}
+
+const GRID_WANTED: &str = "save the mesh as an unstructured grid of tetrahedra (DATASET UNSTRUCTURED_GRID)";
+
+impl<'a> VtkFile<'a> {
+    /// Reads the head of a file whose kind of data set is `wanted`.
+    fn open(
+        name: &str,
+        bytes: &'a [u8],
+        wanted: impl FnOnce(&[u8]) -> std::result::Result<(), (&'static str, &'static str)>,
+    ) -> Result<VtkFile<'a>> {
+        let mut source = Source::new(name, bytes);
+        let at = source.at();
+        let version = source.line().unwrap_or_default().trim_ascii();
+        if version.len() < 22 || !version[..22].eq_ignore_ascii_case(b"# vtk DataFile Version") {
+            return Err(source.broken(at, "the first line should be `# vtk DataFile Version ...`"));
+        }
+        // A free title.
+        source.line();
+        let at = source.at();
+        let encoding = source.line().unwrap_or_default().trim_ascii().to_ascii_uppercase();
+        let binary = match encoding.as_slice() {
+            b"ASCII" => false,
+            b"BINARY" => true,
+            other => return Err(source.broken(at, format!("`{}` stands where ASCII or BINARY should", excerpt(other)))),
+        };
+        let (at, word) = source.word("DATASET")?;
+        let (_, kind) = source.field("the kind of data set")?;
+        if !word.eq_ignore_ascii_case(b"DATASET") {
+            return Err(source.broken(at, format!("`{}` stands where DATASET should", excerpt(word))));
+        }
+        if let Err((what, way_out)) = wanted(kind) {
+            let message = format!("`{} {}` is not {what}", excerpt(word), excerpt(kind));
+            return Err(source.fail(at, message, way_out));
+        }
+        source.line();
+        source.binary = binary;
+        if !binary {
+            source.refuse_zeros()?;
+        }
+        Ok(VtkFile { source, binary, grid: Grid::default(), lists: None, starts: [None; 4], attribute_of: None })
+    }
 }
 
 struct VtkFile<'a> {
     source: Source<'a>,
     binary: bool,
     grid: Grid,
+    /// Polygons and strips of poly data; `None` for a grid.
+    lists: Option<surface::Lists>,
     /// Where the values of `GridArray` start, and the bytes per value.
     starts: [Option<(usize, u64)>; 4],
     /// What the attributes now read belong to.
@@ -265,6 +285,9 @@ impl VtkFile<'_> {
             match word.to_ascii_uppercase().as_slice() {
                 b"POINTS" => self.points(at)?,
                 b"CELLS" => self.cells(at)?,
+                section @ (b"POLYGONS" | b"TRIANGLE_STRIPS" | b"LINES" | b"VERTICES") if self.lists.is_some() => {
+                    self.list(at, section)?;
+                }
                 b"CELL_TYPES" => {
                     let count = self.count_on_line("the number of cell types")?;
                     self.end_head()?;

@@ -75,10 +75,10 @@ pub(crate) fn opened<T>(
 }
 
 /// Most attributes of a tag: arrays have ten, and readers of XML compare each with all others.
-const MOST_ATTRIBUTES: usize = 100;
+pub(crate) const MOST_ATTRIBUTES: usize = 100;
 
 /// Line of the first tag with too many attributes, and how many it has.
-fn crowded_tag(text: &str) -> Option<(usize, usize)> {
+pub(crate) fn crowded_tag(text: &str) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     let mut at = 0;
     while let Some(begin) = bytes[at..].iter().position(|b| *b == b'<').map(|n| at + n) {
