@@ -8,6 +8,8 @@ mod free_path;
 mod labels;
 #[path = "../anatomy/pictures.rs"]
 mod pictures;
+#[path = "../anatomy/placement.rs"]
+mod placement;
 #[path = "../anatomy/readers.rs"]
 mod readers;
 #[path = "../anatomy/surface_nets.rs"]

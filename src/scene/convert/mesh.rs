@@ -55,10 +55,12 @@ impl Check<'_> {
             }
         }
         let unit = self.unit("mesh", "a mesh file", table)?;
-        let options = ImportOptions { unit, accept_size: table.accept_size.unwrap_or(false) };
+        let placement = self.placement(table);
+        let options = ImportOptions { unit, accept_size: table.accept_size.unwrap_or(false), placement };
         match import::read_with(&self.folder.join(name), options) {
             Ok(imported) => {
                 self.notices.extend(imported.notices);
+                self.tell_placement(&placement, Some(imported.mesh.bounds()));
                 Some(Arc::new(imported.mesh))
             }
             Err(error) => {

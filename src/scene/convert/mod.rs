@@ -16,6 +16,7 @@ mod missing;
 mod outputs;
 mod own;
 pub(super) mod parameters;
+mod placement;
 mod regions;
 mod targets;
 mod task;
@@ -353,6 +354,7 @@ impl Check<'_> {
             }
             return (tissue, mesh, None);
         }
+        self.no_placement(table);
         for (key, written) in [("unit", table.unit.is_some()), ("accept_size", table.accept_size.is_some())] {
             if written {
                 self.notices.push(format!("`tissue.{key}` has no effect without tissue.mesh."));

@@ -151,6 +151,24 @@ pub struct TissueTable {
     /// like the surface in it, and where two overlap the later one counts. `unit` is that of the files.
     #[serde(default)]
     pub surfaces: Vec<String>,
+    /// Where mesh, label map or surfaces are put, for a file in odd units or one that lies on its side; a table, or inline:
+    /// `transform = { scale = 0.1, axis = [1, 0, 0], angle_deg = 90 }`.
+    pub transform: Option<TransformTable>,
+}
+
+/// Where a file of tissue is put: scaled about the origin of its coordinates (of a label map: of the patient, RAS), then turned about an
+/// axis through it, then moved. All other coordinates of the scene are places behind that.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TransformTable {
+    /// Factor on all coordinates, beside `unit`, greater than 0; default 1.
+    pub scale: Option<f64>,
+    /// Axis that the file is turned about, any length; with `angle_deg`.
+    pub axis: Option<[f64; 3]>,
+    /// Angle of the turn, right-handed about `axis` [deg].
+    pub angle_deg: Option<f64>,
+    /// Way that the file is moved at last [mm]; default [0, 0, 0].
+    pub translation_mm: Option<[f64; 3]>,
 }
 
 /// A node set of the mesh that is held.
