@@ -85,6 +85,10 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         line(format!("             {}", describe_verdict(&region.material.law)));
     }
     line(format!("boundaries   {}", describe_faces(scene)));
+    if let Some(free) = scene.skin_free {
+        let held = model.composition.skin.len();
+        line(format!("skin         {held} nodes farther than {} mm from the path held", four_digits(free * 1e3)));
+    }
     for support in &scene.supports {
         let names = ["x", "y", "z"].into_iter().zip(support.fixed);
         let fixed: String = names.filter(|(_, on)| *on).map(|(name, _)| name).collect();

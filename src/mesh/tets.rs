@@ -125,6 +125,24 @@ impl TetMesh {
         self.surface().into_iter().filter(on_side).collect()
     }
 
+    /// Nodes of the skin, ascending: those of the surface but of its cuts, the sides of the bounding box that are flat. The side on which
+    /// `entry` lies is skin too.
+    pub fn skin(&self, entry: DVec3) -> Vec<u32> {
+        let (low, high) = self.bounds();
+        let near = SIDE_TOLERANCE * (high - low).length();
+        let cuts: Vec<(usize, f64)> = (0..3)
+            .flat_map(|axis| [(axis, low[axis]), (axis, high[axis])])
+            .filter(|(axis, plane)| (entry[*axis] - plane).abs() > near)
+            .collect();
+        let is_cut = |face: &[u32; 3]| {
+            cuts.iter().any(|(a, plane)| face.iter().all(|n| (self.positions[*n as usize][*a] - plane).abs() <= near))
+        };
+        let mut nodes: Vec<u32> = self.surface().into_iter().filter(|face| !is_cut(face)).flatten().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
     /// Area of a triangle of nodes [m^2].
     pub fn area(&self, face: [u32; 3]) -> f64 {
         let [a, b, c] = face.map(|n| self.positions[n as usize]);

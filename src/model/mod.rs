@@ -8,6 +8,7 @@ pub mod opening;
 mod puncture;
 pub mod rigid;
 mod slit;
+mod supports;
 mod tet_puncture;
 
 use glam::DVec3;
@@ -83,6 +84,7 @@ impl Model {
             .map(|m| Material::of(m, &scene.effects))
             .collect();
         let mut composition = Composition::new(&scene, &mesh, &materials);
+        composition.hold(supports::held_skin(&scene, &mesh, &composition), &mesh, &materials);
         materials.append(&mut composition.mixtures);
         let cell_material = std::mem::take(&mut composition.cell_material);
         if let Mesh::Block(block) = &mut mesh {

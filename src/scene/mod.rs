@@ -68,6 +68,8 @@ pub struct Scene {
     pub case: Option<Arc<Case>>,
     /// Node sets of the tetrahedral mesh whose displacement components are held at zero.
     pub supports: Vec<Support>,
+    /// Distance from the path beyond which skin is held [m]; `None`: nowhere.
+    pub skin_free: Option<f64>,
     /// Conditions on the six faces, indexed by [`Face`].
     pub faces: [FaceCondition; 6],
     /// What touches or pierces the tissue.

@@ -12,6 +12,8 @@ mod pictures;
 mod placement;
 #[path = "../anatomy/readers.rs"]
 mod readers;
+#[path = "../anatomy/supports.rs"]
+mod supports;
 #[path = "../anatomy/surface_nets.rs"]
 mod surface_nets;
 #[path = "../anatomy/surfaces.rs"]

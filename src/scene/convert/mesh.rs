@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::super::Support;
 use super::super::file::{SceneFile, TissueTable};
-use super::super::{FaceCondition, Support};
 use super::Check;
 use crate::Error;
 use crate::mesh::TetMesh;
@@ -135,17 +135,6 @@ impl Check<'_> {
             supports.push(Support { set: table.set.clone(), fixed });
         }
         supports
-    }
-
-    /// Tells of a mesh that nothing holds.
-    pub(super) fn floating_mesh(&mut self, supports: &[Support], faces: &[FaceCondition; 6]) {
-        if supports.is_empty() && faces.iter().all(|face| face.fixed == [false; 3]) {
-            self.notices.push(
-                "Nothing holds the mesh, so it floats; add [[support]] with a node set, or fix a face of the \
-                 bounding box, e.g. boundaries.z_min = \"fixed\"."
-                    .into(),
-            );
-        }
     }
 
     /// Refuses on a mesh what acts on the structured block only.

@@ -18,6 +18,7 @@ mod own;
 pub(super) mod parameters;
 mod placement;
 mod regions;
+mod supports;
 mod targets;
 mod task;
 mod tool;
@@ -28,6 +29,7 @@ use glam::DVec3;
 
 use own::OwnNumbers;
 use parameters::OwnTables;
+use supports::Held;
 
 use missing::{refusal, unreadable};
 
@@ -144,9 +146,21 @@ impl Check<'_> {
         let (mut material, preset) = self.material("material", &file.material, tissue.cell_size);
         let (mut regions, region_presets) = self.regions(file, &tissue, (mesh.as_deref(), case.as_ref()));
         let supports = self.supports(file, mesh.as_deref());
-        let faces = self.faces(&file.boundaries, file.tissue.mesh.is_some());
         let tool = self.tool(file);
         let motion = self.motion(file, tool.as_ref(), mesh.as_deref());
+        let by_words = self.faces_by_words(&file.tissue, &motion);
+        let faces = self.faces(&file.boundaries, by_words);
+        let held = Held {
+            regions: &regions,
+            supports: &supports,
+            faces: &faces,
+            motion: &motion,
+            tissue: &tissue,
+            mesh: mesh.as_deref(),
+            case: case.as_deref(),
+        };
+        let skin_free = self.skin_free(file, &held);
+        self.floating(&file.tissue, &held, skin_free);
         let mut effects = self.effects(file, own, &tool, &motion, (&faces, tissue.size), &material);
         effects.own = self.own_effects(file, own);
         self.own_numbers_of_regions(file, &effects, &mut regions);
@@ -196,14 +210,6 @@ impl Check<'_> {
             None => Mesh::Block(BlockMesh::for_tissue(&tissue, tool.as_ref().map(|_| &motion))),
         };
         self.cells(&cells, &material, &regions, &tissue, &effects);
-        if mesh.is_some() {
-            self.floating_mesh(&supports, &faces);
-        } else if tool.is_some() && faces.iter().all(|face| face.fixed == [false; 3]) {
-            self.notices.push(
-                "No face of the block is fixed, so the tool pushes it away; set e.g. boundaries.z_min = \"fixed\"."
-                    .into(),
-            );
-        }
         let scene = Scene {
             title: file.title.clone().unwrap_or_else(|| name.replace('_', " ")),
             name,
@@ -214,6 +220,7 @@ impl Check<'_> {
             mesh,
             case,
             supports,
+            skin_free,
             faces,
             tool,
             motion,

@@ -81,7 +81,8 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 15))]
     pub region: Vec<RegionTable>,
-    /// What holds, moves or loads the six faces; default: sides and bottom fixed, top free; all free for a mesh.
+    /// What holds, moves or loads the six faces; default: what `tissue.supports` holds, else sides and bottom fixed, top free; all free for a
+    /// mesh.
     #[serde(default)]
     pub boundaries: BoundariesTable,
     /// Node sets of a mesh that are held.
@@ -154,6 +155,30 @@ pub struct TissueTable {
     /// Where mesh, label map or surfaces are put, for a file in odd units or one that lies on its side; a table, or inline:
     /// `transform = { scale = 0.1, axis = [1, 0, 0], angle_deg = 90 }`.
     pub transform: Option<TransformTable>,
+    /// What holds the tissue: "sides" (the four side faces of the block, or of the box around a mesh), "back" (the face that the needle
+    /// points at; of a block the bottom), "bones" (what is `rigid`), "skin" (skin farther than `skin_free_mm` from the path). A face that
+    /// `[boundaries]` names is as it says there. Default: sides, back and bones; of a mesh nothing.
+    #[schemars(extend("uniqueItems" = true))]
+    pub supports: Option<Vec<SupportWord>>,
+    /// Distance from the path, from entry to deepest point, within which skin is free where `supports` lists "skin" [mm]; default 10.
+    pub skin_free_mm: Option<f64>,
+}
+
+/// What may hold the tissue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SupportWord {
+    Sides,
+    Back,
+    Bones,
+    Skin,
+}
+
+impl SupportWord {
+    /// As a scene writes it.
+    pub fn key(self) -> &'static str {
+        ["sides", "back", "bones", "skin"][self as usize]
+    }
 }
 
 /// Where a file of tissue is put: scaled about the origin of its coordinates (of a label map: of the patient, RAS), then turned about an
