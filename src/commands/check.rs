@@ -15,7 +15,7 @@ use crate::engine::stable_dt::power_iteration;
 use crate::error::{Result, brief};
 use crate::material::{describe_constants, describe_verdict};
 use crate::mesh::Mesh;
-use crate::model::Model;
+use crate::model::{Model, loads};
 use crate::needle::{TipShape, Tool};
 use crate::scene::{Face, FaceDrive, RegionShape, Scene};
 use crate::simulation::advice::tool_mach;
@@ -93,6 +93,12 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         let names = ["x", "y", "z"].into_iter().zip(support.fixed);
         let fixed: String = names.filter(|(_, on)| *on).map(|(name, _)| name).collect();
         line(format!("support      {}: {fixed} held", support.set));
+    }
+    for load in &scene.loads {
+        let (area, force) = model.mesh.as_tets().map(|mesh| loads::resultant(mesh, load)).unwrap_or_default();
+        let [x, y, z] = force.to_array().map(four_digits);
+        let name = load.set.as_deref().unwrap_or("the whole surface");
+        line(format!("load         {name}: {} mm2, together ({x}, {y}, {z}) N", four_digits(area * 1e6)));
     }
     for target in &scene.targets {
         let [x, y, z] = (target.position * 1e3).to_array().map(four_digits);

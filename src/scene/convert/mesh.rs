@@ -31,6 +31,12 @@ pub fn list_tags(mesh: &TetMesh) -> String {
     list("regions", mesh.regions.iter().enumerate().map(|(tag, name)| (name.as_str(), count(tag))), "cells")
 }
 
+/// Its node sets with their counts of nodes.
+pub(super) fn list_sets(mesh: &TetMesh) -> String {
+    let sets = mesh.node_sets.iter().map(|(name, nodes)| (name.as_str(), nodes.len()));
+    list("node sets; name a group of faces or nodes in the mesh generator", sets, "nodes")
+}
+
 impl Check<'_> {
     /// Loads the mesh of a scene; `None` after a reported problem.
     pub(super) fn mesh(&mut self, name: &str, table: &TissueTable) -> Option<Arc<TetMesh>> {
@@ -112,12 +118,11 @@ impl Check<'_> {
             } else if let Some(mesh) = mesh
                 && !mesh.node_sets.contains_key(&table.set)
             {
-                let sets = mesh.node_sets.iter().map(|(name, nodes)| (name.as_str(), nodes.len()));
                 self.problems.report(
                     &at("set"),
                     format!("the mesh has no node set called \"{}\"", table.set),
                     "unknown set",
-                    list("node sets; name a group of faces or nodes in the mesh generator", sets, "nodes"),
+                    list_sets(mesh),
                 );
             }
             if table.fixed.is_empty() {

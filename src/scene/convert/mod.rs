@@ -9,6 +9,7 @@ mod effects;
 mod faces;
 mod frames;
 pub(super) mod library;
+mod loads;
 mod material;
 mod mesh;
 mod mesh_path;
@@ -39,6 +40,7 @@ use super::file::*;
 use super::*;
 use crate::anatomy::Case;
 use crate::effects::SELF_CONTAINED;
+use crate::effects::mass_scaling::Loading;
 use crate::effects::own::OwnEffect;
 use crate::effects::parameters::Table;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
@@ -161,7 +163,9 @@ impl Check<'_> {
         };
         let skin_free = self.skin_free(file, &held);
         self.floating(&file.tissue, &held, skin_free);
-        let mut effects = self.effects(file, own, &tool, &motion, (&faces, tissue.size), &material);
+        let loads = self.loads(file, mesh.as_deref(), &supports, &faces);
+        let loading = Loading::of(Some(&motion), &faces, tissue.size).with_loads(&loads, tissue.size);
+        let mut effects = self.effects(file, own, &tool, &motion, &loading, &material);
         effects.own = self.own_effects(file, own);
         self.own_numbers_of_regions(file, &effects, &mut regions);
         parameters::settle(
@@ -220,6 +224,7 @@ impl Check<'_> {
             mesh,
             case,
             supports,
+            loads,
             skin_free,
             faces,
             tool,

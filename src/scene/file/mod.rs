@@ -88,6 +88,10 @@ pub struct SceneFile {
     /// Node sets of a mesh that are held.
     #[serde(default)]
     pub support: Vec<SupportTable>,
+    /// Tractions and pressures on sets of a mesh, at most 64.
+    #[serde(default)]
+    #[schemars(length(max = 64))]
+    pub load: Vec<LoadTable>,
     /// A needle with a conical or bevelled tip, rigid without the effect `flexible_needle`. At most one tool per scene.
     pub needle: Option<NeedleTable>,
     /// A rigid sphere. At most one tool per scene.
@@ -204,6 +208,20 @@ pub struct SupportTable {
     pub set: String,
     /// Components held at zero.
     pub fixed: Vec<Axis>,
+}
+
+/// A load on the surface of a mesh: exactly one of traction and pressure. Loads are dead: they act on rest areas and keep their direction.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoadTable {
+    /// Name of a node or surface set in the mesh file: the triangles of the surface with all nodes in it; default: the whole surface.
+    pub set: Option<String>,
+    /// Force per rest area along x, y, z of the mesh [kPa].
+    pub traction_kpa: Option<[f64; 3]>,
+    /// Pressure against the surface at rest, negative for suction [kPa].
+    pub pressure_kpa: Option<f64>,
+    /// Time over which the load grows linearly [s], the same for all loads of the scene; default 0: at once.
+    pub ramp_s: Option<f64>,
 }
 
 /// Conditions on the six faces of a block, or of the bounding box of a mesh.
