@@ -4,6 +4,8 @@
 mod common;
 #[path = "../anatomy/free_path.rs"]
 mod free_path;
+#[path = "../anatomy/indentation.rs"]
+mod indentation;
 #[path = "../anatomy/labels.rs"]
 mod labels;
 #[path = "../anatomy/pictures.rs"]

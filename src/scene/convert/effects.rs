@@ -188,7 +188,7 @@ impl Check<'_> {
             );
         }
         if of_mesh {
-            for key in ["indentation", "cohesive", "flexible_needle"] {
+            for key in ["cohesive", "flexible_needle"] {
                 if list.has(key) {
                     self.needs_block(&list.place(key), &format!("effect `{key}`"));
                 }
