@@ -8,6 +8,7 @@ use std::path::Path;
 use crate::anatomy::{self, markups};
 use crate::error::{Error, Result};
 use crate::material::curves;
+use crate::mesh::Placement;
 use crate::mesh::import::{self, ImportOptions, LengthUnit};
 use crate::output::checkpoint::RunCheckpoint;
 use crate::output::report::Columns;
@@ -150,7 +151,7 @@ fn materials(bytes: &[u8]) -> Result<()> {
 }
 
 fn mesh(name: &str, bytes: &[u8]) -> Result<()> {
-    let options = ImportOptions { unit: LengthUnit::Millimetre, accept_size: false };
+    let options = ImportOptions { unit: LengthUnit::Millimetre, accept_size: false, placement: Placement::NONE };
     let mesh = import::parse(name, bytes, options)?.mesh;
     let nodes = mesh.positions.len();
     assert!(mesh.tets.iter().flatten().all(|n| (*n as usize) < nodes), "a corner is no node");

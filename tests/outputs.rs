@@ -137,6 +137,8 @@ fn scene(tool: Option<Tool>, direction: DVec3) -> Scene {
         mesh: None,
         case: None,
         supports: Vec::new(),
+        loads: Vec::new(),
+        skin_free: None,
         faces: std::array::from_fn(|_| FaceCondition::default()),
         tool,
         motion: Motion {

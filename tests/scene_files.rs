@@ -1633,8 +1633,8 @@ fn wrong_meshes() {
     assert!(message.contains("the motion into a mesh has no entry point"), "{message}");
     let sphere = "effects = [\"indentation\"]\n[sphere]\nradius_mm = 2\n[[motion.phase]]\n\
                   kind = \"insert\"\nspeed_mm_s = 2\ndepth_mm = 3\n";
-    let message = load_mesh(("[tissue]", &format!("{sphere}[tissue]"))).expect_err("no sphere on a mesh");
-    assert!(message.contains("effect `indentation` acts on the block only"), "{message}");
+    let message = load_mesh(("[tissue]", &format!("{sphere}[tissue]"))).expect_err("no entry point of a sphere");
+    assert!(message.contains("the motion into a mesh has no entry point"), "{message}");
     assert_block_refused(
         "",
         &format!("{MATERIAL}[[support]]\nset = \"a\"\nfixed = [\"x\"]\n"),

@@ -1,4 +1,4 @@
-// Stage indenter_contact: penalty contact of the top face with a sphere or a flat punch; one thread per contact node.
+// Stage indenter_contact: penalty contact of the surface with a sphere or a flat punch; one thread per contact node.
 // Equations: src/effects/indentation.rs and CpuEngine::indenter_contact.
 #import shared/params
 #import shared/thread_index
@@ -27,6 +27,27 @@ struct PointForce {
     stored: f32,
 }
 
+#ifdef TETRAHEDRA
+// On a surface of triangles the node itself touches, for its share of them.
+fn pressed_points(index: u32) -> PointForce {
+    var sum: PointForce;
+    let contact = contact_at(index);
+    let lever = lever_of(index);
+    let penetration = tool_penetration(lever, step_input.direction.xyz, contact.rest_radius);
+    let n = penetration.xyz;
+    let vn = dot(node_velocity[contact.node].xyz - step_input.velocity.xyz, n);
+    let k = indentation.face_stiffness * contact.share;
+    let depth = max(penetration.w, 0.0);
+    let elastic = k * depth;
+    let normal = select(0.0, max(0.0, elastic - indentation.face_damping * k * vn), depth > 0.0);
+    sum.normal = n * normal;
+    sum.torque = cross(lever, sum.normal);
+    sum.pressing = normal;
+    sum.stored = 0.5 * k * depth * depth;
+    sum.damping = n * (normal - elastic);
+    return sum;
+}
+#else
 fn pressed_points(index: u32) -> PointForce {
     var sum: PointForce;
     let contact = contact_at(index);
@@ -43,8 +64,13 @@ fn pressed_points(index: u32) -> PointForce {
             contact_nodes[second].rest.xy,
             contact_nodes[far].rest.xy,
         );
+#ifdef EMPTY_CELLS
+        // Skin is not level.
+        let area = length(cross(contact_nodes[first].rest.xyz - contact.rest, contact_nodes[second].rest.xyz - contact.rest));
+#else
         let edges = array<vec2<f32>, 2>(rest[0] - contact.rest.xy, rest[1] - contact.rest.xy);
         let area = abs(edges[0].x * edges[1].y - edges[0].y * edges[1].x);
+#endif
         let k = indentation.face_stiffness * area / f32(FACE_POINTS * FACE_POINTS);
         let present = (contact.faces & (1u << face)) != 0u;
         for (var point = select(FACE_POINTS * FACE_POINTS, 0u, present); point < FACE_POINTS * FACE_POINTS; point++) {
@@ -70,6 +96,7 @@ fn pressed_points(index: u32) -> PointForce {
     }
     return sum;
 }
+#endif
 
 @compute @workgroup_size(64)
 fn indenter_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {

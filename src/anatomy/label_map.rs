@@ -6,6 +6,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::{DMat3, DVec3};
 
+use crate::mesh::Placement;
+
 /// Most voxels of a volume: a whole body at 1 mm has 2e8.
 pub const MOST_VOXELS: usize = 300_000_000;
 
@@ -40,6 +42,11 @@ impl fmt::Debug for LabelMap {
 }
 
 impl LabelMap {
+    /// The same labels where `placement` puts them.
+    pub fn placed(self, placement: &Placement) -> Self {
+        LabelMap { steps: placement.steps(self.steps), origin: placement.point(self.origin), ..self }
+    }
+
     /// Centre of voxel (i, j, k), RAS [m].
     pub fn position(&self, i: usize, j: usize, k: usize) -> DVec3 {
         self.origin + self.steps * DVec3::new(i as f64, j as f64, k as f64)

@@ -252,7 +252,10 @@ fn of_study(
 fn by_rule(subject: &Subject, cost: &UnitCost, rate: f64) -> std::result::Result<Proposal, String> {
     let scene = &subject.scene;
     let wave = (scene.material.law.shear_modulus() / scene.material.density).sqrt();
-    let by_speed = Loading::of(Some(&scene.motion), &scene.faces, scene.tissue.size).auto_factor(wave).unwrap_or(1.0);
+    let by_speed = Loading::of(Some(&scene.motion), &scene.faces, scene.tissue.size)
+        .with_loads(&scene.loads, scene.tissue.size)
+        .auto_factor(wave)
+        .unwrap_or(1.0);
     // As many digits as the rule has.
     let by_speed = 100.0 * (by_speed / 100.0).floor();
     let mass_scaling = by_speed.max(subject.base.mass_scaling);

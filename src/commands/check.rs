@@ -15,7 +15,7 @@ use crate::engine::stable_dt::power_iteration;
 use crate::error::{Result, brief};
 use crate::material::{describe_constants, describe_verdict};
 use crate::mesh::Mesh;
-use crate::model::Model;
+use crate::model::{Model, loads};
 use crate::needle::{TipShape, Tool};
 use crate::scene::{Face, FaceDrive, RegionShape, Scene};
 use crate::simulation::advice::tool_mach;
@@ -85,10 +85,20 @@ pub fn check(scene: Scene, engine: EngineChoice) -> Result<String> {
         line(format!("             {}", describe_verdict(&region.material.law)));
     }
     line(format!("boundaries   {}", describe_faces(scene)));
+    if let Some(free) = scene.skin_free {
+        let held = model.composition.skin.len();
+        line(format!("skin         {held} nodes farther than {} mm from the path held", four_digits(free * 1e3)));
+    }
     for support in &scene.supports {
         let names = ["x", "y", "z"].into_iter().zip(support.fixed);
         let fixed: String = names.filter(|(_, on)| *on).map(|(name, _)| name).collect();
         line(format!("support      {}: {fixed} held", support.set));
+    }
+    for load in &scene.loads {
+        let (area, force) = model.mesh.as_tets().map(|mesh| loads::resultant(mesh, load)).unwrap_or_default();
+        let [x, y, z] = force.to_array().map(four_digits);
+        let name = load.set.as_deref().unwrap_or("the whole surface");
+        line(format!("load         {name}: {} mm2, together ({x}, {y}, {z}) N", four_digits(area * 1e6)));
     }
     for target in &scene.targets {
         let [x, y, z] = (target.position * 1e3).to_array().map(four_digits);

@@ -11,7 +11,7 @@ use crate::needle::slit::{POINTS, weights};
 use crate::needle::{Tool, ToolPose};
 
 impl CpuEngine {
-    /// Stage `indenter_contact`: penalty contact of the top face with a sphere or a flat punch.
+    /// Stage `indenter_contact`: penalty contact of the surface with a sphere or a flat punch.
     pub(super) fn indenter_contact(&mut self, pose: &ToolPose) {
         let model = self.model.clone();
         let (Some(plan), Some(tool)) = (&model.indentation, &model.scene.tool) else { return };
@@ -21,7 +21,7 @@ impl CpuEngine {
         let State { contact: memories, displacement, velocity, .. } = &mut self.state;
         for (contact, memory) in model.contact_nodes.iter().zip(memories) {
             let node = contact.node as usize;
-            let x = model.mesh.rest_position(node) + displacement[node];
+            let x = contact.place(&model.mesh) + displacement[node];
             let v = velocity[node] - pose.velocity;
             let k = plan.face_stiffness * contact.share;
             self.added_bound[node] += plan.stiffness_bound(contact.share);
@@ -90,14 +90,17 @@ fn pressed_points(
     (displacement, velocity): (&[DVec3], &[DVec3]),
 ) -> PointForce {
     let mut sum = PointForce::default();
-    let Some(faces) = &contact.faces else { return sum };
+    let Some(faces) = &contact.faces else {
+        return pressed_node(model, plan, tool, pose, contact, (displacement, velocity));
+    };
     for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
         if faces.present & (1 << (i + 2 * j)) == 0 {
             continue;
         }
         let others = faces.corners(i, j).map(|c| &model.contact_nodes[c as usize]);
-        let nodes = [contact, others[0], others[1], others[2]].map(|c| c.node as usize);
-        let rest = nodes.map(|n| model.mesh.rest_position(n));
+        let corners = [contact, others[0], others[1], others[2]];
+        let nodes = corners.map(|c| c.node as usize);
+        let rest = corners.map(|c| c.place(&model.mesh));
         let area = (rest[1] - rest[0]).cross(rest[2] - rest[0]).length();
         let k = plan.face_stiffness * area / (POINTS * POINTS) as f64;
         for (a, b) in (0..POINTS).flat_map(|a| (0..POINTS).map(move |b| (a, b))) {
@@ -120,4 +123,29 @@ fn pressed_points(
         }
     }
     sum
+}
+
+/// The same where there are no faces: the node itself touches, for its share of the triangles around it.
+fn pressed_node(
+    model: &Model,
+    plan: &Plan,
+    tool: &Tool,
+    pose: &ToolPose,
+    contact: &ContactNode,
+    (displacement, velocity): (&[DVec3], &[DVec3]),
+) -> PointForce {
+    let node = contact.node as usize;
+    let lever = contact.place(&model.mesh) + displacement[node] - pose.tip;
+    let found = penetration(tool, lever, pose.direction, contact.rest_radius).filter(|p| p.0 > 0.0);
+    let Some((depth, n)) = found else { return PointForce::default() };
+    let k = plan.face_stiffness * contact.share;
+    let elastic = k * depth;
+    let normal = (elastic - plan.face_damping * k * (velocity[node] - pose.velocity).dot(n)).max(0.0);
+    PointForce {
+        normal: n * normal,
+        damping: n * (normal - elastic),
+        torque: lever.cross(n * normal),
+        pressing: normal,
+        stored: 0.5 * k * depth * depth,
+    }
 }

@@ -1,4 +1,4 @@
-//! Indentation: penalty contact of the top face with a rigid sphere or flat punch.
+//! Indentation: penalty contact of the surface with a rigid sphere or flat punch.
 //!
 //! Every face of the top carries 3 x 3 points, each for a ninth of its area A, which follow the bilinear face
 //! (src/needle/slit.rs); a tool that met nodes alone would pass between them. With the penetration g of a point along the outward normal n of the tool
@@ -8,6 +8,12 @@
 //! ```
 //! with h the fine cell edge: a finer mesh penetrates less, and the ratio of contact to tissue in the stable step is the same
 //! on every mesh. Friction sticks to the nodes, with the sum of the normal forces of their points.
+//! In a label map the faces lie between the places where the skin passes the columns of the grid; each is carried by the nearest node of
+//! its column that is at most a quarter of a cell outside.
+//!
+//! On tetrahedra the nodes of the triangles that face the tool touch themselves, each for a third of their areas A: f = kappa A/3 (g - tau v_n) n.
+//! The tool should be wider than two edges, or it passes between them.
+//!
 //! A bonded punch keeps every node below it at the place of its first touch by a spring kappa A_node in all directions.
 
 use glam::DVec3;

@@ -207,10 +207,9 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// True for effects that work on the block only: faces between cells of a grid, the top face under an indenter, a beam beside
-    /// the grid.
+    /// True for effects that work on the block only: faces between cells of a grid, a beam beside the grid.
     pub fn needs_block(&self) -> bool {
-        matches!(self.key, "cohesive" | "indentation" | "flexible_needle")
+        matches!(self.key, "cohesive" | "flexible_needle")
     }
 }
 

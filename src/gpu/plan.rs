@@ -110,7 +110,7 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     let (block, tetrahedra) = (!features.tetrahedra, features.tetrahedra);
     // On tetrahedra the path is planned, and softened.
     let puncture = effects.puncture.is_some();
-    let indentation = block && effects.indentation.is_some();
+    let indentation = effects.indentation.is_some();
     let cohesive = block && effects.cohesive.is_some();
     let (free_path, opening) = (block && features.free_path, block && features.opening);
     let wanted = |stage: &Stage| match stage {

@@ -2,6 +2,7 @@
 
 pub mod block;
 pub mod import;
+pub mod placement;
 pub mod tet_line;
 pub mod tet_path;
 pub mod tets;
@@ -12,6 +13,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 pub use block::{BlockMesh, Bore, CORNERS, Tissue, trilinear};
+pub use placement::Placement;
 pub use tet_line::TetLine;
 pub use tet_path::TetPath;
 pub use tets::TetMesh;

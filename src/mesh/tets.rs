@@ -125,10 +125,41 @@ impl TetMesh {
         self.surface().into_iter().filter(on_side).collect()
     }
 
+    /// Nodes of the skin, ascending: those of the surface but of its cuts, the sides of the bounding box that are flat. The side on which
+    /// `entry` lies is skin too.
+    pub fn skin(&self, entry: DVec3) -> Vec<u32> {
+        let (low, high) = self.bounds();
+        let near = SIDE_TOLERANCE * (high - low).length();
+        let cuts: Vec<(usize, f64)> = (0..3)
+            .flat_map(|axis| [(axis, low[axis]), (axis, high[axis])])
+            .filter(|(axis, plane)| (entry[*axis] - plane).abs() > near)
+            .collect();
+        let is_cut = |face: &[u32; 3]| {
+            cuts.iter().any(|(a, plane)| face.iter().all(|n| (self.positions[*n as usize][*a] - plane).abs() <= near))
+        };
+        let mut nodes: Vec<u32> = self.surface().into_iter().filter(|face| !is_cut(face)).flatten().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
+    /// Triangles of the surface with all nodes in the node set of this name, all of them without a name; `None`: there is no such set.
+    pub fn surface_of(&self, set: Option<&str>) -> Option<Vec<[u32; 3]>> {
+        let Some(name) = set else { return Some(self.surface()) };
+        let nodes = self.node_sets.get(name)?;
+        let holds = |face: &[u32; 3]| face.iter().all(|node| nodes.binary_search(node).is_ok());
+        Some(self.surface().into_iter().filter(holds).collect())
+    }
+
     /// Area of a triangle of nodes [m^2].
     pub fn area(&self, face: [u32; 3]) -> f64 {
+        self.area_vector(face).length()
+    }
+
+    /// The same along its normal, which is the outward one of a triangle of [`TetMesh::surface`] [m^2].
+    pub fn area_vector(&self, face: [u32; 3]) -> DVec3 {
         let [a, b, c] = face.map(|n| self.positions[n as usize]);
-        0.5 * (b - a).cross(c - a).length()
+        0.5 * (b - a).cross(c - a)
     }
 
     /// Rest volume of a region [m^3].

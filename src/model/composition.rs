@@ -26,7 +26,7 @@ use crate::scene::{RegionShape, Scene};
 const SAMPLES: usize = 6;
 
 /// Cells that are filled less hold nothing.
-const LEAST_FILL: f64 = 0.02;
+pub(super) const LEAST_FILL: f64 = 0.02;
 
 /// Parts that a composition is rounded to, the first that gives few enough materials.
 const LEVELS: [u16; 10] = [64, 48, 32, 24, 16, 12, 8, 6, 4, 2];
@@ -44,8 +44,10 @@ pub struct Composition {
     pub empty: Vec<bool>,
     /// Those of them that do not deform; no entries: there are none.
     pub rigid: Vec<bool>,
-    /// Nodes that stand still: of cells that do not deform, and those that no tissue moves; no entries: there are none.
+    /// Nodes that stand still: of cells that do not deform, those that no tissue moves, and held skin; no entries: there are none.
     pub held: Vec<bool>,
+    /// Those of them that are held skin, ascending.
+    pub skin: Vec<usize>,
     /// Part of every cell that tissue fills; no entries: all of it where it is not empty.
     pub fill: Vec<f32>,
     /// What parts of a mixture were rounded to; 0: there is none.
@@ -83,6 +85,23 @@ impl Composition {
             }
         }
         composition
+    }
+
+    /// Lets nodes of the skin stand still. The engines look at single nodes where cells may be empty, so that a block has room for that
+    /// then, though none is.
+    pub(super) fn hold(&mut self, skin: Vec<usize>, mesh: &Mesh, materials: &[Material]) {
+        if skin.is_empty() {
+            return;
+        }
+        if mesh.as_block().is_some() && self.empty.is_empty() {
+            self.empty = vec![false; mesh.cell_count()];
+            self.mixtures.push(mixture(&[(0.0, &materials[0])]));
+            self.cell_material.resize(mesh.cell_count(), 0);
+            self.main.clone_from(&self.cell_material);
+        }
+        self.held.resize(mesh.node_count(), false);
+        skin.iter().for_each(|node| self.held[*node] = true);
+        self.skin = skin;
     }
 
     /// Part of a cell that tissue fills.
@@ -218,7 +237,7 @@ fn of_labels(scene: &Scene, block: &BlockMesh, case: &Case, materials: &[Materia
     let levels = if mixtures.len() > 1 { levels } else { 0 };
     let main = sampled.iter().map(|(.., main)| *main).collect();
     let fill = sampled.iter().map(|(counts, ..)| fill(counts) as f32).collect();
-    Composition { cell_material, main, mixtures, empty, rigid, held: Vec::new(), fill, levels }
+    Composition { cell_material, main, mixtures, empty, rigid, fill, levels, ..Composition::default() }
 }
 
 static EMPTY: Parts = Vec::new();

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::mesh::Mesh;
 use crate::needle::slit::NodeFaces;
 
 /// A node that the tool may touch.
@@ -18,8 +19,11 @@ pub struct ContactNode {
     pub surface: ContactSurface,
     /// On a slit or under an indenter: the faces around the node, at whose points the tool touches.
     pub faces: Option<NodeFaces>,
-    /// What the node stands for in contact: a quarter of the areas of those faces [m^2], without faces its rest volume [m^3].
+    /// What the node stands for in contact: a quarter of the areas of those faces, on tetrahedra under an indenter a third of those of its
+    /// triangles [m^2]; else its rest volume [m^3].
     pub share: f64,
+    /// From the node at rest to the point of the surface that it carries: the skin of a label map lies between nodes [m].
+    pub offset: DVec3,
 }
 
 impl ContactNode {
@@ -33,7 +37,13 @@ impl ContactNode {
             surface: ContactSurface::OpenedPath,
             faces: None,
             share,
+            offset: DVec3::ZERO,
         }
+    }
+
+    /// The point of the surface at rest [m].
+    pub fn place(&self, mesh: &Mesh) -> DVec3 {
+        mesh.rest_position(self.node as usize) + self.offset
     }
 }
 

@@ -4,10 +4,12 @@ pub mod composition;
 mod contact;
 mod free_path;
 mod indentation;
+pub mod loads;
 pub mod opening;
 mod puncture;
 pub mod rigid;
 mod slit;
+mod supports;
 mod tet_puncture;
 
 use glam::DVec3;
@@ -22,7 +24,7 @@ pub use puncture::{
 use crate::effects::{EffectSet, cohesive};
 use crate::material_point::Material;
 use crate::mesh::tets::SIDE_TOLERANCE;
-use crate::mesh::{BlockMesh, Mesh, TetMesh, TissuePoint};
+use crate::mesh::{Mesh, TissuePoint};
 use crate::needle::{Kinematics, PlannedPath};
 use crate::scene::{Face, FaceCondition, Scene};
 use crate::separation::Separation;
@@ -57,7 +59,7 @@ pub struct Model {
     pub kinematics: Option<Kinematics>,
     /// Nodal mass including the uniform mass scaling [kg].
     pub node_mass: Vec<f64>,
-    /// Nodal dead load at full ramp [N]; empty without tractions.
+    /// Nodal dead load at full ramp [N]; empty without loads.
     pub node_load: Vec<DVec3>,
     /// Time over which the loads grow [s].
     pub load_ramp: f64,
@@ -83,6 +85,7 @@ impl Model {
             .map(|m| Material::of(m, &scene.effects))
             .collect();
         let mut composition = Composition::new(&scene, &mesh, &materials);
+        composition.hold(supports::held_skin(&scene, &mesh, &composition), &mesh, &materials);
         materials.append(&mut composition.mixtures);
         let cell_material = std::mem::take(&mut composition.cell_material);
         if let Mesh::Block(block) = &mut mesh {
@@ -95,7 +98,7 @@ impl Model {
             .zip(&composition.held)
             .filter(|(m, held)| **held && **m == 0.0)
             .for_each(|(m, _)| *m = 1.0);
-        let (node_load, load_ramp) = nodal_loads(&scene, &mesh);
+        let (node_load, load_ramp) = loads::nodal_loads(&scene, &mesh);
         let targets = scene.targets.iter().map(|target| TissuePoint::in_mesh(&mesh, target.position)).collect();
         let kinematics = (!scene.motion.phases.is_empty())
             .then(|| Kinematics::new(&scene.motion).no_deeper_than(rigid::deepest(&scene)));
@@ -298,45 +301,4 @@ fn node_flags(scene: &Scene, mesh: &Mesh, composition: &Composition) -> Vec<u32>
         }
     }
     flags
-}
-
-/// Nodal forces of all face tractions at full ramp [N], and the ramp time [s].
-fn nodal_loads(scene: &Scene, mesh: &Mesh) -> (Vec<DVec3>, f64) {
-    let loaded: Vec<Face> = Face::ALL.into_iter().filter(|&f| scene.faces[f as usize].traction.is_some()).collect();
-    if loaded.is_empty() {
-        return (Vec::new(), 0.0);
-    }
-    let mut load = vec![DVec3::ZERO; mesh.node_count()];
-    let mut ramp: f64 = 0.0;
-    for face in loaded {
-        let condition = &scene.faces[face as usize];
-        let traction = condition.traction.unwrap_or_default();
-        ramp = ramp.max(condition.traction_ramp);
-        match mesh {
-            Mesh::Block(block) => load_block(block, face, traction, &mut load),
-            Mesh::Tets(tets) => load_tets(tets, face, traction, &mut load),
-        }
-    }
-    (load, ramp)
-}
-
-/// Adds the nodal forces [N] of a traction on a face of the block [Pa].
-fn load_block(mesh: &BlockMesh, face: Face, traction: DVec3, load: &mut [DVec3]) {
-    let axis = face.axis();
-    let plane = if face.is_max() { mesh.nodes()[axis] - 1 } else { 0 };
-    let lines = &mesh.lines[axis];
-    let half = 0.5 * if face.is_max() { lines[lines.len() - 1] - lines[lines.len() - 2] } else { lines[1] - lines[0] };
-    for (node, force) in load.iter_mut().enumerate() {
-        if mesh.node_coordinates(node)[axis] == plane {
-            *force += traction * (mesh.node_volume(node) / half);
-        }
-    }
-}
-
-/// The same on the triangles of a mesh that lie on a side of its bounding box: a third of their force on each of their nodes.
-fn load_tets(mesh: &TetMesh, face: Face, traction: DVec3, load: &mut [DVec3]) {
-    for triangle in mesh.surface_on_side(face.axis(), face.is_max()) {
-        let share = traction * (mesh.area(triangle) / 3.0);
-        triangle.iter().for_each(|node| load[*node as usize] += share);
-    }
 }

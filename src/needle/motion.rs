@@ -302,7 +302,17 @@ impl Motion {
         self.entry + self.direction * self.deepest()
     }
 
-    /// The same, not below the bottom of a block of height `height` [m].
+    /// Distance of a point from the way of a straight motion, entry to deepest point [m].
+    pub fn distance_from_path(&self) -> impl Fn(DVec3) -> f64 {
+        let (entry, way) = (self.entry, self.deepest_point() - self.entry);
+        let square = way.length_squared();
+        move |x| {
+            let part = if square > 0.0 { ((x - entry).dot(way) / square).clamp(0.0, 1.0) } else { 0.0 };
+            x.distance(entry + way * part)
+        }
+    }
+
+    /// The deepest point, not below the bottom of a block of height `height` [m].
     pub fn deepest_point_in(&self, height: f64) -> DVec3 {
         self.entry + self.direction * self.deepest().min(height / -self.direction.z)
     }

@@ -68,6 +68,8 @@ impl Scene {
             mesh: None,
             case: None,
             supports: Vec::new(),
+            loads: Vec::new(),
+            skin_free: None,
             faces: [held.clone(), held.clone(), held.clone(), held.clone(), held, FaceCondition::default()],
             tool: None,
             motion: Motion::default(),

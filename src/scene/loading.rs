@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Face, FaceCondition};
+use super::{Face, FaceCondition, SetLoad};
 use crate::effects::mass_scaling::Loading;
 use crate::needle::Motion;
 
@@ -20,5 +20,11 @@ impl Loading {
             tool_speed: motion.map_or(0.0, Motion::largest_speed),
             slowness: Face::ALL.into_iter().filter_map(slowness).reduce(f64::min),
         }
+    }
+
+    /// The same with loads on sets of a mesh, which may act along any side of the tissue.
+    pub fn with_loads(self, loads: &[SetLoad], size: DVec3) -> Self {
+        let own = loads.iter().map(|load| load.ramp).filter(|ramp| *ramp > 0.0).map(|ramp| ramp / size.max_element());
+        Loading { slowness: own.chain(self.slowness).reduce(f64::min), ..self }
     }
 }

@@ -68,6 +68,10 @@ pub struct Scene {
     pub case: Option<Arc<Case>>,
     /// Node sets of the tetrahedral mesh whose displacement components are held at zero.
     pub supports: Vec<Support>,
+    /// Loads on sets of the tetrahedral mesh.
+    pub loads: Vec<SetLoad>,
+    /// Distance from the path beyond which skin is held [m]; `None`: nowhere.
+    pub skin_free: Option<f64>,
     /// Conditions on the six faces, indexed by [`Face`].
     pub faces: [FaceCondition; 6],
     /// What touches or pierces the tissue.
@@ -285,6 +289,26 @@ pub struct Support {
     pub set: String,
     /// Components held at zero: x, y, z.
     pub fixed: [bool; 3],
+}
+
+/// A dead load on a part of the surface of the mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetLoad {
+    /// Name of the set in the mesh file; `None`: the whole surface.
+    pub set: Option<String>,
+    /// What acts.
+    pub kind: LoadKind,
+    /// Time over which it grows [s]; 0: at once.
+    pub ramp: f64,
+}
+
+/// What acts on a surface, per rest area.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LoadKind {
+    /// A force in a fixed direction [Pa].
+    Traction(DVec3),
+    /// Against the outward normal at rest [Pa].
+    Pressure(f64),
 }
 
 /// The six faces of the block. The discriminant is the index into [`Scene::faces`].

@@ -37,7 +37,8 @@ pub fn tool_mach(model: &Model) -> Option<f64> {
 /// What will make the scaled inertia show in the force, if anything.
 fn inertia_that_shows(model: &Model) -> Option<String> {
     let scene = &model.scene;
-    let loading = Loading::of(model.kinematics.is_some().then_some(&scene.motion), &scene.faces, scene.tissue.size);
+    let loading = Loading::of(model.kinematics.is_some().then_some(&scene.motion), &scene.faces, scene.tissue.size)
+        .with_loads(&scene.loads, scene.tissue.size);
     let wave = (scene.material.law.shear_modulus() / model.scaled_density()).sqrt();
     let (mach, passages) = (loading.mach(wave), loading.passages(wave));
     let what = match (mach > MOST_MACH, passages < FEWEST_PASSAGES && model.mass_scaling() > 1.0) {

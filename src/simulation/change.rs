@@ -109,6 +109,8 @@ impl Simulation {
             && now.tool == scene.tool
             && now.faces == scene.faces
             && now.supports == scene.supports
+            && now.loads == scene.loads
+            && now.skin_free == scene.skin_free
             && touching(now) == touching(&scene)
             && now.effects.flexible_needle == scene.effects.flexible_needle;
         let model = Arc::new(Model::new(scene, mesh));

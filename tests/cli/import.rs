@@ -208,6 +208,32 @@ fn a_surface_whose_name_says_nothing_is_called_as_its_file() {
 }
 
 #[test]
+fn a_file_in_odd_units_is_placed() {
+    let place = Place::new();
+    // In inches, and its front to the head.
+    let inches = slab().replace(
+        "(1,0,0) (0,1,0) (0,0,1)",
+        "(0.03937007874015748,0,0) (0,0,-0.03937007874015748) (0,0.03937007874015748,0)",
+    );
+    place.write(
+        "slab.nrrd",
+        &inches.replace("(-11.5,-11.5,-9.5)", "(-0.452755905511811,-0.3740157480314961,0.452755905511811)"),
+    );
+    let placed = ["--scale", "25.4", "--axis", "1,0,0", "--angle", "90", "--translation", "0,0,0.5"];
+    let line = ["import", "slab.nrrd", "--entry", "0.3,0.2,6", "--target", "0.3,0.2,-4", "--scene", "slab.toml"];
+    let answer = place.call(&[&line[..], &placed].concat()).ended(0);
+    assert!(answer.stdout.contains("(-12.0, -12.0, -9.5) to (12.0, 12.0, 0.5) mm RAS"), "{}", answer.all());
+    let text = std::fs::read_to_string(place.path("slab.toml")).unwrap();
+    let table = "transform = { scale = 25.4, axis = [1, 0, 0], angle_deg = 90, translation_mm = [0, 0, 0.5] }";
+    assert!(text.contains(table), "{text}");
+    place.call(&["check", "slab.toml"]).ended(0);
+    let mirrored = ["import", "slab.nrrd", "--scale=-1"];
+    place.call(&mirrored).refused().says("--scale: a factor of -1 mirrors the tissue").says("turn it by 180 degrees");
+    place.call(&["import", "slab.nrrd", "--angle", "5"]).refused().says("no axis");
+    place.call(&["import", "slab.nrrd", "--axis", "1,2", "--angle", "5"]).refused().says("three numbers");
+}
+
+#[test]
 fn names_from_elsewhere_are_numbers_in_the_scene() {
     let place = Place::new();
     let without: String =

@@ -269,3 +269,40 @@ fn abaqus_files_in_several_parts() {
     std::fs::remove_file(place.path().join("nodes.inp")).unwrap();
     assert_contains(&read_main().unwrap_err().to_string(), &["main.inp:", "INPUT=nodes.inp: cannot be read"]);
 }
+
+/// A surface is the set of the nodes of its sides; what the writing program made for it is no region.
+#[test]
+fn abaqus_surfaces_are_sets() {
+    let text = |surfaces: &str| {
+        format!(
+            "*NODE\n1, 0, 0, 0\n2, 10, 0, 0\n3, 0, 10, 0\n4, 0, 0, 10\n5, 10, 10, 10\n*ELEMENT, TYPE=C3D4, ELSET=all\n1, 1, 2, 3, 4\n\
+             2, 2, 3, 4, 5\n*NSET, NSET=bone\n1, 2\n*ELSET, ELSET=_top_S1, INTERNAL\n1\n{surfaces}"
+        )
+    };
+    let read = parse_text(
+        "a.inp",
+        &text(
+            "*SURFACE, TYPE=ELEMENT, NAME=top\n_top_S1, S1\n*SURFACE, NAME=\"back\"\npart-1.2, s3\n*SURFACE, TYPE=NODE, NAME=pins\nbone,\n\
+             5, 1.0\n*SURFACE, TYPE=CUTTING SURFACE, NAME=cut\n1, 0, 0\n",
+        ),
+    )
+    .unwrap_or_else(|error| panic!("{error}"));
+    let nodes_of = |set: &str| {
+        let mut found: Vec<[i64; 3]> = read.mesh.node_sets[set]
+            .iter()
+            .map(|n| read.mesh.positions[*n as usize].to_array().map(|x| (x * 1e3).round() as i64))
+            .collect();
+        found.sort_unstable();
+        found
+    };
+    assert_eq!(nodes_of("top"), [[0, 0, 0], [0, 10, 0], [10, 0, 0]]);
+    assert_eq!(nodes_of("back"), [[0, 0, 10], [0, 10, 0], [10, 10, 10]]);
+    assert_eq!(nodes_of("pins"), [[0, 0, 0], [10, 0, 0], [10, 10, 10]]);
+    assert_eq!(read.mesh.regions, ["all"]);
+    assert_eq!(read.mesh.surface_of(Some("top")).unwrap().len(), 1);
+    assert!(read.notices.iter().any(|notice| notice.contains("Surface `cut` names no sides")), "{:?}", read.notices);
+    assert_contains(
+        &refusal("b.inp", text("*SURFACE, NAME=top\nnone, S1\n").as_bytes()),
+        &["b.inp:", "surface top names a set or element that is not in the file", "correct the surface"],
+    );
+}

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use stylet::mesh::Placement;
 use stylet::mesh::import::{ImportOptions, Imported, LengthUnit, parse, read, read_with};
 use stylet::mesh::tets::TetMesh;
 
@@ -10,7 +11,8 @@ mod formats;
 mod refusals;
 mod repairs;
 
-const MILLIMETRES: ImportOptions = ImportOptions { unit: LengthUnit::Millimetre, accept_size: false };
+const MILLIMETRES: ImportOptions =
+    ImportOptions { unit: LengthUnit::Millimetre, accept_size: false, placement: Placement::NONE };
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/meshes")

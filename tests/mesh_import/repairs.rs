@@ -96,7 +96,8 @@ fn a_wrong_unit_is_guessed() {
         &message(LengthUnit::Micrometre),
         &["1000 times too small: did you mean unit = \"mm\"?", "accept_size = true"],
     );
-    let accepted = read_with(&path, ImportOptions { unit: LengthUnit::Metre, accept_size: true }).unwrap();
+    let accepted =
+        read_with(&path, ImportOptions { unit: LengthUnit::Metre, accept_size: true, ..MILLIMETRES }).unwrap();
     assert!((total_volume(&accepted.mesh) - 8e3).abs() < 1e-6);
     // A cube of 1e-7 m^3 is small, but tissue.
     let (nodes, tets) = two();

@@ -1,5 +1,6 @@
 //! Tetrahedra with averaged nodal pressure: reference cells, patch, energy, both engines, known reactions, hard meshes.
 
+mod loads;
 mod needle;
 
 use std::collections::BTreeMap;

@@ -12,8 +12,8 @@ use crate::anatomy::surface::check::Report;
 use crate::anatomy::surface::{self, TriangleSurface};
 use crate::anatomy::{self, LabelMap};
 use crate::error::{Error, Result};
-use crate::mesh::TetMesh;
 use crate::mesh::import::{self, ImportOptions, LengthUnit};
+use crate::mesh::{Placement, TetMesh};
 use crate::reading::{self, most};
 use crate::units::four_digits;
 
@@ -37,6 +37,8 @@ pub struct Content {
     what: What,
     /// Whether names of labels come from elsewhere than the file.
     renamed: bool,
+    /// Where it was put.
+    placement: Placement,
     /// Plain sentences on what was found and assumed.
     notices: Vec<String>,
 }
@@ -56,6 +58,8 @@ pub struct Labels {
     pub in_file: bool,
     /// Whether names of labels come from elsewhere than the file, so that a scene must say numbers.
     pub renamed: bool,
+    /// How the file has to be placed to be this map; none of a map that was made from it.
+    pub placement: Placement,
     /// Plain sentences on how it was made.
     pub notices: Vec<String>,
 }
@@ -115,11 +119,16 @@ fn kind_of(head: &[u8]) -> (Kind, &'static str) {
 }
 
 impl Content {
-    /// Reads a file whose coordinates, where it states no unit, are in `unit`; `names` go before those of a label map.
+    /// Reads a file whose coordinates, where it states no unit, are in `unit`, and places it; `names` go before those of a label map.
     ///
     /// # Errors
     /// Where it cannot be read or is of no kind that is read here.
-    pub fn read(file: &Path, unit: LengthUnit, names: Option<BTreeMap<u16, String>>) -> Result<Content> {
+    pub fn read(
+        file: &Path,
+        unit: LengthUnit,
+        placement: &Placement,
+        names: Option<BTreeMap<u16, String>>,
+    ) -> Result<Content> {
         let unread = |unread: reading::Unread| unread.of(file, "check the name, and that you may read the file");
         let head = reading::head(file, most::VOLUME, HEAD).map_err(unread)?;
         let (kind, title) = kind_of(&head);
@@ -137,7 +146,7 @@ impl Content {
                 notices.extend(read.notices);
                 read.map.names.extend(names.unwrap_or_default());
                 renamed |= name_by_file(&mut read.map, file, &mut notices);
-                What::Labels(Arc::new(read.map))
+                What::Labels(Arc::new(read.map.placed(placement)))
             }
             Kind::Surface => {
                 notices.push(format!("Coordinates are taken in {unit} (--unit)."));
@@ -153,11 +162,13 @@ impl Content {
                 if let [only] = surfaces.as_mut_slice() {
                     name_as_file(only, file, &mut notices);
                 }
-                What::Surfaces(surfaces.into_iter().map(|surface| checked(surface, is_lps, &mut notices)).collect())
+                let place = |surface| checked(surface, is_lps, placement, &mut notices);
+                What::Surfaces(surfaces.into_iter().map(place).collect())
             }
             Kind::Mesh => {
                 notices.push(format!("Coordinates are taken in {unit} (--unit), and as RAS."));
-                let mut read = import::read_with(file, ImportOptions { unit, accept_size: true })?;
+                let mut read =
+                    import::read_with(file, ImportOptions { unit, accept_size: true, placement: *placement })?;
                 notices.extend(read.notices);
                 if let [only] = read.mesh.regions.as_mut_slice()
                     && only.starts_with("region-")
@@ -169,7 +180,10 @@ impl Content {
                 What::Mesh(read.mesh)
             }
         };
-        let mut content = Content { file: file.to_path_buf(), title, what, renamed, notices };
+        if !placement.is_none() {
+            notices.push(format!("It was {}; all places are behind that.", placement.text()));
+        }
+        let mut content = Content { file: file.to_path_buf(), title, what, renamed, placement: *placement, notices };
         content.notice_size();
         Ok(content)
     }
@@ -220,7 +234,8 @@ impl Content {
     /// Where that is too large.
     pub fn labels(&self, voxel: Option<f64>) -> Result<Labels> {
         if let What::Labels(map) = &self.what {
-            return Ok(Labels { map: map.clone(), in_file: true, renamed: self.renamed, notices: Vec::new() });
+            let (map, notices) = (map.clone(), Vec::new());
+            return Ok(Labels { map, in_file: true, renamed: self.renamed, placement: self.placement, notices });
         }
         let size = self.bounds().map_or(0.0, |(low, high)| (high - low).max_element());
         // Steps of 0.05 mm.
@@ -237,7 +252,7 @@ impl Content {
         };
         let [i, j, k] = map.size;
         notices.insert(0, format!("{i} x {j} x {k} voxels of {} mm (--voxel).", four_digits(edge * 1e3)));
-        Ok(Labels { map: Arc::new(map), in_file: false, renamed: false, notices })
+        Ok(Labels { map: Arc::new(map), in_file: false, renamed: false, placement: Placement::NONE, notices })
     }
 }
 
@@ -278,12 +293,18 @@ fn name_as_file(only: &mut TriangleSurface, file: &Path, notices: &mut Vec<Strin
     }
 }
 
-/// A surface looked over, in RAS.
-fn checked(mut surface: TriangleSurface, is_lps: bool, notices: &mut Vec<String>) -> (TriangleSurface, Report) {
+/// A surface looked over, in RAS and where it is put.
+fn checked(
+    mut surface: TriangleSurface,
+    is_lps: bool,
+    placement: &Placement,
+    notices: &mut Vec<String>,
+) -> (TriangleSurface, Report) {
     if is_lps {
         // Two axes turned: a rotation, so triangles stay counterclockwise.
         surface.points.iter_mut().for_each(|x| *x = DVec3::new(-x.x, -x.y, x.z));
     }
+    surface.points.iter_mut().for_each(|x| *x = placement.point(*x));
     let report = surface::check::check(&mut surface);
     notices.extend(report.notices.iter().cloned());
     (surface, report)

@@ -8,6 +8,7 @@ mod line;
 mod materials;
 pub(crate) mod names;
 mod picture;
+mod placed;
 mod scene;
 mod text;
 mod voxels;
@@ -22,6 +23,7 @@ use self::line::Line;
 use super::SceneArgs;
 use super::run::{self, RunArgs};
 use crate::error::{Error, Result};
+use crate::mesh::Placement;
 use crate::mesh::import::LengthUnit;
 use crate::scene::{closest, needles};
 use crate::simulation::EngineChoice;
@@ -45,6 +47,18 @@ pub struct ImportArgs {
     /// Unit of length of a surface or a mesh: m, cm, mm, um or inch
     #[arg(long, default_value = "mm")]
     pub unit: String,
+    /// Factor on all coordinates of the file, about their origin [default: 1]
+    #[arg(long, value_name = "FACTOR", allow_hyphen_values = true)]
+    pub scale: Option<f64>,
+    /// Axis through the origin that it is turned about then, with --angle
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub axis: Option<String>,
+    /// Angle of that turn, right-handed [deg]
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    pub angle: Option<f64>,
+    /// Way that it is moved at last [mm]; entry and target are places behind all that
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub translation: Option<String>,
     /// Edge of the voxels that surfaces and meshes become [mm] [default: 1/200 of their size, 0.3 to 2]
     #[arg(long, value_name = "MM")]
     pub voxel: Option<f64>,
@@ -78,6 +92,7 @@ pub struct ImportArgs {
 pub fn execute(args: &ImportArgs, start: Instant) -> Result<u8> {
     check_gauge(&args.gauge)?;
     let unit: LengthUnit = args.unit.parse()?;
+    let placement = placed::asked(args)?;
     let voxel = args.voxel.map(checked_voxel).transpose()?;
     let line = Line::asked(args.entry.as_deref(), args.target.as_deref(), args.markups.as_deref())?;
     let wants_scene = args.run || args.scene.is_some();
@@ -89,7 +104,7 @@ pub fn execute(args: &ImportArgs, start: Instant) -> Result<u8> {
     }
     let scene_file = wants_scene.then(|| scene_file(args)).transpose()?;
     let names = args.names.as_deref().map(names::read).transpose()?;
-    let content = Content::read(&args.file, unit, names)?;
+    let content = Content::read(&args.file, unit, &placement, names)?;
     crate::println!("{}", content.text().trim_end());
     if line.is_none() && args.picture.is_none() {
         return Ok(0);
@@ -130,7 +145,7 @@ pub fn execute(args: &ImportArgs, start: Instant) -> Result<u8> {
 /// # Errors
 /// Where it cannot be read or is of no kind that is read here.
 pub fn told(file: &Path) -> Result<String> {
-    Ok(Content::read(file, "mm".parse()?, None)?.text())
+    Ok(Content::read(file, "mm".parse()?, &Placement::NONE, None)?.text())
 }
 
 fn check_gauge(gauge: &str) -> Result<()> {

@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::content::{Labels, utf8};
 use super::line::Course;
 use super::materials::{self, FALLBACK, Kind, Matched};
+use super::placed;
 use super::text;
 use crate::anatomy::write_nrrd;
 use crate::error::{Error, Result};
@@ -84,7 +85,10 @@ pub fn write(path: &Path, file: &Path, labels: &Labels, course: &Course, gauge: 
             PathBuf::from(name)
         }
     };
-    whole_file::write(path, scene(&utf8(&map)?, file, course, gauge, labels.renamed).as_bytes())
+    whole_file::write(
+        path,
+        scene((&utf8(&map)?, &placed::line(&labels.placement)), file, course, gauge, labels.renamed).as_bytes(),
+    )
 }
 
 /// The path of a file from the folder of the scene: relative where it lies there or below, else from the root.
@@ -99,8 +103,8 @@ fn relative(file: &Path, scene: &Path) -> PathBuf {
     file.strip_prefix(&folder).map(Path::to_path_buf).unwrap_or(file)
 }
 
-/// Text of the scene; `by_number`: the map does not have the names of its labels.
-fn scene(map: &str, file: &Path, course: &Course, gauge: &str, by_number: bool) -> String {
+/// Text of the scene; `map`: the file and the line that places it, `by_number`: it does not have the names of its labels.
+fn scene((map, transform): (&str, &str), file: &Path, course: &Course, gauge: &str, by_number: bool) -> String {
     let needle = needles::needle(gauge).map_or(MUSCLE.3, |needle| needle.outer_diameter);
     let path = course.length;
     let title = format!("needle to a target in {}", stem(file));
@@ -113,7 +117,7 @@ fn scene(map: &str, file: &Path, course: &Course, gauge: &str, by_number: bool) 
          title = {}\n\
          effects = [\"puncture\", \"friction\", \"mass_scaling\"]\n\n\
          [tissue]\n\
-         labels = {}\n\
+         labels = {}\n{transform}\
          # Forces are better with half the diameter of the needle, {:.1}, and take much longer.\n\
          cell_size_mm = {cell}\n",
         quoted(&title),

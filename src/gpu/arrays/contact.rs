@@ -90,7 +90,7 @@ fn contact_nodes(model: &Model, layout: &Layout) -> Vec<ContactNode> {
                 None => [[0; 4]; 2],
             };
             ContactNode {
-                rest: vec4(model.mesh.rest_position(node)),
+                rest: vec4(c.place(&model.mesh)),
                 grid: [i, j, k, 0],
                 surface: match c.surface {
                     ContactSurface::OpenedPath => [0.0; 4],

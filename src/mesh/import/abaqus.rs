@@ -31,6 +31,7 @@ pub(super) fn read(name: &str, bytes: &[u8], pieces: Vec<Piece>) -> Result<RawMe
         other_elements: HashSet::new(),
         element_sets: Sets::default(),
         node_sets: Sets::default(),
+        surfaces: Vec::new(),
         parts: 0,
         instances: 0,
     };
@@ -40,6 +41,7 @@ pub(super) fn read(name: &str, bytes: &[u8], pieces: Vec<Piece>) -> Result<RawMe
     file.raw.refuse_other_volumes()?;
     file.add_regions()?;
     file.add_node_sets()?;
+    file.add_surfaces()?;
     Ok(file.raw)
 }
 
@@ -54,6 +56,7 @@ struct AbaqusFile<'a> {
     other_elements: HashSet<u64>,
     element_sets: Sets,
     node_sets: Sets,
+    surfaces: Vec<Surface>,
     parts: u32,
     instances: u32,
 }
@@ -67,6 +70,17 @@ struct Element {
     at: usize,
 }
 
+/// A surface: sides of elements, or nodes.
+struct Surface {
+    name: String,
+    of: SetKind,
+    /// Where a line stands, an element, a node or a set of them, and which side of the elements.
+    lines: Vec<(usize, Members, Option<usize>)>,
+}
+
+/// Corners of the sides S1 to S4 of a tetrahedron.
+const SIDES: [[usize; 3]; 4] = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+
 /// Sets in the order in which they are listed last, by their name in capitals.
 #[derive(Default)]
 struct Sets {
@@ -79,6 +93,8 @@ struct Set {
     name: String,
     /// Rank of the last keyword that names the set.
     listed: usize,
+    /// Made by the program that wrote the file.
+    is_internal: bool,
     members: Vec<Member>,
 }
 
@@ -98,8 +114,12 @@ impl Sets {
     fn open(&mut self, name: &str) -> &mut Set {
         self.listed += 1;
         let key = name.to_uppercase();
-        let set =
-            self.sets.entry(key).or_insert_with(|| Set { name: name.to_string(), listed: 0, members: Vec::new() });
+        let set = self.sets.entry(key).or_insert_with(|| Set {
+            name: name.to_string(),
+            listed: 0,
+            is_internal: false,
+            members: Vec::new(),
+        });
         set.listed = self.listed;
         set
     }
@@ -255,6 +275,7 @@ impl AbaqusFile<'_> {
                 "ELEMENT" => self.elements(&keyword)?,
                 "ELSET" => self.set(&keyword, SetKind::Elements)?,
                 "NSET" => self.set(&keyword, SetKind::Nodes)?,
+                "SURFACE" => self.surface(&keyword),
                 "INCLUDE" => {
                     return Err(self.source.fail(
                         at,
@@ -460,7 +481,81 @@ impl AbaqusFile<'_> {
             }
         }
         let sets = if kind == SetKind::Elements { &mut self.element_sets } else { &mut self.node_sets };
-        sets.open(name).members.extend(members);
+        let set = sets.open(name);
+        set.members.extend(members);
+        set.is_internal |= keyword.parameter("INTERNAL").is_some();
+        Ok(())
+    }
+
+    /// Keeps a surface of sides of elements (S1 to S4) or of nodes; one of another kind is told and left out.
+    fn surface(&mut self, keyword: &Keyword) {
+        let name = keyword.parameter("NAME").unwrap_or_default().to_string();
+        let of = match keyword.parameter("TYPE").map(str::to_uppercase).as_deref() {
+            None | Some("ELEMENT") => SetKind::Elements,
+            Some("NODE") => SetKind::Nodes,
+            Some(_) => return self.left_out(&name),
+        };
+        let mut lines = Vec::new();
+        while let Some((at, line)) = self.next_data() {
+            let fields = fields(&line);
+            let label = fields[0].rsplit('.').next().unwrap_or_default().trim_matches('"');
+            let what = label.parse().map_or_else(|_| Members::Set(label.to_uppercase()), Members::Id);
+            let side = fields
+                .get(1)
+                .and_then(|side| ["S1", "S2", "S3", "S4"].iter().position(|s| side.eq_ignore_ascii_case(s)));
+            if label.is_empty() || of == SetKind::Elements && side.is_none() {
+                return self.left_out(&name);
+            }
+            lines.push((at, what, side));
+        }
+        if !name.is_empty() && !lines.is_empty() {
+            self.surfaces.push(Surface { name, of, lines });
+        }
+    }
+
+    fn left_out(&mut self, name: &str) {
+        self.raw
+            .notices
+            .push(format!("Surface `{name}` names no sides S1 to S4 of elements and no nodes; it is left out."));
+    }
+
+    /// Surfaces as sets of their nodes.
+    fn add_surfaces(&mut self) -> Result<()> {
+        let nodes: BTreeSet<u64> = self.raw.nodes.iter().map(|n| n.id).collect();
+        let mut elements: BTreeSet<u64> = self.elements.iter().map(|e| e.id).collect();
+        elements.extend(&self.other_elements);
+        let mut left = MOST_SETS * (nodes.len() + elements.len() + FEW);
+        for surface in std::mem::take(&mut self.surfaces) {
+            let (sets, known, word) = match surface.of {
+                SetKind::Elements => (&self.element_sets, &elements, "element"),
+                SetKind::Nodes => (&self.node_sets, &nodes, "node"),
+            };
+            let mut found: Vec<u32> = Vec::new();
+            for (at, what, side) in &surface.lines {
+                let ids = match what {
+                    Members::Set(key) if sets.sets.contains_key(key) => {
+                        sets.resolve(&self.source, key, known, word, &mut left)?
+                    }
+                    Members::Id(id) if known.contains(id) => BTreeSet::from([*id]),
+                    _ => {
+                        return Err(self.source.fail(
+                            *at,
+                            format!("surface {} names a set or {word} that is not in the file", surface.name),
+                            "correct the surface or write the input file again",
+                        ));
+                    }
+                };
+                match side.filter(|_| surface.of == SetKind::Elements) {
+                    None => found.extend(ids.iter().map(|id| self.node_index[id])),
+                    Some(side) => {
+                        let tets = ids.iter().filter_map(|id| self.element_index.get(id));
+                        let corners = tets.flat_map(|tet| SIDES[side].map(|corner| self.elements[*tet].nodes[corner]));
+                        found.extend(corners.map(|id| self.node_index[&id]));
+                    }
+                }
+            }
+            self.raw.node_sets.entry(surface.name).or_default().extend(found);
+        }
         Ok(())
     }
 
@@ -478,7 +573,13 @@ impl AbaqusFile<'_> {
     fn add_regions(&mut self) -> Result<()> {
         let mut known: BTreeSet<u64> = self.elements.iter().map(|e| e.id).collect();
         known.extend(&self.other_elements);
-        let mut order: Vec<(&String, &Set)> = self.element_sets.sets.iter().collect();
+        // Sets that the writing program made for a surface are no tissue of their own.
+        let of_surfaces: HashSet<&String> = (self.surfaces.iter().flat_map(|surface| &surface.lines))
+            .filter_map(|(_, what, _)| if let Members::Set(key) = what { Some(key) } else { None })
+            .collect();
+        let is_region = |key: &String, set: &Set| !(set.is_internal && of_surfaces.contains(key));
+        let mut order: Vec<(&String, &Set)> =
+            self.element_sets.sets.iter().filter(|(key, set)| is_region(key, set)).collect();
         order.sort_by_key(|(_, set)| set.listed);
         let mut left = MOST_SETS * (known.len() + FEW);
         let mut shared = 0;

@@ -18,6 +18,7 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
+use super::placement::Placement;
 use super::tets::TetMesh;
 use crate::reading::{self, Unread};
 use crate::{Error, Result};
@@ -31,12 +32,14 @@ pub struct Imported {
 }
 
 /// How a file is to be understood.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImportOptions {
     /// Unit of the coordinates in the file; none of the formats states one.
     pub unit: LengthUnit,
     /// Accept a mesh outside 1 mm .. 1 m, which is otherwise taken for a wrong unit.
     pub accept_size: bool,
+    /// Where the mesh is put, behind its unit.
+    pub placement: Placement,
 }
 
 /// Unit of the coordinates of a file.
@@ -103,7 +106,7 @@ impl FromStr for LengthUnit {
 
 /// Reads a mesh file; a mesh outside 1 mm .. 1 m is refused.
 pub fn read(path: &Path, unit: LengthUnit) -> Result<Imported> {
-    read_with(path, ImportOptions { unit, accept_size: false })
+    read_with(path, ImportOptions { unit, accept_size: false, placement: Placement::NONE })
 }
 
 /// Reads a mesh file.

@@ -1,7 +1,7 @@
 //! Checks behind the reader, and the canonical form of a mesh. Whatever is changed is counted in a notice; what would
 //! change the tissue is an error.
 //!
-//! 1. nodes of no tetrahedron are dropped, the unit is applied, the size is checked
+//! 1. nodes of no tetrahedron are dropped, unit and placement are applied, the size is checked
 //! 2. nodes at the same place become one
 //! 3. flat tetrahedra are refused, inverted ones turned, overlapping ones refused
 //! 4. nodes and tetrahedra are sorted along a Morton curve, regions numbered as they appear there
@@ -113,14 +113,15 @@ fn bounds(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }
 
-/// Converts to metres and checks the size; returns the diagonal of the bounding box [m].
+/// Converts to metres, places the mesh and checks the size; returns the diagonal of the bounding box [m].
 fn apply_unit(raw: &mut RawMesh, options: ImportOptions) -> Result<f64> {
     let in_file = bounds(raw.nodes.iter().map(|n| n.position));
     let length_in_file = (in_file.1 - in_file.0).length();
     let unit = options.unit;
     for node in &mut raw.nodes {
         // Adding zero turns -0 into 0, so that equal coordinates are equal bits.
-        node.position = DVec3::from_array(node.position.to_array().map(|x| unit.to_metres(x) + 0.0));
+        let metres = DVec3::from_array(node.position.to_array().map(|x| unit.to_metres(x)));
+        node.position = options.placement.point(metres) + DVec3::ZERO;
     }
     let (low, high) = bounds(raw.nodes.iter().map(|n| n.position));
     let diagonal = (high - low).length();
@@ -134,16 +135,19 @@ fn apply_unit(raw: &mut RawMesh, options: ImportOptions) -> Result<f64> {
     if options.accept_size || fits(diagonal) {
         return Ok(diagonal);
     }
-    let distance = |other: LengthUnit| (other.to_metres(length_in_file) / USUAL_SIZE).ln().abs();
+    let scale = options.placement.scale;
+    let across = |other: LengthUnit| scale * other.to_metres(length_in_file);
+    let distance = |other: LengthUnit| (across(other) / USUAL_SIZE).ln().abs();
     // Inches are rare in anatomy: a guess is metric.
     let meant = LengthUnit::ALL
         .into_iter()
-        .filter(|other| *other != LengthUnit::Inch && fits(other.to_metres(length_in_file)))
+        .filter(|other| *other != LengthUnit::Inch && fits(across(*other)))
         .min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
-    let message = format!("{}: the mesh is {} across when its unit is {unit}", raw.name, readable(diagonal));
+    let scaled = if scale == 1.0 { String::new() } else { format!(" and its scale {scale}") };
+    let message = format!("{}: the mesh is {} across when its unit is {unit}{scaled}", raw.name, readable(diagonal));
     Err(match meant {
         Some(meant) => {
-            let factor = diagonal / meant.to_metres(length_in_file);
+            let factor = diagonal / across(meant);
             let (factor, direction) = if factor > 1.0 { (factor, "large") } else { (1.0 / factor, "small") };
             let factor = if factor < 10.0 { format!("{factor:.1}") } else { format!("{factor:.0}") };
             Error::input(

@@ -8,7 +8,7 @@ use super::super::file::{LabelEntry, MotionTable, SceneFile, TissueTable};
 use super::{Check, MM, Within};
 use crate::Error;
 use crate::anatomy::{self, Case, Frame, LabelMap, markups, surface};
-use crate::mesh::Tissue;
+use crate::mesh::{Placement, Tissue};
 use crate::units::four_digits;
 
 /// Width of the block where the scene states none [m].
@@ -39,10 +39,12 @@ impl Check<'_> {
     /// The label map of a scene; sets size and height of the block. `None` after a reported problem.
     pub(super) fn case(&mut self, file: &SceneFile, tissue: &mut Tissue) -> Option<PlacedCase> {
         let table = &file.tissue;
+        let placement = self.placement(table);
         let mut map = match &table.labels {
-            Some(name) => self.read_labels(name, table)?,
-            None => self.read_surfaces(table, tissue.cell_size)?,
+            Some(name) => self.read_labels(name, table)?.placed(&placement),
+            None => self.read_surfaces(table, &placement, tissue.cell_size)?,
         };
+        self.tell_placement(&placement, map.bounds());
         if let Some(outside) = &table.outside {
             let labels = self.labels_of("tissue.outside", outside.list(), &map);
             map.labels.iter_mut().filter(|label| labels.contains(label)).for_each(|label| *label = 0);
@@ -92,7 +94,7 @@ impl Check<'_> {
     }
 
     /// Closed surfaces as a label map: voxels of a quarter of a cell, so that cells that a surface cuts are filled right.
-    fn read_surfaces(&mut self, table: &TissueTable, cell_size: f64) -> Option<LabelMap> {
+    fn read_surfaces(&mut self, table: &TissueTable, placement: &Placement, cell_size: f64) -> Option<LabelMap> {
         if table.mesh.is_some() {
             self.problems.report(
                 "tissue.mesh",
@@ -117,6 +119,7 @@ impl Check<'_> {
             }
         }
         for surface in &mut surfaces {
+            surface.points.iter_mut().for_each(|x| *x = placement.point(*x));
             self.notices.extend(surface::check::check(surface).notices);
         }
         match surface::voxels::label_map(&surfaces, VOXELS_PER_CELL * cell_size, cell_size) {

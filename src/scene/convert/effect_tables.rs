@@ -117,14 +117,10 @@ impl Check<'_> {
 
     /// What does not act in a label map, or before bone, yet.
     pub(super) fn case_limits(&mut self, effects: &EffectSet, motion: &Motion, in_case: bool, regions: &[Region]) {
-        let without = [
-            ("effects", effects.cohesive.is_some(), "the effect cohesive"),
-            ("effects", effects.indentation.is_some(), "the effect indentation"),
-        ];
-        for (at, _, what) in without.into_iter().filter(|(_, there, _)| in_case && *there) {
+        if in_case && effects.cohesive.is_some() {
             self.problems.report(
-                at,
-                format!("{what} does not act in a label map yet"),
+                "effects",
+                "the effect cohesive does not act in a label map yet",
                 "not in the tissue of a patient",
                 "leave it out: a needle on a straight or a free path serves",
             );

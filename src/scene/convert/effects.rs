@@ -1,6 +1,5 @@
 //! The effects of a scene: which are on, what they need around them.
 
-use super::super::FaceCondition;
 use super::super::file::*;
 use super::{Check, Within, parameters};
 use crate::effects::mass_scaling::Loading;
@@ -32,7 +31,7 @@ impl Check<'_> {
         own: &[&'static OwnEffect],
         tool: &Option<Tool>,
         motion: &Motion,
-        (faces, size): (&[FaceCondition; 6], glam::DVec3),
+        loading: &Loading,
         material: &TissueMaterial,
     ) -> EffectSet {
         let list = Listed(&file.effects);
@@ -75,9 +74,7 @@ impl Check<'_> {
             Some(MassScalingEntry::Factor(factor)) => {
                 self.number("solver.mass_scaling", factor, Within::Between(1.0, 1e8))
             }
-            _ if list.has("mass_scaling") => {
-                self.automatic_mass_scaling(&Loading::of(Some(motion), faces, size), material)
-            }
+            _ if list.has("mass_scaling") => self.automatic_mass_scaling(loading, material),
             _ => 1.0,
         };
         self.own_tables("", file.own_tables());
@@ -191,7 +188,7 @@ impl Check<'_> {
             );
         }
         if of_mesh {
-            for key in ["indentation", "cohesive", "flexible_needle"] {
+            for key in ["cohesive", "flexible_needle"] {
                 if list.has(key) {
                     self.needs_block(&list.place(key), &format!("effect `{key}`"));
                 }

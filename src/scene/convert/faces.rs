@@ -9,16 +9,13 @@ use crate::mesh::TetMesh;
 use crate::units::four_digits;
 
 impl Check<'_> {
-    /// Conditions of the six faces; those of a mesh are the sides of its bounding box and free unless written.
-    pub(super) fn faces(&mut self, table: &BoundariesTable, of_mesh: bool) -> [FaceCondition; 6] {
+    /// Conditions of the six faces, those of a mesh on the sides of its bounding box; `by_words`: what they are unless written.
+    pub(super) fn faces(&mut self, table: &BoundariesTable, by_words: [FaceKind; 6]) -> [FaceCondition; 6] {
         let entries = [&table.x_min, &table.x_max, &table.y_min, &table.y_max, &table.z_min, &table.z_max];
-        let conditions = Face::ALL.map(|face| {
-            let default = if of_mesh || face == Face::ZMax { FaceKind::Free } else { FaceKind::Fixed };
-            match entries[face as usize] {
-                None => face_of_kind(face, default),
-                Some(FaceEntry::Kind(kind)) => face_of_kind(face, *kind),
-                Some(FaceEntry::Table(table)) => self.face(face, table),
-            }
+        let conditions = Face::ALL.map(|face| match entries[face as usize] {
+            None => face_of_kind(face, by_words[face as usize]),
+            Some(FaceEntry::Kind(kind)) => face_of_kind(face, *kind),
+            Some(FaceEntry::Table(table)) => self.face(face, table),
         });
         self.one_ramp(&conditions);
         conditions

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::super::Support;
 use super::super::file::{SceneFile, TissueTable};
-use super::super::{FaceCondition, Support};
 use super::Check;
 use crate::Error;
 use crate::mesh::TetMesh;
@@ -29,6 +29,12 @@ fn list<'a>(what: &str, counts: impl Iterator<Item = (&'a str, usize)>, unit: &s
 pub fn list_tags(mesh: &TetMesh) -> String {
     let count = |tag: usize| mesh.tags.iter().filter(|t| **t as usize == tag).count();
     list("regions", mesh.regions.iter().enumerate().map(|(tag, name)| (name.as_str(), count(tag))), "cells")
+}
+
+/// Its node sets with their counts of nodes.
+pub(super) fn list_sets(mesh: &TetMesh) -> String {
+    let sets = mesh.node_sets.iter().map(|(name, nodes)| (name.as_str(), nodes.len()));
+    list("node sets; name a group of faces or nodes in the mesh generator", sets, "nodes")
 }
 
 impl Check<'_> {
@@ -55,10 +61,12 @@ impl Check<'_> {
             }
         }
         let unit = self.unit("mesh", "a mesh file", table)?;
-        let options = ImportOptions { unit, accept_size: table.accept_size.unwrap_or(false) };
+        let placement = self.placement(table);
+        let options = ImportOptions { unit, accept_size: table.accept_size.unwrap_or(false), placement };
         match import::read_with(&self.folder.join(name), options) {
             Ok(imported) => {
                 self.notices.extend(imported.notices);
+                self.tell_placement(&placement, Some(imported.mesh.bounds()));
                 Some(Arc::new(imported.mesh))
             }
             Err(error) => {
@@ -110,12 +118,11 @@ impl Check<'_> {
             } else if let Some(mesh) = mesh
                 && !mesh.node_sets.contains_key(&table.set)
             {
-                let sets = mesh.node_sets.iter().map(|(name, nodes)| (name.as_str(), nodes.len()));
                 self.problems.report(
                     &at("set"),
                     format!("the mesh has no node set called \"{}\"", table.set),
                     "unknown set",
-                    list("node sets; name a group of faces or nodes in the mesh generator", sets, "nodes"),
+                    list_sets(mesh),
                 );
             }
             if table.fixed.is_empty() {
@@ -133,17 +140,6 @@ impl Check<'_> {
             supports.push(Support { set: table.set.clone(), fixed });
         }
         supports
-    }
-
-    /// Tells of a mesh that nothing holds.
-    pub(super) fn floating_mesh(&mut self, supports: &[Support], faces: &[FaceCondition; 6]) {
-        if supports.is_empty() && faces.iter().all(|face| face.fixed == [false; 3]) {
-            self.notices.push(
-                "Nothing holds the mesh, so it floats; add [[support]] with a node set, or fix a face of the \
-                 bounding box, e.g. boundaries.z_min = \"fixed\"."
-                    .into(),
-            );
-        }
     }
 
     /// Refuses on a mesh what acts on the structured block only.

@@ -14,6 +14,8 @@ use crate::units::four_digits;
 const MOST_GRAZING: f64 = 80.0;
 /// Distance of the entry point from the surface that is told [m].
 const TOLD: f64 = 0.5 * MM;
+/// Radius of an indenter in edges of the mesh below which it is told that it may pass between nodes.
+const NARROW: f64 = 2.0;
 /// Largest coordinate of a point of a mesh [mm].
 const FARTHEST: f64 = 10_000.0;
 
@@ -237,6 +239,17 @@ impl Check<'_> {
 
     /// The path stays in the mesh to its end, with room around it.
     fn path_in_mesh(&mut self, mesh: &TetMesh, tool: Option<&Tool>, motion: &Motion) {
+        if let Some(Tool::Sphere { radius } | Tool::FlatPunch { radius, .. }) = tool {
+            let (_, edge) = super::mesh::extent(mesh);
+            if *radius < NARROW * edge {
+                self.notices.push(format!(
+                    "The tool is {} mm in radius and an edge of the mesh is {} mm long: it touches nodes alone and may pass between \
+                     them; use a wider tool or a finer mesh.",
+                    four_digits(radius / MM),
+                    four_digits(edge / MM)
+                ));
+            }
+        }
         let Some(Tool::Needle(_)) = tool else { return };
         let Ok(way) = TetPath::new(mesh, motion.entry, motion.direction, &lines_of(tool, motion.direction)) else {
             return;

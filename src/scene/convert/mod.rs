@@ -9,6 +9,7 @@ mod effects;
 mod faces;
 mod frames;
 pub(super) mod library;
+mod loads;
 mod material;
 mod mesh;
 mod mesh_path;
@@ -16,7 +17,9 @@ mod missing;
 mod outputs;
 mod own;
 pub(super) mod parameters;
+mod placement;
 mod regions;
+mod supports;
 mod targets;
 mod task;
 mod tool;
@@ -27,6 +30,7 @@ use glam::DVec3;
 
 use own::OwnNumbers;
 use parameters::OwnTables;
+use supports::Held;
 
 use missing::{refusal, unreadable};
 
@@ -36,6 +40,7 @@ use super::file::*;
 use super::*;
 use crate::anatomy::Case;
 use crate::effects::SELF_CONTAINED;
+use crate::effects::mass_scaling::Loading;
 use crate::effects::own::OwnEffect;
 use crate::effects::parameters::Table;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
@@ -143,10 +148,24 @@ impl Check<'_> {
         let (mut material, preset) = self.material("material", &file.material, tissue.cell_size);
         let (mut regions, region_presets) = self.regions(file, &tissue, (mesh.as_deref(), case.as_ref()));
         let supports = self.supports(file, mesh.as_deref());
-        let faces = self.faces(&file.boundaries, file.tissue.mesh.is_some());
         let tool = self.tool(file);
         let motion = self.motion(file, tool.as_ref(), mesh.as_deref());
-        let mut effects = self.effects(file, own, &tool, &motion, (&faces, tissue.size), &material);
+        let by_words = self.faces_by_words(&file.tissue, &motion);
+        let faces = self.faces(&file.boundaries, by_words);
+        let held = Held {
+            regions: &regions,
+            supports: &supports,
+            faces: &faces,
+            motion: &motion,
+            tissue: &tissue,
+            mesh: mesh.as_deref(),
+            case: case.as_deref(),
+        };
+        let skin_free = self.skin_free(file, &held);
+        self.floating(&file.tissue, &held, skin_free);
+        let loads = self.loads(file, mesh.as_deref(), &supports, &faces);
+        let loading = Loading::of(Some(&motion), &faces, tissue.size).with_loads(&loads, tissue.size);
+        let mut effects = self.effects(file, own, &tool, &motion, &loading, &material);
         effects.own = self.own_effects(file, own);
         self.own_numbers_of_regions(file, &effects, &mut regions);
         parameters::settle(
@@ -195,14 +214,6 @@ impl Check<'_> {
             None => Mesh::Block(BlockMesh::for_tissue(&tissue, tool.as_ref().map(|_| &motion))),
         };
         self.cells(&cells, &material, &regions, &tissue, &effects);
-        if mesh.is_some() {
-            self.floating_mesh(&supports, &faces);
-        } else if tool.is_some() && faces.iter().all(|face| face.fixed == [false; 3]) {
-            self.notices.push(
-                "No face of the block is fixed, so the tool pushes it away; set e.g. boundaries.z_min = \"fixed\"."
-                    .into(),
-            );
-        }
         let scene = Scene {
             title: file.title.clone().unwrap_or_else(|| name.replace('_', " ")),
             name,
@@ -213,6 +224,8 @@ impl Check<'_> {
             mesh,
             case,
             supports,
+            loads,
+            skin_free,
             faces,
             tool,
             motion,
@@ -353,6 +366,7 @@ impl Check<'_> {
             }
             return (tissue, mesh, None);
         }
+        self.no_placement(table);
         for (key, written) in [("unit", table.unit.is_some()), ("accept_size", table.accept_size.is_some())] {
             if written {
                 self.notices.push(format!("`tissue.{key}` has no effect without tissue.mesh."));

@@ -242,9 +242,7 @@ impl Check<'_> {
             );
             return Motion::default();
         }
-        // Other tools are refused on a mesh by their effect.
-        let is_needle = matches!(tool, Some(Tool::Needle(_)));
-        let Entry { entry, direction } = match file.tissue.mesh.is_some() && is_needle {
+        let Entry { entry, direction } = match file.tissue.mesh.is_some() {
             true => match self.mesh_entry(table, mesh, tool) {
                 Some(entry) => entry,
                 None => return Motion { direction: DVec3::NEG_Z, ..Motion::default() },

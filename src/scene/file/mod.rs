@@ -81,12 +81,17 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 15))]
     pub region: Vec<RegionTable>,
-    /// What holds, moves or loads the six faces; default: sides and bottom fixed, top free; all free for a mesh.
+    /// What holds, moves or loads the six faces; default: what `tissue.supports` holds, else sides and bottom fixed, top free; all free for a
+    /// mesh.
     #[serde(default)]
     pub boundaries: BoundariesTable,
     /// Node sets of a mesh that are held.
     #[serde(default)]
     pub support: Vec<SupportTable>,
+    /// Tractions and pressures on sets of a mesh, at most 64.
+    #[serde(default)]
+    #[schemars(length(max = 64))]
+    pub load: Vec<LoadTable>,
     /// A needle with a conical or bevelled tip, rigid without the effect `flexible_needle`. At most one tool per scene.
     pub needle: Option<NeedleTable>,
     /// A rigid sphere. At most one tool per scene.
@@ -151,6 +156,48 @@ pub struct TissueTable {
     /// like the surface in it, and where two overlap the later one counts. `unit` is that of the files.
     #[serde(default)]
     pub surfaces: Vec<String>,
+    /// Where mesh, label map or surfaces are put, for a file in odd units or one that lies on its side; a table, or inline:
+    /// `transform = { scale = 0.1, axis = [1, 0, 0], angle_deg = 90 }`.
+    pub transform: Option<TransformTable>,
+    /// What holds the tissue: "sides" (the four side faces of the block, or of the box around a mesh), "back" (the face that the needle
+    /// points at; of a block the bottom), "bones" (what is `rigid`), "skin" (skin farther than `skin_free_mm` from the path). A face that
+    /// `[boundaries]` names is as it says there. Default: sides, back and bones; of a mesh nothing.
+    #[schemars(extend("uniqueItems" = true))]
+    pub supports: Option<Vec<SupportWord>>,
+    /// Distance from the path, from entry to deepest point, within which skin is free where `supports` lists "skin" [mm]; default 10.
+    pub skin_free_mm: Option<f64>,
+}
+
+/// What may hold the tissue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SupportWord {
+    Sides,
+    Back,
+    Bones,
+    Skin,
+}
+
+impl SupportWord {
+    /// As a scene writes it.
+    pub fn key(self) -> &'static str {
+        ["sides", "back", "bones", "skin"][self as usize]
+    }
+}
+
+/// Where a file of tissue is put: scaled about the origin of its coordinates (of a label map: of the patient, RAS), then turned about an
+/// axis through it, then moved. All other coordinates of the scene are places behind that.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TransformTable {
+    /// Factor on all coordinates, beside `unit`, greater than 0; default 1.
+    pub scale: Option<f64>,
+    /// Axis that the file is turned about, any length; with `angle_deg`.
+    pub axis: Option<[f64; 3]>,
+    /// Angle of the turn, right-handed about `axis` [deg].
+    pub angle_deg: Option<f64>,
+    /// Way that the file is moved at last [mm]; default [0, 0, 0].
+    pub translation_mm: Option<[f64; 3]>,
 }
 
 /// A node set of the mesh that is held.
@@ -161,6 +208,20 @@ pub struct SupportTable {
     pub set: String,
     /// Components held at zero.
     pub fixed: Vec<Axis>,
+}
+
+/// A load on the surface of a mesh: exactly one of traction and pressure. Loads are dead: they act on rest areas and keep their direction.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoadTable {
+    /// Name of a node or surface set in the mesh file: the triangles of the surface with all nodes in it; default: the whole surface.
+    pub set: Option<String>,
+    /// Force per rest area along x, y, z of the mesh [kPa].
+    pub traction_kpa: Option<[f64; 3]>,
+    /// Pressure against the surface at rest, negative for suction [kPa].
+    pub pressure_kpa: Option<f64>,
+    /// Time over which the load grows linearly [s], the same for all loads of the scene; default 0: at once.
+    pub ramp_s: Option<f64>,
 }
 
 /// Conditions on the six faces of a block, or of the bounding box of a mesh.

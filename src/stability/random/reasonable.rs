@@ -45,7 +45,7 @@ pub fn beyond(model: &Model, stable_dt: f64) -> Vec<String> {
     let wave =
         materials.iter().map(|m| (m.law.shear_modulus() / (m.density * scaling)).sqrt()).fold(f64::INFINITY, f64::min);
     let tool = scene.tool.is_some().then_some(&scene.motion);
-    let loading = Loading::of(tool, &scene.faces, scene.tissue.size);
+    let loading = Loading::of(tool, &scene.faces, scene.tissue.size).with_loads(&scene.loads, scene.tissue.size);
     let (mach, passages) = (loading.mach(wave), loading.passages(wave));
     // What a scene is told before it runs, here with its softest material.
     not(mach <= MOST_MACH, format!("moves at {mach:.3} of the scaled shear wave speed"));
