@@ -183,12 +183,14 @@ fn move_tip() {
     let spring = puncture.tip_stiffness / f32(ANCHOR_COUNT);
     var force = 0.0;
     var gap = 0.0;
+    var stretched = 0.0;
     var sway = vec3<f32>(0.0);
     var fx = vec3<f32>(0.0);
     var fy = vec3<f32>(0.0);
     var fz = vec3<f32>(0.0);
     for (var i = 0u; i < ANCHOR_COUNT; i++) {
         force += spring * max(gaps[i], 0.0);
+        stretched += select(0.0, 1.0, gaps[i] > 0.0);
         gap += gaps[i] / f32(ANCHOR_COUNT);
         sway += sways[i] / f32(ANCHOR_COUNT);
         fx += columns_x[i] / f32(ANCHOR_COUNT);
@@ -223,7 +225,8 @@ fn move_tip() {
     let travel = (speed + puncture.needle_radius * length(angular_velocity())) * params.dt;
     let cap = advance_limit(at_surface, travel);
     let slip_cap = MOST_TRAVELS * travel + SLIP_CAP;
-    let advance = clamp((force - threshold) / (puncture.tip_stiffness * stretch), 0.0, cap);
+    let more = max(force - threshold, 0.0);
+    let advance = min(more / (puncture.tip_stiffness * (max(stretched, 1.0) / f32(ANCHOR_COUNT)) * stretch), cap);
     capped = select(NO_CAP, threshold, advance == cap);
     let retreat = clamp((-SLACK - gap) / stretch, 0.0, slip_cap);
     let size = length(sway);

@@ -129,8 +129,10 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         var gap = 0.0;
         var stretch = 0.0;
         var distance = 0.0;
+        var stretched = 0.0;
         for (var i = 0u; i < ANCHOR_COUNT; i++) {
             gap += gaps[i];
+            stretched += select(0.0, 1.0, gaps[i] > 0.0);
             stretch += stretches[i];
             distance += distances[i];
         }
@@ -154,7 +156,9 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
             advance = min(max(long, 0.0) / max(lambda - closing, LEAST_STRETCH), cap);
 #else
             let cap = advance_limit(before == 0.0, speed * params.dt);
-            advance = min(excess / (puncture.tip_stiffness * lambda), cap);
+            // Springs that are not stretched have no force to lose.
+            let tip_stiffness = puncture.tip_stiffness * (stretched / f32(ANCHOR_COUNT));
+            advance = min(excess / (tip_stiffness * lambda), cap);
 #endif
             capped = advance == cap;
         }

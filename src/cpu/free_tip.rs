@@ -216,7 +216,8 @@ impl CpuEngine {
         let travel = (pose.velocity.length() + plan.needle.radius * pose.angular_velocity.length()) * self.dt;
         let cap = advance_limit(tip.coordinate == 0.0, travel);
         let slip_cap = slip_limit(travel);
-        let advance = tip_advance(force, threshold, p.tip_stiffness, stretch, cap);
+        let stretched = springs.anchors.iter().filter(|a| a.0 > 0.0).count() as f64 / ANCHOR_COUNT as f64;
+        let advance = tip_advance(force, threshold, p.tip_stiffness * stretched, stretch, cap);
         let retreat = retreat(springs.mean_gap, stretch, slip_cap);
         let mut slip = pulled_back(f, sway_beyond(springs.sway, force, threshold, p.tip_stiffness));
         if slip.length() > slip_cap {

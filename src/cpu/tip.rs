@@ -161,7 +161,8 @@ impl CpuEngine {
                 }
                 _ => {
                     let cap = advance_limit(a == 0.0, speed * self.dt);
-                    (tip_advance(now.force, threshold, p.tip_stiffness, lambda, cap), cap)
+                    let stretched = anchors.iter().filter(|p| p.gap > 0.0).count() as f64 / count;
+                    (tip_advance(now.force, threshold, p.tip_stiffness * stretched, lambda, cap), cap)
                 }
             };
             self.state.tip_coordinate = a + advance;

@@ -5,7 +5,8 @@
 //! ```text
 //! g_k = max(0, (p_tip - x_k(a)).t),  F = k_tip/N sum g_k                                  [m], [N]
 //! F_c(a) = (F_cut + (F_pun - F_cut) max(0, 1 - (a - a_0)/l_p)) (max(v, v_0)/v_0)^n
-//! where F > F_c:  a += min((F - F_c) / (k_tip lambda), cap),  lambda = <dx_k/da . t> in 0.2..3
+//! where F > F_c:  a += min((F - F_c) / (p k_tip lambda), cap),  lambda = <dx_k/da . t> in 0.2..3
+//! p: part of the springs with g_k > 0
 //! dissipated: sum k_tip/N g_k (loss of g_k)                                               [J]
 //! ```
 //! `a_0`: where the tip entered the material that it is in. `cap`: 5 um in the first step, 22 um later (at least 5/4 of
@@ -93,7 +94,9 @@ pub fn advance_limit(first: bool, travel: f64) -> f64 {
 }
 
 /// How far the tip advances in a step, da [m], under the force F and the threshold F_c [N]: as far as its springs are too long,
-/// `(F - F_c)/(k_tip lambda)`, at most `cap` [m]. `tip_stiffness`: k_tip [N/m]; `stretch`: lambda, within its bounds.
+/// `(F - F_c)/(p k_tip lambda)`, at most `cap` [m]. `tip_stiffness`: p k_tip [N/m], p the part of the springs that are stretched: those
+/// that are not have no force to lose. `stretch`: lambda, within its bounds. The force falls no faster than this as springs let go, so
+/// that it never ends below the threshold.
 pub fn tip_advance(force: f64, threshold: f64, tip_stiffness: f64, stretch: f64, cap: f64) -> f64 {
     ((force - threshold) / (tip_stiffness * stretch)).max(0.0).min(cap)
 }
