@@ -20,7 +20,7 @@ struct OpeningNode {
 @group(3) @binding(21) var<storage, read> opening_corners: array<vec4<f32>>;
 
 #ifdef WIDE
-// As `pieces` in src/gpu/plan.rs.
+// As `pieces` in src/gpu/grain.rs.
 const PIECES: u32 = 8u;
 var<workgroup> shares: array<vec4<f32>, 64>;
 #else

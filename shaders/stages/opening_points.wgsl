@@ -4,7 +4,7 @@
 #import shared/opening_cluster
 
 #ifdef WIDE
-// As `pieces` in src/gpu/plan.rs. Hardware waits for one point after another; software would only do more.
+// As `pieces` in src/gpu/grain.rs. Hardware waits for one point after another; software would only do more.
 const PIECES: u32 = 8u;
 // What threads have for the modes of their cluster, w: for the bounds at its corners; its sums.
 var<workgroup> shares: array<vec4<f32>, 512>;

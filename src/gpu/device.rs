@@ -25,7 +25,7 @@ pub struct Gpu {
     pub kernels: KernelCache,
     /// Whether arrays lie in textures, see [`super::texels`]; engines that are made later follow it.
     pub texels: bool,
-    /// Whether short stages get many threads, see [`super::plan::Grain`]; engines that are made later follow it.
+    /// Whether short stages get many threads, see [`super::grain::Grain`]; engines that are made later follow it.
     pub wide: bool,
 }
 

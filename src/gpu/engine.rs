@@ -12,11 +12,12 @@ use super::arrays::{
     step_input,
 };
 use super::device::Gpu;
+use super::grain::Grain;
 use super::kernel::{BindingKind, Compiled, Kernel};
 use super::layout::{Layout, strip_layers};
 use super::memory::{Memory, allocate};
 use super::pace::Pace;
-use super::plan::{Features, Grain, defines, mesh_numbers, stages, threads};
+use super::plan::{Features, defines, mesh_numbers, stages, threads};
 use super::structs::StepInput;
 use crate::engine::{Engine, EngineImage, EngineInfo, FramePlan, FrameSums, Health, Stage, State, foreign_image};
 use crate::error::{Error, Result};

@@ -4,6 +4,7 @@ pub mod arrays;
 pub mod compose;
 pub mod device;
 pub mod engine;
+pub mod grain;
 pub mod kernel;
 pub mod layout;
 mod memory;

@@ -196,9 +196,12 @@ fn lane_measure<S: Simd>(
     let stride = grid.stride;
     let zero = Lanes::splat(simd, 0.0);
     let one = Lanes::splat(simd, 1.0);
+    let [volume, edge, inverse_square] = cells.sizes();
+    // A gap between two copies of a line is no tissue either.
+    let is_tissue = (volume * Lanes::splat(simd, 1e30)).smaller(one);
     let holds = match material.holds {
-        Some(holds) => holds,
-        None => one,
+        Some(holds) => holds * is_tissue,
+        None => is_tissue,
     };
     let mut u = differences(simd, stride, at);
     let mut modes = [[zero; SIGNS]; 3];
@@ -229,7 +232,6 @@ fn lane_measure<S: Simd>(
     if !least.is_within(LEAST_CORNER_J, f64::from(f32::MAX)) {
         return false;
     }
-    let [volume, edge, inverse_square] = cells.sizes();
     let around = Around {
         length: edge,
         kept: Lanes::load(simd, at.intact, at.i) * holds,

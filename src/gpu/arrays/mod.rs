@@ -17,8 +17,8 @@ use std::cell::OnceCell;
 
 use glam::DVec3;
 
+use super::grain::Grain;
 use super::layout::Layout;
-use super::plan::Grain;
 use crate::engine::{FrameSums, State};
 use crate::model::Model;
 

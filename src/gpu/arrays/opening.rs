@@ -10,8 +10,8 @@ use super::super::structs::{
     OpeningSum, OpeningTotals,
 };
 use super::{Array, Source, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
+use crate::gpu::grain::Grain;
 use crate::gpu::layout::Layout;
-use crate::gpu::plan::Grain;
 use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::Model;
 use crate::model::opening::{Cluster, NearCell, OpeningPlan};
