@@ -272,8 +272,7 @@ fn region(group: &Group, course: &Course, needle: f64, by_number: bool) -> Strin
     table += &format!("material = {{ preset = {} }}\n", quoted(&preset.name));
     if preset.cutting.is_none() {
         let (puncture, cutting) = forces(preset, needle);
-        let by = if preset.toughness.is_some() { "by the toughness" } else { "by the stiffness" };
-        table += &format!("puncture_force_n = {puncture} # estimate\ncutting_force_n = {cutting} # estimate, {by}\n");
+        table += &format!("puncture_force_n = {puncture} # estimate\ncutting_force_n = {cutting} # estimate\n");
     }
     table + "\n"
 }
@@ -291,19 +290,13 @@ fn entry(label: u16, course: &Course, by_number: bool) -> String {
     own.map_or(label.to_string(), |name| quoted(name))
 }
 
-/// Tip forces [N]. Where a toughness of the tissue is known it cuts a slit as wide as the needle, and punctures at as many times that as
-/// muscle does. Elsewhere they go by the stiffness. What is softer than muscle is pressed in as far as muscle before it gives way: the force goes with
+/// Tip forces by the stiffness [N]. What is softer than muscle is pressed in as far as muscle before it gives way: the force goes with
 /// Young's modulus. Where it is stiffer it goes with its root, as the force at which a crack grows does at one toughness.
 fn forces(preset: &TissuePreset, needle: f64) -> (f64, f64) {
-    let by_cutting = MUSCLE.0 / MUSCLE.1;
-    if let Some(toughness) = preset.toughness {
-        let cutting = (toughness * needle).clamp(FORCES.0 / by_cutting, FORCES.1 / by_cutting);
-        return (rounded(cutting * by_cutting), rounded(cutting));
-    }
     let stiffness = preset.law.youngs_modulus() / MUSCLE.2;
     let force = MUSCLE.0 * stiffness.min(stiffness.sqrt()) * needle / MUSCLE.3;
     let puncture = force.clamp(FORCES.0, FORCES.1);
-    (rounded(puncture), rounded(puncture / by_cutting))
+    (rounded(puncture), rounded(puncture * MUSCLE.1 / MUSCLE.0))
 }
 
 /// Two digits.
