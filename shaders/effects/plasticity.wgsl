@@ -15,7 +15,7 @@ struct PlasticState {
 // Flow begins where the overstress is worth a thousandth of the strain at yield within these limits, and ends where it is
 // worth a tenth of that: smaller increments would vanish in the last digits of G and alpha.
 const SMALLEST_FLOW: f32 = 1e-6;
-const WORTHWHILE_FLOW: f32 = 2e-5;
+const WORTHWHILE_FLOW: f32 = 2e-6;
 const LARGEST_FLOW: f32 = 0.05;
 const FLOW_ITERATIONS: u32 = 40u;
 

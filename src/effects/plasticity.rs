@@ -155,7 +155,7 @@ pub mod in_lanes {
     /// Flow begins where the overstress is worth a thousandth of the strain at yield within these limits, and ends where it is worth a
     /// tenth of that: smaller increments would vanish in the last digits of G and alpha.
     const SMALLEST_FLOW: f64 = 1e-6;
-    const WORTHWHILE_FLOW: f64 = 2e-5;
+    const WORTHWHILE_FLOW: f64 = 2e-6;
     const ITERATIONS: usize = 40;
     /// Nothing is divided by less.
     const TINY: f64 = 1e-30;
