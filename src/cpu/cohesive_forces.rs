@@ -39,10 +39,8 @@ impl CpuEngine {
             *damage = torn.damage;
             self.sums.energy.cohesive += torn.dissipated;
             stored += torn.stored;
-            self.external[a] += torn.force;
-            self.external[b] -= torn.force;
-            self.added_bound[a] += 2.0 * k;
-            self.added_bound[b] += 2.0 * k;
+            self.added.add(a, torn.force, 2.0 * k);
+            self.added.add(b, -torn.force, 2.0 * k);
         }
         self.sums.energy.cohesive_stored = stored;
     }

@@ -24,7 +24,7 @@ impl CpuEngine {
             let x = contact.place(&model.mesh) + displacement[node];
             let v = velocity[node] - pose.velocity;
             let k = plan.face_stiffness * contact.share;
-            self.added_bound[node] += plan.stiffness_bound(contact.share);
+            self.added.add(node, DVec3::ZERO, plan.stiffness_bound(contact.share));
             let mut sums = ContactSums::default();
             if bonded {
                 let Some((depth, n)) = penetration(tool, x - pose.tip, pose.direction, contact.rest_radius) else {
@@ -60,7 +60,7 @@ impl CpuEngine {
                 sums.torque += (x - pose.tip).cross(sums.friction);
             }
             memory.stored = sums.stored;
-            self.external[node] += sums.normal + sums.friction;
+            self.added.add(node, sums.normal + sums.friction, 0.0);
             stored += sums.stored;
             self.sums.book(&sums, pose, dt);
         }

@@ -4,6 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::CpuEngine;
+use super::added::Added;
 use crate::effects::mass_scaling::stable_mass;
 use crate::engine::{StepInput, WATCHED_STEP_RATIO};
 use crate::model::Model;
@@ -56,8 +57,8 @@ pub(super) struct NodeStep<'a> {
     /// Of the faces at rest [m].
     pub face_centres: &'a [DVec3; 6],
     pub gravity: DVec3,
-    pub external: &'a [DVec3],
-    pub added_bound: &'a [f64],
+    /// Forces and bounds beside those of the cells.
+    pub added: &'a Added,
 }
 
 impl CpuEngine {
@@ -71,8 +72,7 @@ impl CpuEngine {
             limit: self.speed_limit,
             face_centres: &self.face_centres,
             gravity: model.effects.gravity.map_or(DVec3::ZERO, |g| g.acceleration / model.mass_scaling()),
-            external: &self.external,
-            added_bound: &self.added_bound,
+            added: &self.added,
         };
         let nodes: Vec<NodeSums> = match lanes {
             Some(lanes) => lanes.integrate(&step, &mut state.displacement, &mut state.velocity),
@@ -117,15 +117,15 @@ impl NodeStep<'_> {
 
     /// What acts on a node.
     fn acting(&self, node: usize, gather: impl Fn(usize) -> (DVec3, f64)) -> Acting {
-        let NodeStep { model, input, gravity, external, added_bound, .. } = *self;
+        let NodeStep { model, input, gravity, added, .. } = *self;
         let own = [node as u32];
         // Tied copies move as one node: every copy sums over all of them and books its share of the mass.
         let copies = model.separation.tied(node).unwrap_or(&own);
         let mut sum = Acting::default();
         for copy in copies.iter().map(|n| *n as usize) {
-            let (f, k) = gather(copy);
-            sum.force += f + external[copy];
-            sum.bound += k + added_bound[copy];
+            let ((f, k), added) = (gather(copy), added.at(copy));
+            sum.force += f + added.0;
+            sum.bound += k + added.1;
             sum.mass += model.node_mass[copy];
             sum.load += gravity * model.node_mass[copy];
             sum.load += model.node_load.get(copy).map_or(DVec3::ZERO, |f| *f * input.load_factor);

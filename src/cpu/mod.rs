@@ -1,5 +1,6 @@
 //! The CPU engine: f64, rayon, written from the equations. Reference for the tests and fallback without an adapter.
 
+mod added;
 mod cohesive_forces;
 mod free_tip;
 mod indenter_contact;
@@ -14,6 +15,7 @@ mod tip;
 
 use std::sync::Arc;
 
+use added::Added;
 use glam::{DMat3, DVec3};
 use lanes::LaneCells;
 pub use lanes::unknown_to_lanes;
@@ -70,9 +72,8 @@ pub struct CpuEngine {
     wants_lanes: bool,
     lanes: Option<LaneCells>,
     cells: Vec<CellForces>,
-    external: Vec<DVec3>,
-    /// Stiffness bound that cohesive faces add at a node [N/m].
-    added_bound: Vec<f64>,
+    /// Beside what the cells exert.
+    added: Added,
     tip_forces: Vec<(f64, [usize; 8], [f64; 8])>,
     tip_energy: f64,
     /// Force across the needle on every anchor of a free tip [N].
@@ -163,8 +164,7 @@ impl CpuEngine {
             cells: if lanes.is_some() { Vec::new() } else { vec![CellForces::default(); cells] },
             lanes,
             elements,
-            external: vec![DVec3::ZERO; nodes],
-            added_bound: vec![0.0; nodes],
+            added: Added::new(nodes),
             tip_forces: Vec::new(),
             tip_energy: 0.0,
             tip_sway: DVec3::ZERO,
@@ -196,8 +196,8 @@ impl CpuEngine {
         self.forces(input);
         let nodes = 0..self.model.mesh.node_count();
         let at = |node: usize| {
-            let (force, bound) = self.gather(node);
-            (force + self.external[node], bound + self.added_bound[node])
+            let ((force, bound), added) = (self.gather(node), self.added.at(node));
+            (force + added.0, bound + added.1)
         };
         let (mut forces, mut bounds): (Vec<DVec3>, Vec<f64>) = nodes.map(at).unzip();
         for tie in &self.model.separation.ties {
@@ -228,7 +228,7 @@ impl CpuEngine {
     /// All stages but the last: forces and stiffness bounds.
     fn forces(&mut self, input: &StepInput) {
         let model = self.model.clone();
-        self.external.fill(DVec3::ZERO);
+        self.added.clear();
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             match &plan.free {
                 None => {
@@ -242,7 +242,6 @@ impl CpuEngine {
             }
         }
         self.element_forces(input);
-        self.added_bound.fill(0.0);
         self.cohesive_forces();
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             self.needle_contact(plan, &pose, input.step);
@@ -418,7 +417,7 @@ impl CpuEngine {
     /// E - dt/2 f v by the trapezoidal rule.
     fn measure_nodes(&mut self) {
         let (model, state) = (&self.model, &self.state);
-        let force = |node: usize| self.gather(node).0 + self.external[node];
+        let force = |node: usize| self.gather(node).0 + self.added.at(node).0;
         let power = state.velocity.iter().enumerate().map(|(node, v)| force(node).dot(*v)).sum::<f64>();
         let sums = &mut self.sums;
         if sums.steps > 0 {

@@ -113,7 +113,7 @@ impl CpuEngine {
             match tip_loads.of(node) {
                 Some(load) => {
                     sums.tip = load.force;
-                    self.added_bound[node] += load.stiffness;
+                    self.added.add(node, DVec3::ZERO, load.stiffness);
                 }
                 // What only carries the tip of a planned path, and carries nothing.
                 None if !contact.pushed && plan.free.is_none() && contact.surface == ContactSurface::OpenedPath => {
@@ -143,7 +143,7 @@ impl CpuEngine {
                     sums.torque = now.torque;
                     sums.stored = now.stored;
                     sums.damping = memory.damped(now.damping, now.v, self.dt);
-                    self.added_bound[node] += now.bound;
+                    self.added.add(node, DVec3::ZERO, now.bound);
                     bend_power += now.bend_power;
                     if let Some(friction) = model.effects.friction {
                         let kt = friction.stiffness_ratio * now.stiffness;
@@ -160,7 +160,7 @@ impl CpuEngine {
             let total = sums.tip + sums.normal + sums.friction;
             sums.torque += lever.cross(sums.tip + sums.friction);
             bend_power += sums.friction.dot(at.bend.rate);
-            self.external[node] += total;
+            self.added.add(node, total, 0.0);
             stored += sums.stored;
             self.sums.book(&sums, pose, self.dt);
             if line.is_some() {

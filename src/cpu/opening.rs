@@ -134,8 +134,7 @@ impl CpuEngine {
             .each(sections.len(), |i| point_forces(&shape, opening, &opening.stations[i], &sections[i], displacement));
         for ((station, local), sums) in opening.stations.iter().zip(&points).zip(&mut sums) {
             for (node, (force, bound)) in station.nodes.iter().zip(&local.1) {
-                self.external[*node as usize] -= *force;
-                self.added_bound[*node as usize] += bound;
+                self.added.add(*node as usize, -*force, *bound);
             }
             *sums = local.0;
             elastic += local.0.energy;
@@ -171,7 +170,7 @@ impl CpuEngine {
     ) -> Option<(Vec<StationSums>, f64)> {
         let measures = self.measures;
         let shape = |cell: u32| Shape { material: model.material(cell as usize), measures };
-        let CpuEngine { lanes, state, external, added_bound, .. } = self;
+        let CpuEngine { lanes, state, added, .. } = self;
         let OpeningInLanes { opening: lanes, team, numbers, stride } = lanes.as_mut()?.opening()?;
         let displacement = &state.displacement;
         let [vectors, cells] = lanes.compute(team, opening, sections, displacement, measures);
@@ -184,9 +183,7 @@ impl CpuEngine {
                     let point = &station.points[index];
                     let (d, energy) =
                         point_force(shape(point.cell), opening, point, section, &u, |place, force, bound| {
-                            let node = station.nodes[place] as usize;
-                            external[node] -= force;
-                            added_bound[node] += bound;
+                            added.add(station.nodes[place] as usize, -force, bound);
                         });
                     found = PointSums::new(&d, energy, point.volume);
                 }
@@ -194,8 +191,7 @@ impl CpuEngine {
             }
         }
         lanes.at_corners(|node, force, bound| {
-            external[node] -= force;
-            added_bound[node] += bound;
+            added.add(node, -force, bound);
         });
         let (points, cells_of_spans) = lanes.gather(team, sections, (numbers, stride));
         let mut sums: Vec<StationSums> = points.iter().map(StationSums::from).collect();
@@ -283,17 +279,16 @@ impl CpuEngine {
             // Everywhere along the path: a mass that was raised where friction sets in would swing with another energy.
             for (place, w) in station.disc.iter().filter(|_| model.effects.friction.is_some()) {
                 let kt = friction.stiffness_ratio * opening.stick;
-                self.added_bound[station.nodes[usize::from(*place)] as usize] += 2.0 * kt * w;
+                self.added.add(station.nodes[usize::from(*place)] as usize, DVec3::ZERO, 2.0 * kt * w);
             }
             let along = t * (spread + rubbing);
             for (place, w) in station.disc.iter().filter(|_| along != DVec3::ZERO) {
-                self.external[station.nodes[usize::from(*place)] as usize] += along * *w;
+                self.added.add(station.nodes[usize::from(*place)] as usize, along * *w, 0.0);
             }
             let across = guide - centre[i];
             for (place, w) in station.centre.iter().filter(|_| across != DVec3::ZERO || held > 0.0) {
                 let node = station.nodes[usize::from(*place)] as usize;
-                self.external[node] += across * *w;
-                self.added_bound[node] += 2.0 * held * w;
+                self.added.add(node, across * *w, 2.0 * held * w);
             }
             booked.normal += t * spread + guide;
             booked.friction += t * rubbing;

@@ -9,6 +9,7 @@ use glam::DVec3;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::nodes::{NODE, NodeLines};
+use super::number::{HalfWide, half_wide};
 use super::opening::{LaneOpening, OpeningInLanes};
 use super::points::Points;
 use super::rows::{CellRows, gather_rows};
@@ -64,6 +65,8 @@ impl Edge {
 /// What does not change.
 pub(super) struct Grid {
     pub arch: Arch,
+    /// Vectors half as wide as the widest.
+    pub half: Option<HalfWide>,
     pub cells: [usize; 3],
     /// f32 of a row.
     pub stride: usize,
@@ -132,6 +135,7 @@ impl LaneBlock {
             opening: model.opening().map(opening),
             grid: Grid {
                 arch: Arch::new(),
+                half: half_wide(),
                 cells,
                 stride,
                 x: EdgesX {
@@ -292,7 +296,9 @@ fn remembering(points: &Option<Points>) -> Option<(&Points, usize)> {
 
 /// The stiffness that a path left of every cell; empty where it left all of it.
 fn left_by_a_path(stiffness: &[f64]) -> &[f64] {
-    if stiffness.iter().any(|s| *s != 1.0) { stiffness } else { &[] }
+    // Without a branch per cell, which would be as long as a stage.
+    let any = |part: &[f64]| part.iter().fold(false, |any, s| any | (*s != 1.0));
+    if stiffness.chunks(512).any(any) { stiffness } else { &[] }
 }
 
 /// Constants of every cell, row by row.

@@ -94,8 +94,9 @@ impl NodeLines {
         for copy in copies {
             let (of_cells, bound_of_cells) = self.from(copy.first as usize);
             let node = copy.node as usize;
-            force += of_cells + step.external[node];
-            bound += bound_of_cells + step.added_bound[node];
+            let added = step.added.at(node);
+            force += of_cells + added.0;
+            bound += bound_of_cells + added.1;
             mass += step.model.node_mass[node];
         }
         (force, bound, mass)
@@ -185,6 +186,9 @@ struct Scratch {
     mass: Vec<f64>,
     raised: Vec<f64>,
     weight: Vec<f64>,
+    /// What is added at nodes where nothing is.
+    no_force: Vec<DVec3>,
+    no_bound: Vec<f64>,
     others: Vec<(usize, DVec3, DVec3)>,
 }
 
@@ -197,6 +201,8 @@ impl Scratch {
             mass: zeros.clone(),
             raised: zeros.clone(),
             weight: zeros,
+            no_force: vec![DVec3::ZERO; width],
+            no_bound: vec![0.0; width],
             others: Vec::new(),
         }
     }
@@ -224,12 +230,13 @@ impl WithSimd for PlainLine<'_, '_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let PlainLine { step, first, line, u, v, scratch, sums } = self;
         let NodeStep { model, dt, gravity, .. } = *step;
-        let Scratch { kick, new, mass, raised, weight, others } = scratch;
+        let Scratch { kick, new, mass, raised, weight, no_force, no_bound, others } = scratch;
         let falls = gravity != DVec3::ZERO;
         others.clear();
         let count = u.len();
         let masses = &model.node_mass[first..first + count];
-        let (external, added_bound) = (&step.external[first..first + count], &step.added_bound[first..first + count]);
+        let nothing = (&no_force[..count], &no_bound[..count]);
+        let (external, added_bound) = step.added.within(first..first + count).unwrap_or(nothing);
         // Factor of a bound that raises the mass, and largest ratio of bound and mass that is not watched.
         let (raise, watched) = (dt * dt / (4.0 * RAISED_STEP_RATIO), 4.0 * WATCHED_STEP_RATIO / (dt * dt));
         let raise = if model.effects.mass_scaling.is_some() { raise } else { 0.0 };
@@ -304,7 +311,7 @@ impl WithSimd for PlainLine<'_, '_> {
             // after^2 - before^2 = 2 mid (after - before)
             let grown = simd.mul_f64s(mid, simd.sub_f64s(after, before));
             gained = simd.mul_add_f64s(load::<S>(raised, at), grown, gained);
-            fastest = simd.max_f64s(fastest, simd.abs_f64s(after));
+            fastest = simd.max_f64s(fastest, simd.max_f64s(after, simd.sub_f64s(zero, after)));
             new[at..at + lanes].copy_from_slice(bytemuck::cast_slice(std::slice::from_ref(&after)));
         }
         let (damped, gained) = (simd.reduce_sum_f64s(damped), simd.reduce_sum_f64s(gained));

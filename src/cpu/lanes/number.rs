@@ -6,6 +6,25 @@ use pulp::Simd;
 
 use crate::number::Number;
 
+/// Vectors of 8 f32, where this processor has them.
+#[cfg(target_arch = "x86_64")]
+pub type HalfWide = pulp::x86::V3;
+/// See above; no other processor has wider ones to halve.
+#[cfg(not(target_arch = "x86_64"))]
+pub type HalfWide = pulp::Scalar;
+
+/// Their token.
+#[cfg(target_arch = "x86_64")]
+pub fn half_wide() -> Option<HalfWide> {
+    HalfWide::try_new()
+}
+
+/// Their token.
+#[cfg(not(target_arch = "x86_64"))]
+pub fn half_wide() -> Option<HalfWide> {
+    None
+}
+
 /// One vector of f32.
 #[derive(Debug, Clone, Copy)]
 pub struct Lanes<S: Simd> {

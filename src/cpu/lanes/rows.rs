@@ -3,6 +3,8 @@
 // Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
 #![allow(clippy::needless_range_loop)]
 
+use std::ops::Range;
+
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
@@ -76,21 +78,33 @@ impl WithSimd for SomeRows<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let SomeRows { rows, first, lines, histories } = self;
-        let (stride, ny) = (rows.grid.stride, rows.grid.cells[1]);
+        let (stride, [nx, ny, _]) = (rows.grid.stride, rows.grid.cells);
         let mut forces = RowForces::new(stride);
         let mut intact = vec![1.0f32; stride];
+        // What a row leaves of its last vector is less work in a vector half as wide.
+        let left = nx % WIDEST;
+        let half = rows.grid.half.filter(|_| S::F32_LANES == WIDEST && (1..=WIDEST / 2).contains(&left));
+        let whole = if half.is_some() { nx - left } else { nx };
         for (i, lines) in lines.chunks_exact_mut(LINES * stride).enumerate() {
-            let row = first + i;
-            let at = [row % ny, row / ny];
+            let at = [(first + i) % ny, (first + i) / ny];
+            let row = rows.row(at, &mut intact);
             match rows.points {
-                None => cell_row(simd, rows, at, &mut forces, &mut intact),
+                None => {
+                    cell_row(simd, rows, (&row, at, 0..whole), &mut forces, &intact);
+                    if let Some(half) = half {
+                        cell_row(half, rows, (&row, at, whole..nx), &mut forces, &intact);
+                    }
+                }
                 Some(points) => {
                     let length = points.row_length();
                     let history = &mut histories[i * length..(i + 1) * length];
-                    row_of_points(simd, rows, (points, history), at, &mut forces, &mut intact);
+                    row_of_points(simd, rows, (points, &mut *history), (&row, at, 0..whole), &mut forces, &intact);
+                    if let Some(half) = half {
+                        row_of_points(half, rows, (points, history), (&row, at, whole..nx), &mut forces, &intact);
+                    }
                 }
             }
-            add_up(simd, &forces, stride, rows.grid.cells[0] + 1, lines);
+            add_up(simd, &forces, stride, nx + 1, lines);
         }
     }
 }
@@ -161,20 +175,25 @@ impl<'a> CellRows<'a> {
     }
 }
 
-/// Forces and bounds of one row.
+/// Forces and bounds of some cells of the row at `at`.
 #[inline(always)]
-fn cell_row<S: Simd>(simd: S, rows: &CellRows, at: [usize; 2], forces: &mut RowForces, intact: &mut [f32]) {
-    let nx = rows.grid.cells[0];
-    let row = rows.row(at, intact);
-    for i in (0..nx).step_by(Lanes::<S>::COUNT) {
-        let (vector, material) = rows.vector(simd, &row, i, intact);
+fn cell_row<S: Simd>(
+    simd: S,
+    rows: &CellRows,
+    (row, at, cells): (&Row, [usize; 2], Range<usize>),
+    forces: &mut RowForces,
+    intact: &[f32],
+) {
+    let end = cells.end;
+    for i in cells.step_by(Lanes::<S>::COUNT) {
+        let (vector, material) = rows.vector(simd, row, i, intact);
         let Some(material) = material else {
             nothing(simd, &vector, forces);
             continue;
         };
         let answers = Elastic { slopes: material.law.polynomial, of_powers: Lanes::splat(simd, 0.0) };
         if !shaped_forces(simd, rows.grid, at, &material, answers, &vector, forces) {
-            cells_one_by_one(rows, row.first_cell, i..(i + Lanes::<S>::COUNT).min(nx), None, forces);
+            cells_one_by_one(rows, row.first_cell, i..(i + Lanes::<S>::COUNT).min(end), None, forces);
         }
     }
 }
@@ -185,15 +204,14 @@ fn row_of_points<S: Simd>(
     simd: S,
     rows: &CellRows,
     (points, history): (&Points, &mut [f32]),
-    at: [usize; 2],
+    (row, at, cells): (&Row, [usize; 2], Range<usize>),
     forces: &mut RowForces,
-    intact: &mut [f32],
+    intact: &[f32],
 ) {
-    let nx = rows.grid.cells[0];
-    let row = rows.row(at, intact);
+    let (nx, end) = (rows.grid.cells[0], cells.end);
     let kind = |i: usize| rows.model.material_index(row.first_cell + i);
-    for i in (0..nx).step_by(Lanes::<S>::COUNT) {
-        let (vector, material) = rows.vector(simd, &row, i, intact);
+    for i in cells.step_by(Lanes::<S>::COUNT) {
+        let (vector, material) = rows.vector(simd, row, i, intact);
         let Some(material) = material else {
             nothing(simd, &vector, forces);
             continue;
@@ -204,7 +222,7 @@ fn row_of_points<S: Simd>(
             tangent: [Lanes::splat(simd, 0.0); 2],
         };
         if !shaped_forces(simd, rows.grid, at, &material, answers, &vector, forces) {
-            let cells = i..(i + Lanes::<S>::COUNT).min(nx);
+            let cells = i..(i + Lanes::<S>::COUNT).min(end);
             cells_one_by_one(rows, row.first_cell, cells, Some((points, history)), forces);
         }
     }
