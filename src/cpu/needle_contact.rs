@@ -43,6 +43,21 @@ impl NearNodes {
     }
 }
 
+/// From how many nodes on the threads share them.
+const SHARED_NODES: usize = 256;
+
+/// What the needle does to a contact node in a step.
+struct NodeAtNeedle {
+    index: usize,
+    /// What it remembers from now on.
+    memory: ContactState,
+    sums: ContactSums,
+    /// [N/m]
+    bound: f64,
+    /// Power of its forces on a needle that bends [W].
+    bend_power: f64,
+}
+
 /// What the springs of the tip do to a node.
 #[derive(Debug, Clone, Copy)]
 struct NodeLoad {
@@ -102,65 +117,24 @@ impl CpuEngine {
         let (coordinate, tip) = (self.state.tip_coordinate, self.state.tip);
         let needle = Needle { model: &model, plan, pose, profile, d: -pose.direction, coordinate, tip, line };
         let looked_at = self.nodes_at_needle(&needle, &tip_loads);
-        let State { contact: memories, displacement, velocity, .. } = &mut self.state;
+        let State { contact, displacement, velocity, .. } = &self.state;
         let slit = SlitContact { model: &model, plan, profile, pose, coordinate, line, displacement, velocity };
+        let touch = |index: &u32| self.node_at_needle(*index, &contact[*index as usize], &needle, &slit, &tip_loads);
+        let touched: Vec<NodeAtNeedle> = match looked_at.len() {
+            few if few < SHARED_NODES => looked_at.iter().filter_map(touch).collect(),
+            many => {
+                let ranges = self
+                    .in_ranges(many, |range| looked_at[range].iter().filter_map(touch).collect::<Vec<NodeAtNeedle>>());
+                ranges.into_iter().flatten().collect()
+            }
+        };
+        // In the order of the nodes: no bit hangs on the number of threads.
         let mut stored = self.tip_energy;
-        for index in &looked_at {
-            let index = *index as usize;
-            let (contact, memory) = (&model.contact_nodes[index], &mut memories[index]);
-            let node = contact.node as usize;
-            let mut sums = ContactSums::default();
-            match tip_loads.of(node) {
-                Some(load) => {
-                    sums.tip = load.force;
-                    self.added.add(node, DVec3::ZERO, load.stiffness);
-                }
-                // What only carries the tip of a planned path, and carries nothing.
-                None if !contact.pushed && plan.free.is_none() && contact.surface == ContactSurface::OpenedPath => {
-                    continue;
-                }
-                None => {}
-            }
-            let rest = self.rest[node];
-            let lever = rest + displacement[node] - pose.tip;
-            let carries = sums.tip != DVec3::ZERO;
-            // Most nodes of a free path, all of them where a hand leads: nothing of theirs would change.
-            if !carries && !memory.passed && !memory.touching && needle.is_far_from(rest, lever) {
-                continue;
-            }
-            let at = needle.place(lever, velocity[node]);
-            let mut bend_power = sums.tip.dot(at.bend.rate);
-            match needle.pressing(&slit, contact, memory, &at) {
-                None => {
-                    // What the springs of a contact held goes with it.
-                    sums.released = memory.stored;
-                    let (rest_radius, passed) = (memory.rest_radius, memory.passed);
-                    *memory = ContactState { rest_radius, passed, ..ContactState::default() };
-                }
-                Some(now) => {
-                    sums.normal = now.normal;
-                    sums.on_shaft = now.on_shaft;
-                    sums.torque = now.torque;
-                    sums.stored = now.stored;
-                    sums.damping = memory.damped(now.damping, now.v, self.dt);
-                    self.added.add(node, DVec3::ZERO, now.bound);
-                    bend_power += now.bend_power;
-                    if let Some(friction) = model.effects.friction {
-                        let kt = friction.stiffness_ratio * now.stiffness;
-                        let motion = (now.v - now.n * now.v.dot(now.n)) * self.dt;
-                        let stick = stick_or_slide(memory.stick, motion, now.n, kt, now.limit);
-                        memory.stick = stick.stretch;
-                        sums.friction = stick.force;
-                        sums.friction_work = stick.dissipated;
-                        sums.stored += stick.stored;
-                    }
-                }
-            }
-            memory.stored = sums.stored;
+        for NodeAtNeedle { index, memory, sums, bound, bend_power } in touched {
+            let node = model.contact_nodes[index].node as usize;
             let total = sums.tip + sums.normal + sums.friction;
-            sums.torque += lever.cross(sums.tip + sums.friction);
-            bend_power += sums.friction.dot(at.bend.rate);
-            self.added.add(node, total, 0.0);
+            self.state.contact[index] = memory;
+            self.added.add(node, total, bound);
             stored += sums.stored;
             self.sums.book(&sums, pose, self.dt);
             if line.is_some() {
@@ -172,8 +146,78 @@ impl CpuEngine {
         self.contact_energy = stored;
         self.tip_loads = tip_loads;
         if let Some(near) = &mut self.near {
-            near.keep(&looked_at, memories);
+            near.keep(&looked_at, &self.state.contact);
         }
+    }
+
+    /// What the needle does to the contact node number `index` with its `memory`; `None`: nothing, and nothing of it changes.
+    fn node_at_needle(
+        &self,
+        index: u32,
+        memory: &ContactState,
+        needle: &Needle,
+        slit: &SlitContact,
+        tip_loads: &NodeLoads,
+    ) -> Option<NodeAtNeedle> {
+        let Needle { model, plan, pose, .. } = *needle;
+        let index = index as usize;
+        let contact = &model.contact_nodes[index];
+        let node = contact.node as usize;
+        let (mut sums, mut memory, mut bound) = (ContactSums::default(), *memory, 0.0);
+        match tip_loads.of(node) {
+            Some(load) => {
+                sums.tip = load.force;
+                bound += load.stiffness;
+            }
+            // What only carries the tip of a planned path, and carries nothing.
+            None if !contact.pushed && plan.free.is_none() && contact.surface == ContactSurface::OpenedPath => {
+                return None;
+            }
+            None => {}
+        }
+        let rest = self.rest[node];
+        let lever = rest + self.state.displacement[node] - pose.tip;
+        // Most nodes of a free path, all of them where a hand leads: nothing of theirs would change.
+        let carries = sums.tip != DVec3::ZERO;
+        let is_idle = !carries && !memory.passed && !memory.touching && needle.is_far_from(rest, lever);
+        if is_idle && bound == 0.0 {
+            return None;
+        }
+        if is_idle {
+            return Some(NodeAtNeedle { index, memory, sums, bound, bend_power: 0.0 });
+        }
+        let at = needle.place(lever, self.state.velocity[node]);
+        let mut bend_power = sums.tip.dot(at.bend.rate);
+        match needle.pressing(slit, contact, &mut memory, &at) {
+            None => {
+                // What the springs of a contact held goes with it.
+                sums.released = memory.stored;
+                let (rest_radius, passed) = (memory.rest_radius, memory.passed);
+                memory = ContactState { rest_radius, passed, ..ContactState::default() };
+            }
+            Some(now) => {
+                sums.normal = now.normal;
+                sums.on_shaft = now.on_shaft;
+                sums.torque = now.torque;
+                sums.stored = now.stored;
+                sums.damping = memory.damped(now.damping, now.v, self.dt);
+                bound += now.bound;
+                bend_power += now.bend_power;
+                if let Some(friction) = model.effects.friction {
+                    let kt = friction.stiffness_ratio * now.stiffness;
+                    let motion = (now.v - now.n * now.v.dot(now.n)) * self.dt;
+                    let stick = stick_or_slide(memory.stick, motion, now.n, kt, now.limit);
+                    memory.stick = stick.stretch;
+                    sums.friction = stick.force;
+                    sums.friction_work = stick.dissipated;
+                    sums.stored += stick.stored;
+                }
+            }
+        }
+        memory.stored = sums.stored;
+        sums.torque += lever.cross(sums.tip + sums.friction);
+        bend_power += sums.friction.dot(at.bend.rate);
+        Some(NodeAtNeedle { index, memory, sums, bound, bend_power })
     }
 
     /// Numbers of the contact nodes that the needle may have to do with, in their order: all of them on a planned path; on a free one, where
