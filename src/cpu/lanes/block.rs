@@ -12,7 +12,7 @@ use super::nodes::{NODE, NodeLines};
 use super::number::{HalfWide, half_wide};
 use super::opening::{LaneOpening, OpeningInLanes};
 use super::points::Points;
-use super::rows::{CellRows, gather_rows};
+use super::rows::{CellRows, gather_plane};
 use super::shapes::BentColumns;
 use super::{LaneMaterial, WIDEST, materials_of, threads_for};
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
@@ -28,6 +28,14 @@ use crate::model::Model;
 pub(super) const PLACE: usize = 6;
 /// f32 per row of cells in [`LaneBlock::lines`]: force of every axis on four lines of nodes, and the bound of all.
 pub(super) const LINES: usize = 13;
+/// Layers of cells that a part keeps: its first and its last, between which planes of nodes are added up with their neighbours, and one more.
+const KEPT: usize = 3;
+
+/// Which of the kept layers the layer `k` of a part is in, until the second after it comes.
+fn kept(k: usize) -> usize {
+    if k == 0 { 0 } else { 1 + (k - 1) % 2 }
+}
+
 /// f32 per row of cells in [`Grid::mixed`]: c1, c2, c3, c01, bulk modulus, hourglass modulus, 1 where a cell holds tissue, mu and b of an
 /// exponential, mu and alpha of powers of the stretches.
 pub(super) const MIXED: usize = 11;
@@ -126,6 +134,8 @@ impl LaneBlock {
         let mixed = mixed_rows(model, block, &materials, stride);
         let lines = (ny + 1) * (nz + 1) * stride;
         let nodes = NodeLines::new(model, nx + 1, stride);
+        let team = Team::new(threads_for(block.cell_count()));
+        let part = team.part(nz);
         let first_number = |node| nodes.first_number(node);
         let opening = |plan| Box::new(LaneOpening::new(model, block, plan, &materials, first_number));
         let points = Points::new(&model.materials, stride);
@@ -156,9 +166,9 @@ impl LaneBlock {
                 quartic: elements.quartic(),
                 on_edge,
             },
-            team: Team::new(threads_for(block.cell_count())),
             places: vec![0.0; lines * PLACE],
-            lines: vec![0.0; ny * nz * LINES * stride],
+            lines: vec![0.0; nz.div_ceil(part) * KEPT.min(part) * ny * LINES * stride],
+            team,
             nodes,
         })
     }
@@ -216,16 +226,33 @@ impl LaneBlock {
         }
         let points = points.as_ref();
         let rows = CellRows { grid, places, model, elements, displacement, stiffness, points, advance };
-        let part = team.part(ny * nz);
-        let lines_of = lines.chunks_mut(part * LINES * stride);
-        let work = |i: usize, (lines, histories): (&mut [f32], &mut [f32])| rows.compute(i * part, lines, histories);
-        match points.map_or(0, Points::row_length) {
-            0 => team.map(lines_of.map(|lines| (lines, &mut [][..])), work),
-            length => team.map(lines_of.zip(histories.chunks_mut(part * length)), work),
+        let (layer, plane) = (ny * LINES * stride, (ny + 1) * NODE * stride);
+        // Planes between two layers of a part are added up while both are in the cache.
+        let part = team.part(nz);
+        let work = |i: usize, ((lines, nodes), histories): ((&mut [f32], &mut [f32]), &mut [f32])| {
+            let length = histories.len() / part.min(nz - i * part);
+            for k in 0..part.min(nz - i * part) {
+                let histories = &mut histories[k * length..(k + 1) * length];
+                rows.compute((i * part + k) * ny, &mut lines[kept(k) * layer..][..layer], histories);
+                if k > 0 {
+                    let [below, above] = [k - 1, k].map(|k| Some(&lines[kept(k) * layer..][..layer]));
+                    gather_plane(grid, below, above, &mut nodes[k * plane..(k + 1) * plane]);
+                }
+            }
         };
+        let parts = lines.chunks_mut(KEPT.min(part) * layer).zip(nodes.numbers.chunks_mut(part * plane));
+        match points.map_or(0, Points::row_length) {
+            0 => team.map(parts.map(|part| (part, &mut [][..])), work),
+            length => team.map(parts.zip(histories.chunks_mut(part * ny * length)), work),
+        };
+        // Those between two parts, and the outermost.
         let lines = lines.as_slice();
-        let part = team.part((ny + 1) * (nz + 1));
-        team.map(nodes.numbers.chunks_mut(part * NODE * stride), |i, nodes| gather_rows(grid, lines, i * part, nodes));
+        let kept_of = |k: usize| &lines[((k / part) * KEPT.min(part) + kept(k % part)) * layer..][..layer];
+        let between = nodes.numbers.chunks_mut(plane).enumerate().filter(|(k, _)| k % part == 0 || *k == nz);
+        team.map(between, |_, (k, nodes)| {
+            let below = k.checked_sub(1).map(kept_of);
+            gather_plane(grid, below, (k < nz).then(|| kept_of(k)), nodes);
+        });
     }
 
     /// Takes in what the points remember.

@@ -608,15 +608,15 @@ fn add_up<S: Simd>(simd: S, forces: &RowForces, stride: usize, nodes: usize, lin
     }
 }
 
-/// Adds up what the rows of cells around every line of nodes from `first` on do to it: -f_int, and the bound.
-pub(super) fn gather_rows(grid: &Grid, lines: &[f32], first: usize, nodes: &mut [f32]) {
-    grid.arch.dispatch(Gathered { grid, lines, first, nodes });
+/// Adds up what the layers of cells below and above a plane of nodes do to it: -f_int, and the bound.
+pub(super) fn gather_plane(grid: &Grid, below: Option<&[f32]>, above: Option<&[f32]>, nodes: &mut [f32]) {
+    grid.arch.dispatch(Gathered { grid, layers: [above, below], nodes });
 }
 
 struct Gathered<'a> {
     grid: &'a Grid,
-    lines: &'a [f32],
-    first: usize,
+    /// Rows of the layers on either side: the one that follows along z first.
+    layers: [Option<&'a [f32]>; 2],
     nodes: &'a mut [f32],
 }
 
@@ -625,19 +625,16 @@ impl WithSimd for Gathered<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Gathered { grid, lines, first, nodes } = self;
-        let (stride, [nx, ny, nz]) = (grid.stride, grid.cells);
-        for (i, node) in nodes.chunks_exact_mut(NODE * stride).enumerate() {
-            let (j, k) = ((first + i) % (ny + 1), (first + i) / (ny + 1));
+        let Gathered { grid, layers, nodes } = self;
+        let (stride, [nx, ny, _]) = (grid.stride, grid.cells);
+        for (j, node) in nodes.chunks_exact_mut(NODE * stride).enumerate() {
             // Rows of cells beside this line, and which of their four lines it is.
             let mut around: [Option<(&[f32], usize)>; 4] = [None; 4];
             for (number, around) in around.iter_mut().enumerate() {
-                let (far_y, far_z) = (number & 1, number >> 1);
-                if let (Some(j), Some(k)) = (j.checked_sub(far_y), k.checked_sub(far_z))
+                if let (Some(j), Some(lines)) = (j.checked_sub(number & 1), layers[number >> 1])
                     && j < ny
-                    && k < nz
                 {
-                    *around = Some((&lines[(k * ny + j) * LINES * stride..][..LINES * stride], number));
+                    *around = Some((&lines[j * LINES * stride..][..LINES * stride], number));
                 }
             }
             for number in 0..NODE {
