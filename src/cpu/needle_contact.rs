@@ -180,11 +180,8 @@ impl CpuEngine {
         // Most nodes of a free path, all of them where a hand leads: nothing of theirs would change.
         let carries = sums.tip != DVec3::ZERO;
         let is_idle = !carries && !memory.passed && !memory.touching && needle.is_far_from(rest, lever);
-        if is_idle && bound == 0.0 {
-            return None;
-        }
         if is_idle {
-            return Some(NodeAtNeedle { index, memory, sums, bound, bend_power: 0.0 });
+            return (bound > 0.0).then_some(NodeAtNeedle { index, memory, sums, bound, bend_power: 0.0 });
         }
         let at = needle.place(lever, self.state.velocity[node]);
         let mut bend_power = sums.tip.dot(at.bend.rate);
