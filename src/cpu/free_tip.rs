@@ -6,22 +6,13 @@ use super::CpuEngine;
 use crate::effects::puncture::{
     advance_limit, bounded_stretch, retreat, share_beyond, slip_limit, sway_beyond, tip_advance,
 };
-use crate::material::kinematics::cofactor;
-use crate::mesh::{BlockMesh, trilinear};
+use crate::mesh::BlockMesh;
+use crate::mesh::material_place::{grid_place, material_place, pulled_back, within_block};
 use crate::model::{ANCHOR_COUNT, FreePlan, PuncturePlan};
 use crate::needle::free_path::{
     AS_BEFORE, FreeTip, LOOK_AHEAD, MARKED_BEHIND, SAMPLES, SOFTENING_RATE, TURNING, anchor_offset,
 };
 use crate::needle::{ToolPose, lateral_axes};
-
-/// A material point in the deformed mesh.
-struct MaterialPlace {
-    nodes: [usize; 8],
-    weights: [f64; 8],
-    /// x(X) [m] and F there.
-    position: DVec3,
-    gradient: DMat3,
-}
 
 /// The springs of the tip at one place.
 struct TipSprings {
@@ -34,52 +25,10 @@ struct TipSprings {
     gradient: DMat3,
 }
 
-/// Cell and local coordinates of a rest position inside the block.
-fn grid_place(mesh: &BlockMesh, x: DVec3) -> ([usize; 3], DVec3, DVec3) {
-    let (mut cell, mut local, mut width) = ([0; 3], DVec3::ZERO, DVec3::ZERO);
-    for a in 0..3 {
-        let lines = &mesh.lines[a];
-        let i = lines.partition_point(|l| *l <= x[a]).clamp(1, lines.len() - 1) - 1;
-        cell[a] = i;
-        width[a] = lines[i + 1] - lines[i];
-        local[a] = ((x[a] - lines[i]) / width[a]).clamp(0.0, 1.0);
-    }
-    (cell, local, width)
-}
-
-/// The rest position itself or the nearest one in the block.
-fn within_block(mesh: &BlockMesh, x: DVec3) -> DVec3 {
-    let end = |a: usize| mesh.lines[a][mesh.lines[a].len() - 1];
-    let first = |a: usize| mesh.lines[a][0];
-    x.clamp(DVec3::new(first(0), first(1), first(2)), DVec3::new(end(0), end(1), end(2)))
-}
-
-/// The rest position itself or the nearest one in the tissue: in the block, and not above the skin.
-fn within_tissue(mesh: &BlockMesh, free: &FreePlan, x: DVec3) -> DVec3 {
-    let x = within_block(mesh, x);
-    match free.skin_at(mesh, x) {
-        Some(skin) if !free.heights.is_empty() => DVec3 { z: x.z.min(skin), ..x },
-        _ => x,
-    }
-}
-
-fn material_place(mesh: &BlockMesh, u: &[DVec3], x: DVec3) -> MaterialPlace {
-    let (cell, local, width) = grid_place(mesh, x);
-    let nodes = mesh.cell_nodes(mesh.cell_index(cell[0], cell[1], cell[2]));
-    let (weights, rates) = trilinear(local, width);
-    let (mut position, mut gradient) = (x, DMat3::IDENTITY);
-    for ((node, weight), rate) in nodes.iter().zip(weights).zip(rates) {
-        let u = u[*node];
-        position += u * weight;
-        gradient += DMat3::from_cols(u * rate.x, u * rate.y, u * rate.z);
-    }
-    MaterialPlace { nodes, weights, position, gradient }
-}
-
 /// Cells of the box whose middle is no farther from `x` than `reach` and half their diagonal; some more, found axis by axis.
 fn cells_near(mesh: &BlockMesh, free: &FreePlan, x: DVec3, reach: f64) -> Vec<[usize; 3]> {
     let edge = |a: usize, i: usize| mesh.lines[a][i + 1] - mesh.lines[a][i];
-    let range = |a: usize| free.low[a]..free.low[a] + free.count[a];
+    let range = |a: usize| free.skin.low[a]..free.skin.low[a] + free.skin.count[a];
     let longest = [0, 1].map(|a| range(a).map(|i| edge(a, i)).fold(0.0, f64::max));
     let near = |a: usize, i: usize, size: DVec3| {
         (0.5 * (mesh.lines[a][i] + mesh.lines[a][i + 1]) - x[a]).abs() <= reach + 0.5 * size.length()
@@ -92,13 +41,6 @@ fn cells_near(mesh: &BlockMesh, free: &FreePlan, x: DVec3, reach: f64) -> Vec<[u
         }
     }
     cells
-}
-
-/// F^-1 v, and v itself where the material is turned inside out.
-fn pulled_back(f: DMat3, v: DVec3) -> DVec3 {
-    let cofactor = cofactor(f);
-    let j = f.x_axis.dot(cofactor.x_axis);
-    if j > 0.02 { cofactor.transpose() * v / j } else { v }
 }
 
 fn tip_springs(
@@ -114,7 +56,7 @@ fn tip_springs(
     let part = 1.0 / ANCHOR_COUNT as f64;
     for anchor in 0..ANCHOR_COUNT {
         let (a, b) = anchor_offset(anchor, radius);
-        let x = within_tissue(mesh, free, tip.place + tip.across * a + other * b);
+        let x = free.skin.nearest(mesh, tip.place + tip.across * a + other * b);
         let at = material_place(mesh, u, x);
         let offset = x - tip.place;
         let gap = (pose.tip - at.position).dot(t) + offset.dot(tip.along);
@@ -130,11 +72,11 @@ fn tip_springs(
 /// Outside: one step of Newton's iteration for the point of the tissue that the tip is at, for the needle moves little from step to
 /// step; through the skin, or the top face, a track begins.
 fn look_for_surface((mesh, free): (&BlockMesh, &FreePlan), u: &[DVec3], tip: &mut FreeTip, pose: &ToolPose) {
-    let near = within_tissue(mesh, free, tip.place);
+    let near = free.skin.nearest(mesh, tip.place);
     let at = material_place(mesh, u, near);
     let away = pose.tip - at.position - (tip.place - near);
     tip.place += pulled_back(at.gradient, away);
-    let Some(skin) = free.skin_at(mesh, tip.place) else { return };
+    let Some(skin) = free.skin.skin_at(mesh, tip.place) else { return };
     let over = within_block(mesh, tip.place.with_z(skin)) == tip.place.with_z(skin);
     // Nearer than a tenth of a millimetre: far from the solution a step may end anywhere.
     if over && tip.place.z <= skin + 1e-9 && away.length() < 1e-4 {
@@ -230,9 +172,9 @@ impl CpuEngine {
         if !(advance > 0.0 || retreat > 0.0 || slip != DVec3::ZERO) {
             return None;
         }
-        let before = free.skin_at(mesh, tip.place);
+        let before = free.skin.skin_at(mesh, tip.place);
         tip.place += direction * (advance - retreat) + slip;
-        let skin = free.skin_at(mesh, tip.place);
+        let skin = free.skin.skin_at(mesh, tip.place);
         // What glides on the skin goes up and down with it.
         if let (Some(from), Some(to), true) = (before, skin, tip.coordinate == 0.0 && advance == retreat) {
             tip.place.z += to - from;
@@ -251,7 +193,7 @@ impl CpuEngine {
         if retreat > 0.0 && skin.is_some_and(|skin| tip.place.z > skin) {
             *tip = FreeTip { inside: false, advance: 0.0, coordinate: 0.0, entry: 0.0, ..*tip };
         }
-        tip.place = if tip.inside { within_tissue(mesh, free, tip.place) } else { tip.place };
+        tip.place = if tip.inside { free.skin.nearest(mesh, tip.place) } else { tip.place };
         Some(if advance == cap { threshold } else { f64::INFINITY })
     }
 

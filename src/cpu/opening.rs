@@ -14,7 +14,7 @@ use crate::model::opening::{
 use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
 use crate::needle::centre_line::Bend;
-use crate::needle::opening::{Derivatives, Opening, Station, outer, squared_norm_bound};
+use crate::needle::opening::{Derivatives, Opening, OpeningMap, Station, outer, squared_norm_bound};
 use glam::{DMat3, DVec3};
 
 /// What is derived of one station: of the energy E.
@@ -81,9 +81,9 @@ fn within(stations: &[Station], near: &NearCell) -> Station {
 
 impl CpuEngine {
     /// Where all stations are.
-    fn stations_now(&self, plan: &PuncturePlan, opening: &OpeningPlan, tip: DVec3) -> Vec<Now> {
+    fn stations_now(&self, plan: &PuncturePlan, opening: &OpeningPlan, pose: &ToolPose) -> Vec<Now> {
         let (rest, u, a) = (&self.rest, &self.state.displacement, self.state.tip_coordinate);
-        let t = plan.path.direction;
+        let t = pose.direction;
         let shift = plan.contact.as_ref().map_or(0.0, |c| c.part(a)) * self.state.touch.dimple;
         let mut now = self.each(opening.stations.len(), |i| {
             let station = &opening.stations[i];
@@ -91,11 +91,12 @@ impl CpuEngine {
                 return Now::default();
             }
             let centre = mean_place(&station.centre, &station.nodes, rest, u);
-            let behind = (tip - mean_place(&station.disc, &station.nodes, rest, u)).dot(t) - shift;
-            let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.map.shaft));
+            let behind = (pose.tip - mean_place(&station.disc, &station.nodes, rest, u)).dot(t) - shift;
+            let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.shaft));
             let (full, slope) = (radius * opened, rate * opened);
             let (cut, cut_rate) = opening.cut(station, a);
-            let section = Station { centre, radius: full * cut, ..Station::default() };
+            let section =
+                Station { centre, radius: full * cut, rest_direction: station.direction, ..Station::default() };
             Now { section, behind, cut, cut_rate, full, slope, radius, rate }
         });
         for i in 0..now.len() {
@@ -111,11 +112,12 @@ impl CpuEngine {
     /// Stage `opening`: forces of points, near cells, the guide on the needle and friction.
     pub(super) fn opening(&mut self, plan: &PuncturePlan, opening: &OpeningPlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
-        let now = self.stations_now(plan, opening, pose.tip);
+        let now = self.stations_now(plan, opening, pose);
         let sections: Vec<Station> = now.iter().map(|n| n.section).collect();
-        let (sums, elastic) = match self.opened_in_lanes(&model, opening, &sections) {
+        let map = opening.map(pose.direction);
+        let (sums, elastic) = match self.opened_in_lanes(&model, (opening, &map), &sections) {
             Some(found) => found,
-            None => self.opened_in_f64(&model, opening, &sections),
+            None => self.opened_in_f64(&model, (opening, &map), &sections),
         };
         if self.measures {
             self.opening_elastic = elastic;
@@ -124,14 +126,19 @@ impl CpuEngine {
     }
 
     /// Forces of points and near cells on nodes; what is derived of the stations, and the energy that opening adds.
-    fn opened_in_f64(&mut self, model: &Model, opening: &OpeningPlan, sections: &[Station]) -> (Vec<StationSums>, f64) {
+    fn opened_in_f64(
+        &mut self,
+        model: &Model,
+        (opening, map): (&OpeningPlan, &OpeningMap),
+        sections: &[Station],
+    ) -> (Vec<StationSums>, f64) {
         let mut sums = vec![StationSums::default(); sections.len()];
         let mut elastic = 0.0;
         // Points: every station its own.
         let (displacement, measures) = (&self.state.displacement, self.measures);
         let shape = |cell: u32| Shape { material: model.material(cell as usize), measures };
         let points = self
-            .each(sections.len(), |i| point_forces(&shape, opening, &opening.stations[i], &sections[i], displacement));
+            .each(sections.len(), |i| point_forces(&shape, map, &opening.stations[i], &sections[i], displacement));
         for ((station, local), sums) in opening.stations.iter().zip(&points).zip(&mut sums) {
             for (node, (force, bound)) in station.nodes.iter().zip(&local.1) {
                 self.added.add(*node as usize, -*force, *bound);
@@ -142,7 +149,7 @@ impl CpuEngine {
         let displacement = &self.state.displacement;
         let cells = self.each(opening.cells.len(), |i| {
             let near = &opening.cells[i];
-            near_cell_forces(model, shape(near.cell), opening, near, &within(sections, near), displacement)
+            near_cell_forces(model, shape(near.cell), map, near, &within(sections, near), displacement)
         });
         for (near, added) in opening.cells.iter().zip(cells) {
             let Some(found) = added else { continue };
@@ -165,7 +172,7 @@ impl CpuEngine {
     fn opened_in_lanes(
         &mut self,
         model: &Model,
-        opening: &OpeningPlan,
+        (opening, map): (&OpeningPlan, &OpeningMap),
         sections: &[Station],
     ) -> Option<(Vec<StationSums>, f64)> {
         let measures = self.measures;
@@ -173,7 +180,7 @@ impl CpuEngine {
         let CpuEngine { lanes, state, added, .. } = self;
         let OpeningInLanes { opening: lanes, team, numbers, stride } = lanes.as_mut()?.opening()?;
         let displacement = &state.displacement;
-        let [vectors, cells] = lanes.compute(team, opening, sections, displacement, measures);
+        let [vectors, cells] = lanes.compute(team, map, sections, displacement, measures);
         for number in vectors {
             for (lane, (station, index)) in lanes.points_of(number).to_vec().into_iter().enumerate() {
                 let (section, station) = (&sections[station], &opening.stations[station]);
@@ -182,7 +189,7 @@ impl CpuEngine {
                     let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
                     let point = &station.points[index];
                     let (d, energy) =
-                        point_force(shape(point.cell), opening, point, section, &u, |place, force, bound| {
+                        point_force(shape(point.cell), map, point, section, &u, |place, force, bound| {
                             added.add(station.nodes[place] as usize, -force, bound);
                         });
                     found = PointSums::new(&d, energy, point.volume);
@@ -205,7 +212,7 @@ impl CpuEngine {
         }
         for near in cells.into_iter().map(|i| &opening.cells[i]) {
             let section = within(sections, near);
-            let found = near_cell_forces(model, shape(near.cell), opening, near, &section, &self.state.displacement);
+            let found = near_cell_forces(model, shape(near.cell), map, near, &section, &self.state.displacement);
             if let Some(found) = found {
                 elastic += self.add_near_cell(near, &found, &mut sums);
             }
@@ -222,7 +229,7 @@ impl CpuEngine {
         now: &[Now],
         sums: &[StationSums],
     ) {
-        let t = plan.path.direction;
+        let t = pose.direction;
         let model = self.model.clone();
         let count = now.len();
         // By rc with all that follows from it, and by the centre.
@@ -319,7 +326,7 @@ impl CpuEngine {
         let axis = bend.offset + plan.profile.shift * now.radius;
         let aside = now.section.centre - pose.tip;
         let aside = aside - t * aside.dot(t) - axis;
-        let per_radius = opening.guide / opening.map.shaft;
+        let per_radius = opening.guide / opening.shaft;
         let held = per_radius * now.section.radius;
         let by_radius = 0.5 * per_radius * aside.length_squared();
         Guide {
@@ -389,7 +396,7 @@ impl Shape<'_> {
 /// Forces (with the sign of f_int) and bounds of the points of a station at its nodes.
 fn point_forces<'a>(
     shape: &impl Fn(u32) -> Shape<'a>,
-    opening: &OpeningPlan,
+    map: &OpeningMap,
     station: &OpeningStation,
     section: &Station,
     displacement: &[DVec3],
@@ -402,7 +409,7 @@ fn point_forces<'a>(
     let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
     let mut local = vec![(DVec3::ZERO, 0.0); u.len()];
     for point in &station.points {
-        let (d, energy) = point_force(shape(point.cell), opening, point, section, &u, |place, force, bound| {
+        let (d, energy) = point_force(shape(point.cell), map, point, section, &u, |place, force, bound| {
             local[place].0 += force;
             local[place].1 += bound;
         });
@@ -415,14 +422,14 @@ fn point_forces<'a>(
 /// What opening adds at a point: derivatives and energy per volume; `add` gets places of its corners in the station, forces and bounds.
 fn point_force(
     shape: Shape,
-    opening: &OpeningPlan,
+    map: &OpeningMap,
     point: &PathPoint,
     section: &Station,
     u: &[DVec3],
     mut add: impl FnMut(usize, DVec3, f64),
 ) -> (Derivatives<f64>, f64) {
     let (y, h) = point.place_and_gradient(u);
-    let map = opening.map.at(section, y, h);
+    let map = map.at(section, y, h);
     let (d, energy, tangent) = shape.opened(&map, h);
     // Rows of the point's own stiffness.
     let (by_gradient, by_place) = map.amplification();
@@ -447,7 +454,7 @@ type NearCellForces = (CellForces, Derivatives<f64>, f64);
 fn near_cell_forces(
     model: &Model,
     shape_of: Shape,
-    opening: &OpeningPlan,
+    map: &OpeningMap,
     near: &NearCell,
     section: &Station,
     displacement: &[DVec3],
@@ -478,7 +485,7 @@ fn near_cell_forces(
         .filter(|corner| is_volume_place(*corner))
         .map(|corner| {
             let offset = DVec3::from(CORNERS[corner]) * (0.5 * VOLUME_PLACE) * width;
-            (opening.map.dilation(section, middle + gradient * offset), offset)
+            (map.dilation(section, middle + gradient * offset), offset)
         })
         .collect();
     let tangent = material.tangent_bound(h, &PointState::default());
@@ -487,7 +494,7 @@ fn near_cell_forces(
     // What keeps the shape, of what points do not carry.
     if near.share > 0.0 {
         let offset = near.place * width;
-        let map = opening.map.at(section, middle + gradient * offset, h);
+        let map = map.at(section, middle + gradient * offset, h);
         let volume = near.share * shape.volume;
         let (d, w, tangent) = shape_of.opened(&map, h);
         energy += volume * w;

@@ -64,13 +64,8 @@ impl TipLoads {
 
 impl CpuEngine {
     /// What is around the anchor number `index` at the material coordinate `a` [m].
-    fn around_anchor(
-        mesh: &Mesh,
-        plan: &PuncturePlan,
-        (index, columns): (usize, &[Column]),
-        a: f64,
-        direction: DVec3,
-    ) -> Around {
+    fn around_anchor(mesh: &Mesh, plan: &PuncturePlan, (index, columns): (usize, &[Column]), a: f64) -> Around {
+        let direction = plan.path.direction;
         match mesh {
             Mesh::Block(block) => {
                 let x = plan.anchors[index].surface + direction * a;
@@ -108,7 +103,7 @@ impl CpuEngine {
     ///
     /// `g_k = max(0, (p_tip - x_k).t)`, `F = k_tip/N sum g_k`, threshold `F_c(a)` falls from F_pun to F_cut over l_p;
     /// where F > F_c: `a += min((F - F_c) / (k_tip lambda), cap)`, `lambda = <dx_k/da . t>` clamped to 0.2..3. No spring from
-    /// `a = a_exit` on.
+    /// `a = a_exit` on. The needle, of the direction t, may be turned against its path T: what lies at `a` is `a T.t` along it.
     pub(super) fn advance_tip(&mut self, plan: &PuncturePlan, pose: &ToolPose) {
         let model = self.model.clone();
         let mesh = &model.mesh;
@@ -117,17 +112,18 @@ impl CpuEngine {
         let count = plan.anchors.len() as f64;
         let spring = plan.params.tip_stiffness / count;
         let tip_axial = (pose.tip - plan.path.entry).dot(t);
+        let along_needle = if plan.path.direction == t { 1.0 } else { plan.path.direction.dot(t) };
         let place = |u: &[DVec3], a: f64| -> Vec<PlacedAnchor> {
             (0..plan.anchors.len())
                 .map(|index| {
-                    let (nodes, weights, slope) = Self::around_anchor(mesh, plan, (index, &columns), a, t);
-                    let (mut du, mut stretch) = (0.0, 1.0);
+                    let (nodes, weights, slope) = Self::around_anchor(mesh, plan, (index, &columns), a);
+                    let (mut du, mut stretch) = (0.0, along_needle);
                     for i in 0..8 {
                         let along = u[nodes[i]].dot(t);
                         du += weights[i] * along;
                         stretch += slope[i] * along;
                     }
-                    let distance = tip_axial - a - du;
+                    let distance = tip_axial - a * along_needle - du;
                     let gap = if a < plan.exit { distance.max(0.0) } else { 0.0 };
                     PlacedAnchor { distance, gap, stretch, nodes, weights }
                 })

@@ -2,6 +2,7 @@
 
 pub mod block;
 pub mod import;
+pub mod material_place;
 pub mod placement;
 pub mod tet_line;
 pub mod tet_path;

@@ -8,6 +8,7 @@ use crate::anatomy::Case;
 use crate::effects::puncture::Cutting;
 use crate::effects::{TissueMaterial, puncture};
 use crate::mesh::BlockMesh;
+use crate::mesh::material_place::within_block;
 use crate::needle::free_path::{AS_BEFORE, FreeTip, NO_SKIN};
 use crate::needle::gap::Profile;
 use crate::needle::motion::Placement;
@@ -16,32 +17,49 @@ use crate::needle::{NeedleShape, PlannedPath, lateral_axes};
 /// Room around the planned motion for the nodes and cells of a free path: tissue moves before the tip comes [m].
 const FREE_PATH_ROOM: f64 = 1.0e-3;
 
-/// What a free path needs instead of a planned one.
+/// Box of cells below the skin.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FreePlan {
-    /// Box of the cells that the tip may open: first cell and number of cells along each axis.
+pub struct Skin {
+    /// First cell and number of cells along each axis.
     pub low: [usize; 3],
     pub count: [usize; 3],
-    /// Tip forces of each material of the scene, then of nothing, where cells hold nothing.
-    pub cuttings: Vec<Cutting>,
-    /// Which of them the tip finds in a cell of the box; [`AS_BEFORE`]: those that it had before.
-    pub tissues: Vec<u8>,
     /// Heights of the skin over the node columns of the box, rows of x [m]; [`NO_SKIN`] where there is no tissue. Empty: the top face, 0.
     pub heights: Vec<f64>,
 }
 
+/// What a free path needs instead of a planned one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreePlan {
+    /// Box of the cells that the tip may open.
+    pub skin: Skin,
+    /// Tip forces of each material of the scene, then of nothing, where cells hold nothing.
+    pub cuttings: Vec<Cutting>,
+    /// Which of them the tip finds in a cell of the box; [`AS_BEFORE`]: those that it had before.
+    pub tissues: Vec<u8>,
+}
+
 impl FreePlan {
     pub fn cell_count(&self) -> usize {
-        self.count.iter().product()
+        self.skin.count.iter().product()
     }
 
     /// Grid coordinates of the cell number `index` of the box.
     pub fn cell(&self, index: usize) -> [usize; 3] {
-        let [nx, ny, _] = self.count;
+        let [nx, ny, _] = self.skin.count;
         let part = [index % nx, index / nx % ny, index / (nx * ny)];
-        std::array::from_fn(|a| self.low[a] + part[a])
+        std::array::from_fn(|a| self.skin.low[a] + part[a])
     }
 
+    /// Number of a cell in the box; `None` outside it.
+    pub fn index(&self, cell: [usize; 3]) -> Option<usize> {
+        let Skin { low, count, .. } = &self.skin;
+        let inside = (0..3).all(|a| (low[a]..low[a] + count[a]).contains(&cell[a]));
+        let [i, j, k]: [usize; 3] = std::array::from_fn(|a| cell[a].wrapping_sub(low[a]));
+        inside.then(|| (k * count[1] + j) * count[0] + i)
+    }
+}
+
+impl Skin {
     /// Height of the skin at a rest position [m]: `None` where there is no tissue below.
     pub fn skin_at(&self, mesh: &BlockMesh, x: DVec3) -> Option<f64> {
         if self.heights.is_empty() {
@@ -62,18 +80,20 @@ impl FreePlan {
         (height > 1e-2 * NO_SKIN).then_some(height)
     }
 
+    /// The rest position itself or the nearest one in the tissue: in the block, and not above the skin.
+    pub fn nearest(&self, mesh: &BlockMesh, x: DVec3) -> DVec3 {
+        let x = within_block(mesh, x);
+        match self.skin_at(mesh, x) {
+            Some(skin) if !self.heights.is_empty() => DVec3 { z: x.z.min(skin), ..x },
+            _ => x,
+        }
+    }
+
     /// Heights at the four corners of a column of cells of the box: x first [m].
     pub fn corner_heights(&self, [i, j]: [usize; 2]) -> [f64; 4] {
         let row = self.count[0] + 1;
         let at = |i: usize, j: usize| self.heights.get(j * row + i).copied().unwrap_or(0.0);
         [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)]
-    }
-
-    /// Number of a cell in the box; `None` outside it.
-    pub fn index(&self, cell: [usize; 3]) -> Option<usize> {
-        let inside = (0..3).all(|a| (self.low[a]..self.low[a] + self.count[a]).contains(&cell[a]));
-        let [i, j, k]: [usize; 3] = std::array::from_fn(|a| cell[a].wrapping_sub(self.low[a]));
-        inside.then(|| (k * self.count[1] + j) * self.count[0] + i)
     }
 }
 
@@ -117,10 +137,6 @@ impl Model {
             }
         }
         let count = std::array::from_fn(|a| high[a].saturating_sub(low[a]));
-        let heights = match self.scene.case.as_deref() {
-            Some(case) if !self.composition.empty.is_empty() => heights(case, mesh, low, count),
-            _ => Vec::new(),
-        };
         let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
         let cutting = |m: &TissueMaterial| {
             let cutting = m.cutting.unwrap_or(own);
@@ -129,7 +145,11 @@ impl Model {
         };
         let cuttings = std::iter::once(&self.scene.material).chain(self.scene.regions.iter().map(|r| &r.material));
         let path = PlannedPath::into_block(motion.entry, motion.direction);
-        let mut free = FreePlan { low, count, cuttings: cuttings.map(cutting).collect(), tissues: Vec::new(), heights };
+        let mut free = FreePlan {
+            skin: self.skin_over(low, count),
+            cuttings: cuttings.map(cutting).collect(),
+            tissues: Vec::new(),
+        };
         let composition = &self.composition;
         let tissue = |cell: usize| match (composition.rigid.get(cell), composition.empty.get(cell)) {
             (Some(true), _) => AS_BEFORE,
@@ -167,10 +187,24 @@ impl Model {
         self.weigh_cut_carriers();
     }
 
+    /// The skin over a box of cells of the block: first cell, and number of cells along each axis.
+    pub(super) fn skin_over(&self, low: [usize; 3], count: [usize; 3]) -> Skin {
+        let heights = match (self.scene.case.as_deref(), self.mesh.as_block()) {
+            (Some(case), Some(mesh)) if !self.composition.empty.is_empty() => heights(case, mesh, low, count),
+            _ => Vec::new(),
+        };
+        Skin { low, count, heights }
+    }
+
+    /// The skin, where the path is free.
+    pub fn skin(&self) -> Option<&Skin> {
+        let free = self.puncture.as_ref().and_then(|plan| plan.free.as_ref());
+        free.map(|free| &free.skin).or(self.laid.as_ref().map(|laid| &laid.skin))
+    }
+
     /// Height of the skin at a rest position [m], where the path is free: `None` where there is no tissue below.
     pub fn skin_at(&self, x: DVec3) -> Option<f64> {
-        let free = self.puncture.as_ref().and_then(|plan| plan.free.as_ref())?;
-        free.skin_at(self.mesh.as_block()?, x)
+        self.skin()?.skin_at(self.mesh.as_block()?, x)
     }
 
     /// The tip before the run, where the path is free.

@@ -16,15 +16,17 @@ use glam::DVec3;
 
 pub use composition::Composition;
 pub use contact::{ContactNode, ContactSurface};
-pub use free_path::FreePlan;
+pub use free_path::{FreePlan, Skin};
 pub use puncture::{
     ANCHOR_COUNT, LARGEST_ANCHOR_COUNT, LARGEST_SEGMENT_COUNT, PathCell, PathSegment, PuncturePlan, TipAnchor,
 };
 
+use crate::effects::puncture::SchemeWord;
 use crate::effects::{EffectSet, cohesive};
 use crate::material_point::Material;
 use crate::mesh::tets::SIDE_TOLERANCE;
 use crate::mesh::{Mesh, TissuePoint};
+use crate::needle::path_line::PathLine;
 use crate::needle::{Kinematics, PlannedPath};
 use crate::scene::{Face, FaceCondition, Scene};
 use crate::separation::Separation;
@@ -39,6 +41,13 @@ pub const HELD: u32 = 7;
 /// (`free_hand/reinsertion.toml` in its usual step: 8.5 against 3.7 %); with 0.25 squeezed cells outrun the masses that are raised for
 /// them, and a block that is let go from 0.4 of its height triples its energy.
 const SPEED_PER_STEP: f64 = 0.1;
+
+/// A path that is laid while the needle comes.
+#[derive(Debug, Clone)]
+pub struct LaidPath {
+    pub line: PathLine,
+    pub skin: Skin,
+}
 
 /// Everything constant.
 #[derive(Debug, Clone)]
@@ -63,6 +72,8 @@ pub struct Model {
     pub node_load: Vec<DVec3>,
     /// Time over which the loads grow [s].
     pub load_ramp: f64,
+    /// The path that is laid while the needle comes: a free path in the scheme `opening`.
+    pub laid: Option<LaidPath>,
     pub puncture: Option<PuncturePlan>,
     pub indentation: Option<crate::effects::indentation::Plan>,
     /// Faces that may separate, and copies that are tied.
@@ -102,7 +113,9 @@ impl Model {
         let targets = scene.targets.iter().map(|target| TissuePoint::in_mesh(&mesh, target.position)).collect();
         let kinematics = (!scene.motion.phases.is_empty())
             .then(|| Kinematics::new(&scene.motion).no_deeper_than(rigid::deepest(&scene)));
+        let is_laid = scene.has_free_path() && scene.effects.puncture.is_some_and(|p| p.scheme == SchemeWord::Opening);
         let mut model = Model {
+            laid: None,
             effects: scene.effects.clone(),
             node_flags: node_flags(&scene, &mesh, &composition),
             materials,
@@ -122,6 +135,10 @@ impl Model {
             scene,
             mesh,
         };
+        if is_laid && let Some(block) = model.mesh.as_block() {
+            let line = PathLine::straight(model.scene.motion.entry, model.scene.motion.direction);
+            model.laid = Some(LaidPath { line, skin: model.skin_over([0; 3], block.cells()) });
+        }
         model.plan_separation();
         model.plan_puncture();
         model.plan_indentation();

@@ -9,7 +9,8 @@ use crate::effects::puncture::LEAST_TRAVELS;
 use crate::mesh::{BlockMesh, CORNERS, trilinear};
 use crate::needle::lateral_axes;
 use crate::needle::opening::OpeningMap;
-use crate::needle::{NeedleShape, PlannedPath};
+use crate::needle::NeedleShape;
+use crate::needle::path_line::PathLine;
 
 /// Distance between stations, in needle radii.
 const SPACING: f64 = 0.22;
@@ -72,6 +73,9 @@ pub struct PathPoint {
 pub struct OpeningStation {
     /// Material coordinate Z of its middle [m].
     pub depth: f64,
+    /// Rest position of its middle [m], and direction of the path there (unit vector).
+    pub middle: DVec3,
+    pub direction: DVec3,
     /// All nodes that it acts on.
     pub nodes: Vec<u32>,
     /// Mean of the innermost ring: the middle of the path. Mean over the section of the needle: where it is along the needle.
@@ -112,7 +116,10 @@ pub struct NearCell {
 /// What the scheme prepares.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpeningPlan {
-    pub map: OpeningMap,
+    /// Radius R of the needle [m].
+    pub shaft: f64,
+    /// s0 of the map [m^2].
+    pub least: f64,
     /// Length of the tip [m]; behind it the radius is that of the shaft.
     pub tip_length: f64,
     /// Distance between stations [m].
@@ -144,17 +151,22 @@ impl NearCell {
 }
 
 impl OpeningPlan {
+    /// The map around a needle of this direction (unit vector).
+    pub fn map(&self, direction: DVec3) -> OpeningMap {
+        OpeningMap { direction, shaft: self.shaft, least: self.least }
+    }
+
     /// Radius of the needle at `s` behind its tip [m], and its rate. The corner between tip and shaft is rounded over the distance of two
     /// stations: at a sharp one the force along the needle fell by what a station holds (12 % of the tip's force) as it passed.
     pub fn radius(&self, s: f64) -> (f64, f64) {
-        let rate = self.map.shaft / self.tip_length;
+        let rate = self.shaft / self.tip_length;
         let left = self.tip_length + 0.5 * self.spacing - s;
         match s {
             s if s <= 0.0 => (0.0, 0.0),
             s if left > self.spacing => (rate * s, rate),
             _ => {
                 let bend = left.max(0.0) / self.spacing;
-                (self.map.shaft - 0.5 * rate * self.spacing * bend * bend, rate * bend)
+                (self.shaft - 0.5 * rate * self.spacing * bend * bend, rate * bend)
             }
         }
     }
@@ -181,7 +193,7 @@ impl OpeningPlan {
 
 /// What the stations are made from.
 pub struct OpeningInput<'a> {
-    pub path: &'a PlannedPath,
+    pub line: &'a PathLine,
     pub needle: &'a NeedleShape,
     /// Deepest material coordinate of the tip and the end of the material [m].
     pub deepest: f64,
@@ -235,12 +247,12 @@ fn place_in(mesh: &BlockMesh, x: DVec3) -> Place {
 }
 
 impl OpeningPlan {
-    /// Stations, points and cells of a straight path through a block.
+    /// Stations, points and cells of a path through a block.
     pub fn new(mesh: &BlockMesh, input: &OpeningInput) -> Self {
         let shaft = input.needle.radius;
         let spacing = SPACING * shaft;
         let near = (2.0 * input.cell_size).clamp(NEAR[0] * shaft, NEAR[1] * shaft);
-        let direction = input.path.direction;
+        let direction = input.line.piece(0.0).direction;
         // An oblique path reaches the surface at one side before its axis does.
         let tilt = direction.truncate().length() / -direction.z;
         let first = -(near * tilt / spacing).ceil() as i32;
@@ -251,7 +263,8 @@ impl OpeningPlan {
         let least = 0.03 * stations.iter().map(|s| s.hole).fold(f64::INFINITY, f64::min).powi(2) / shaft;
         let average = (1.45 * shaft).max(1.5 * input.cell_size);
         let mut plan = OpeningPlan {
-            map: OpeningMap { direction, rest_direction: direction, shaft, least: least * least },
+            shaft,
+            least: least * least,
             tip_length: input.needle.tip_length,
             spacing,
             clusters: clusters_of(&stations),
@@ -275,10 +288,10 @@ impl OpeningPlan {
 
 fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, near: f64) -> OpeningStation {
     let depth = (f64::from(number) + 0.5) * spacing;
-    let PlannedPath { entry, direction, .. } = *input.path;
+    let direction = input.line.piece(depth).direction;
     let (e1, e2) = lateral_axes(direction);
     let hole = (input.hole)(depth).min(0.9 * near);
-    let middle = entry + direction * depth;
+    let middle = input.line.point(depth);
     let at = |r: f64, part: f64| {
         let angle = std::f64::consts::TAU * part;
         middle + (e1 * angle.cos() + e2 * angle.sin()) * r
@@ -327,7 +340,7 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, ne
             });
         }
     }
-    OpeningStation { depth, nodes: nodes.list, centre, disc, points, hole }
+    OpeningStation { depth, middle, direction, nodes: nodes.list, centre, disc, points, hole }
 }
 
 fn clusters_of(stations: &[OpeningStation]) -> Vec<Cluster> {
@@ -348,14 +361,10 @@ fn clusters_of(stations: &[OpeningStation]) -> Vec<Cluster> {
 /// Cells that the map reaches, with the part of their volume outside of the zone of points.
 fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: f64, end: f64) -> Vec<NearCell> {
     const SAMPLES: usize = 12;
-    let faded = crate::needle::opening::FADED * plan.map.shaft;
+    let faded = crate::needle::opening::FADED * plan.shaft;
     let last = plan.stations.len() - 1;
     let first = plan.stations[0].depth - 0.5 * plan.spacing;
-    let coordinates = |x: DVec3| {
-        let relative = x - input.path.entry;
-        let axial = relative.dot(input.path.direction);
-        ((relative - input.path.direction * axial).length(), axial)
-    };
+    let coordinates = |x: DVec3| input.line.coordinates(x);
     let mut cells: Vec<NearCell> = (0..mesh.cell_count())
         .filter_map(|cell| {
             let size = mesh.cell_size(cell);
@@ -380,7 +389,7 @@ fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: 
                 }
             };
             // Half of its extent along the path, of a sphere where the path is oblique.
-            let t = input.path.direction.abs();
+            let t = input.line.piece(s).direction.abs();
             let half = 0.5 * size.dot(t * t);
             let index = |s: f64| (((s - first) / plan.spacing).round().max(0.0) as usize).min(last + 1);
             let (from, to) = (index(s - half), index(s + half));

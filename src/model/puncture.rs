@@ -5,13 +5,14 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::opening::{OpeningInput, OpeningPlan};
-use super::{ContactNode, ContactSurface, FreePlan, Model, tet_puncture};
+use super::{ContactNode, ContactSurface, FreePlan, LaidPath, Model, tet_puncture};
 use crate::anatomy::Case;
 use crate::effects::puncture;
 use crate::effects::puncture::{Cutting, SchemeWord, left_before_exit};
 use crate::mesh::{BlockMesh, Bore};
 use crate::mesh::{Mesh, TetLine};
 use crate::needle::gap::Profile;
+use crate::needle::path_line::PathLine;
 use crate::needle::slit::REFERENCE_EDGE;
 use crate::needle::tip_contact::{DISC, TipContact};
 use crate::needle::{NeedleShape, PlannedPath, Tool, lateral_axes, ring_around, tip_lines};
@@ -161,7 +162,8 @@ impl Model {
             return;
         };
         let needle = needle.clone();
-        if self.scene.has_free_path() {
+        let opening = params.scheme == SchemeWord::Opening;
+        if self.scene.has_free_path() && !opening {
             self.plan_free_path(params, needle);
             return;
         }
@@ -169,8 +171,15 @@ impl Model {
             self.plan_puncture_of_tets(params, needle);
             return;
         }
-        let path = PlannedPath::into_block(self.scene.motion.entry, self.scene.motion.direction);
-        let deepest = self.scene.motion.deepest();
+        let line = self
+            .laid
+            .as_ref()
+            .map(|laid| laid.line.clone())
+            .unwrap_or_else(|| PathLine::straight(self.scene.motion.entry, self.scene.motion.direction));
+        let ahead = line.ahead();
+        let path = PlannedPath::into_block(ahead.origin, ahead.direction);
+        // A hand may lead it as deep as there is tissue.
+        let deepest = if params.anywhere { f64::INFINITY } else { self.scene.motion.deepest() };
         let Some(mesh) = self.mesh.as_block() else { return };
         let case = self.scene.case.as_deref();
         // Faces that separate need no softened path; the core of a hollow needle is severed cell by cell.
@@ -179,11 +188,18 @@ impl Model {
             (Some(_), None) => Vec::new(),
             (None, _) => path_cells(mesh, &path, &params, deepest),
         };
-        let exit = self.scene.tissue.size.z / -path.direction.z;
+        let exit = match &self.laid {
+            Some(_) => (mesh.lines[2][0] - path.entry.z) / path.direction.z,
+            None => self.scene.tissue.size.z / -path.direction.z,
+        };
+        let deepest = deepest.min(exit);
         let surfaces = self.separated_surfaces(&path);
-        let opening = params.scheme == SchemeWord::Opening;
         let anchors = match opening {
-            true => disc_anchors(&path, &needle, case),
+            // Where the line has turned the front is across it.
+            true if line.pieces().len() > 1 => disc_offsets(&path, &needle)
+                .map(|o| TipAnchor { surface: path.entry + o, axial_offset: 0.0 })
+                .collect(),
+            true => disc_offsets(&path, &needle).map(|o| anchor_beside(&path, o, case)).collect(),
             false => tip_anchors(&path, &needle, self.effects.cohesive.is_some(), case),
         };
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the outermost anchor.
@@ -209,12 +225,12 @@ impl Model {
         self.weigh_cut_carriers();
         self.join_slit_faces();
         let segments = path_segments(&self.scene, &params, &needle, exit, |depth| {
-            self.scene.region_at(path.entry + path.direction * depth)
+            self.scene.region_at(line.point(depth))
         });
         self.puncture =
             Some(self.puncture_plan(params, needle, path, Way { segments, anchors, lines: Vec::new(), exit, cells }));
         if opening {
-            self.plan_opening();
+            self.plan_opening(&line, deepest);
         }
     }
 
@@ -265,15 +281,15 @@ impl Model {
         }
     }
 
-    /// The scheme `opening` on the path that is planned.
-    fn plan_opening(&mut self) {
+    /// The scheme `opening` on the path along `line`, down to the material coordinate `deepest` [m].
+    fn plan_opening(&mut self, line: &PathLine, deepest: f64) {
         let (Some(mesh), Some(plan)) = (self.mesh.as_block(), &self.puncture) else { return };
         let opening = OpeningPlan::new(
             mesh,
             &OpeningInput {
-                path: &plan.path,
+                line,
                 needle: &plan.needle,
-                deepest: self.scene.motion.deepest(),
+                deepest,
                 exit: plan.exit,
                 cell_size: self.scene.tissue.cell_size,
                 shear_modulus: self.scene.material.law.shear_modulus(),
@@ -282,7 +298,7 @@ impl Model {
                 hole: &|depth| plan.segment(depth.max(0.0)).hole,
             },
         );
-        let below = plan.path.entry + plan.path.direction * SEGMENT_STEP;
+        let below = line.point(SEGMENT_STEP);
         let material = self.scene.material_at(below);
         let surface = Surface::new(&material.law, &plan.needle);
         let puncture_force = plan.segments[0].cutting.puncture_force;
@@ -293,6 +309,16 @@ impl Model {
         plan.contact = Some(contact);
         plan.cells.clear();
         self.contact_nodes.iter_mut().for_each(|c| c.pushed = false);
+    }
+
+    /// The same model with its path along another line, where paths are laid.
+    pub fn relaid(&self, line: PathLine) -> Model {
+        let mut model = self.clone();
+        if let Some(LaidPath { line: laid, .. }) = &mut model.laid {
+            *laid = line;
+            model.plan_puncture();
+        }
+        model
     }
 
     /// The scheme `opening`, where the scene has it.
@@ -394,23 +420,24 @@ fn tip_anchors(path: &PlannedPath, needle: &NeedleShape, cohesive: bool, case: O
     offsets.into_iter().map(|o| anchor_beside(path, o, case)).collect()
 }
 
-/// Lines on which the tip acts in the scheme `opening`: each stands for the same part of a disc of the radius [`DISC`] R.
-fn disc_anchors(path: &PlannedPath, needle: &NeedleShape, case: Option<&Case>) -> Vec<TipAnchor> {
+/// Places across the path of the lines on which the tip acts in the scheme `opening`: each stands for the same part of a disc of the radius
+/// [`DISC`] R.
+fn disc_offsets(path: &PlannedPath, needle: &NeedleShape) -> impl Iterator<Item = DVec3> {
     let (e1, e2) = lateral_axes(path.direction);
     let within = |ring: usize| (1 + 3 * ring * (ring + 1)) as f64;
-    let offsets = (0..=RINGS).flat_map(|ring| {
+    let radius_of_needle = needle.radius;
+    (0..=RINGS).flat_map(move |ring| {
         // Half of the area of the ring lies within this radius.
         let radius = match ring {
             0 => 0.0,
-            _ => DISC * needle.radius * (0.5 * (within(ring - 1) + within(ring)) / within(RINGS)).sqrt(),
+            _ => DISC * radius_of_needle * (0.5 * (within(ring - 1) + within(ring)) / within(RINGS)).sqrt(),
         };
         let count = (6 * ring).max(1);
         (0..count).map(move |i| {
             let angle = std::f64::consts::TAU * i as f64 / count as f64;
             (e1 * angle.cos() + e2 * angle.sin()) * radius
         })
-    });
-    offsets.map(|o| anchor_beside(path, o, case)).collect()
+    })
 }
 
 /// The anchor whose line runs at `offset` [m] from the path.

@@ -7,6 +7,7 @@ pub mod free_path;
 pub mod gap;
 pub mod motion;
 pub mod opening;
+pub mod path_line;
 mod shape;
 pub mod slit;
 pub mod tip_contact;

@@ -36,6 +36,8 @@ pub struct Station {
     /// Radius of the needle there [m], and its rate with the material coordinate.
     pub radius: f64,
     pub radius_rate: f64,
+    /// Direction of the path at rest t0 (unit vector): gradient of the material coordinate.
+    pub rest_direction: DVec3,
 }
 
 impl Station {
@@ -48,17 +50,17 @@ impl Station {
             mean.centre_rate += station.centre_rate * by;
             mean.radius += station.radius * by;
             mean.radius_rate += station.radius_rate * by;
+            mean.rest_direction += station.rest_direction * by;
         }
         mean
     }
 }
 
-/// What does not change along a path.
+/// What is the same along a whole path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpeningMap {
-    /// Direction of the needle (unit vector), and of the path at rest.
+    /// Direction of the needle (unit vector).
     pub direction: DVec3,
-    pub rest_direction: DVec3,
     /// Radius R of the shaft [m], by which the map fades.
     pub shaft: f64,
     /// s0 [m^2].
@@ -69,28 +71,29 @@ pub struct OpeningMap {
 #[derive(Debug, Clone, Copy)]
 pub struct MapIn<N> {
     direction: [N; 3],
-    rest_direction: [N; 3],
     /// Where it begins to fade [m], and one over the length on which it does [1/m].
     from: N,
     over_width: N,
     least: N,
 }
 
-/// What a place needs of the path: where it lies from the middle [m], the rate of the middle, the radius and its rate.
+/// What a place needs of the path: where it lies from the middle [m], the rate of the middle, the radius and its rate, the direction at rest.
 #[derive(Debug, Clone, Copy)]
 pub struct Beside<N> {
     pub offset: [N; 3],
     pub centre_rate: [N; 3],
     pub radius: N,
     pub radius_rate: N,
+    pub rest_direction: [N; 3],
 }
 
 /// The map at one point: all that its gradient and the derivatives of an energy need.
 #[derive(Debug, Clone, Copy)]
 pub struct Opening<N> {
     map: MapIn<N>,
-    /// rc_Z there.
+    /// rc_Z and t0 there.
     radius_rate: N,
+    rest_direction: [N; 3],
     eta: [N; 3],
     square: N,
     /// g - 1, g and its derivatives by s; g_rc and its derivatives by s and rc.
@@ -207,10 +210,8 @@ impl OpeningMap {
 
     #[inline(always)]
     fn in_lengths<N: Number>(&self, n: N, unit: f64) -> MapIn<N> {
-        let (t, t0) = (self.direction, self.rest_direction);
         MapIn {
-            direction: [n.of(t.x), n.of(t.y), n.of(t.z)],
-            rest_direction: [n.of(t0.x), n.of(t0.y), n.of(t0.z)],
+            direction: self.direction.to_array().map(|x| n.of(x)),
             from: n.of(EXACT * self.shaft / unit),
             over_width: n.of(unit / ((FADED - EXACT) * self.shaft)),
             least: n.of(self.least / (unit * unit)),
@@ -224,6 +225,7 @@ impl OpeningMap {
             centre_rate: station.centre_rate.to_array(),
             radius: station.radius,
             radius_rate: station.radius_rate,
+            rest_direction: station.rest_direction.to_array(),
         };
         self.in_numbers(0.0).at(&beside, &h.to_cols_array_2d())
     }
@@ -302,13 +304,14 @@ impl<N: Number> MapIn<N> {
             column[a] = column[a] + one;
             column = across(self.direction, column);
             for b in 0..3 {
-                column[b] = column[b] - beside.centre_rate[b] * self.rest_direction[a];
+                column[b] = column[b] - beside.centre_rate[b] * beside.rest_direction[a];
             }
             lateral[a] = column;
         }
         Opening {
             map: *self,
             radius_rate: beside.radius_rate,
+            rest_direction: beside.rest_direction,
             eta,
             square: s,
             g_less: (area * v).over(g + one),
@@ -352,12 +355,12 @@ impl<N: Number> Opening<N> {
     /// F - I, of F = grad x, from the gradient of the displacement that the map was made with.
     #[inline(always)]
     pub fn gradient(&self, h: &Tensor<N>) -> Tensor<N> {
-        let Opening { eta, g_less, g1, gr, lateral, map, .. } = *self;
+        let Opening { eta, g_less, g1, gr, lateral, rest_direction, .. } = *self;
         let ht_eta = transposed_times(&lateral, eta);
         let (twice, widening) = (self.g.of(2.0) * g1, gr * self.radius_rate);
         let mut f = *h;
         for a in 0..3 {
-            let by_eta = ht_eta[a].mul_add(twice, map.rest_direction[a] * widening);
+            let by_eta = ht_eta[a].mul_add(twice, rest_direction[a] * widening);
             for b in 0..3 {
                 f[a][b] = eta[b].mul_add(by_eta, lateral[a][b].mul_add(g_less, f[a][b]));
             }
@@ -368,12 +371,12 @@ impl<N: Number> Opening<N> {
     /// Derivatives of an energy per volume, from its derivative P by F.
     #[inline(always)]
     pub fn pull_back(&self, p: &Tensor<N>) -> Derivatives<N> {
-        let Opening { eta, g_less, g1, g2, gr, gr1, grr, lateral: h, radius_rate: rcz, map, .. } = *self;
+        let Opening { eta, g_less, g1, g2, gr, gr1, grr, lateral: h, radius_rate: rcz, rest_direction: t0, map, .. } = *self;
         let two = g1.of(2.0);
         let twice = two * g1;
         let (ht_eta, pt_eta) = (transposed_times(&h, eta), transposed_times(p, eta));
         let h_p = dot(h[2], p[2]) + (dot(h[1], p[1]) + dot(h[0], p[0]));
-        let (stretched, sheared) = (dot(pt_eta, ht_eta), dot(pt_eta, map.rest_direction));
+        let (stretched, sheared) = (dot(pt_eta, ht_eta), dot(pt_eta, t0));
         let mut by_h = *p;
         for a in 0..3 {
             let by_eta = pt_eta[a] * twice;
@@ -385,13 +388,13 @@ impl<N: Number> Opening<N> {
             by_h[a] = across(map.direction, column);
         }
         let along_eta = twice * h_p + g1.of(4.0) * g2 * stretched + two * gr1 * rcz * sheared;
-        let (p_ht_eta, h_pt_eta, p_t0) = (times(p, ht_eta), times(&h, pt_eta), times(p, map.rest_direction));
+        let (p_ht_eta, h_pt_eta, p_t0) = (times(p, ht_eta), times(&h, pt_eta), times(p, t0));
         let widening = gr * rcz;
         let mut place = eta;
         for b in 0..3 {
             place[b] = p_t0[b].mul_add(widening, (p_ht_eta[b] + h_pt_eta[b]).mul_add(twice, eta[b] * along_eta));
         }
-        let rate = times(&by_h, map.rest_direction);
+        let rate = times(&by_h, t0);
         let none = g1.of(0.0);
         let mut gradient = by_h;
         for a in 0..3 {
@@ -440,7 +443,7 @@ mod tests {
 
     fn map() -> OpeningMap {
         let direction = DVec3::new(0.2, -0.3, -1.0).normalize();
-        OpeningMap { direction, rest_direction: DVec3::new(0.25, -0.2, -1.0).normalize(), shaft: 0.8e-3, least: 4e-10 }
+        OpeningMap { direction, shaft: 0.8e-3, least: 4e-10 }
     }
 
     fn station() -> Station {
@@ -450,6 +453,7 @@ mod tests {
             centre_rate: across(DVec3::new(0.05, 0.02, 0.0)),
             radius: 0.5e-3,
             radius_rate: -0.3,
+            rest_direction: DVec3::new(0.25, -0.2, -1.0).normalize(),
         }
     }
 
@@ -493,7 +497,7 @@ mod tests {
             for (axis, column) in [(DVec3::X, f.x_axis), (DVec3::Y, f.y_axis), (DVec3::Z, f.z_axis)] {
                 let step = 1e-8;
                 let at = |h: f64| {
-                    let along = h * axis.dot(map.rest_direction);
+                    let along = h * axis.dot(station.rest_direction);
                     let moved = Station {
                         centre: station.centre + station.centre_rate * along,
                         radius: station.radius + station.radius_rate * along,
@@ -580,7 +584,7 @@ mod tests {
     #[test]
     fn a_line_becomes_a_hole_and_volume_is_kept() {
         let map = OpeningMap { least: 0.0, ..map() };
-        let straight = Station { radius: 0.8e-3, ..Station::default() };
+        let straight = Station { radius: 0.8e-3, rest_direction: map.direction, ..Station::default() };
         let side = map.across(DVec3::X).normalize();
         let x = map.place(&straight, side * 1e-7);
         assert!((x.dot(side) - 0.8e-3).abs() < 1e-9);

@@ -52,6 +52,20 @@ impl Change {
         &self.model.scene
     }
 
+    pub(super) fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The same scene with its path along another line, and its steps: the stable one and the one that is taken [s], and steps per frame.
+    pub(super) fn to_line(
+        model: Arc<Model>,
+        (stable_dt, dt, steps_per_frame): (f64, f64, u64),
+        device: Option<Gpu>,
+        purpose: Purpose,
+    ) -> Self {
+        Change { reach: Reach::Kernels, model, stable_dt, dt, steps_per_frame, device, purpose }
+    }
+
     /// The engine of the changed scene; takes as long as starting does, on any thread.
     ///
     /// # Errors
@@ -113,7 +127,11 @@ impl Simulation {
             && now.skin_free == scene.skin_free
             && touching(now) == touching(&scene)
             && now.effects.flexible_needle == scene.effects.flexible_needle;
-        let model = Arc::new(Model::new(scene, mesh));
+        let mut model = Model::new(scene, mesh);
+        if let Some(laying) = self.laying.as_ref().filter(|_| model.laid.is_some()) {
+            model = model.relaid(laying.line().clone());
+        }
+        let model = Arc::new(model);
         let stable_dt = wave_speed_bound(&model);
         let (mut dt, mut steps_per_frame) = choose_step(&model, stable_dt);
         if steps_per_frame > MOST_STEPS_PER_FRAME {
@@ -186,7 +204,7 @@ impl Simulation {
     }
 
     /// The engine has the change; the rest of the simulation follows.
-    fn adopted(&mut self, change: &Change, before: Option<FrameSums>) -> Result<()> {
+    pub(super) fn adopted(&mut self, change: &Change, before: Option<FrameSums>) -> Result<()> {
         if (change.dt, change.steps_per_frame) != (self.clock.dt, self.clock.steps_per_frame) {
             self.clock = match self.collected {
                 0 => Clock::new(change.dt, change.steps_per_frame),
@@ -218,7 +236,7 @@ impl Simulation {
     }
 
     /// The state as a frame without a step measures it; nothing before the first frame.
-    fn measured(&mut self) -> Result<Option<FrameSums>> {
+    pub(super) fn measured(&mut self) -> Result<Option<FrameSums>> {
         if self.collected == 0 {
             return Ok(None);
         }
@@ -237,7 +255,7 @@ fn touching(scene: &Scene) -> ([bool; 4], Option<Vec<crate::effects::cohesive::P
 }
 
 /// The state of a model in the terms of another one on the same mesh.
-fn carried(state: &State, from: &Model, to: &Model) -> State {
+pub(super) fn carried(state: &State, from: &Model, to: &Model) -> State {
     let mut next = CpuEngine::new_state(to);
     next.displacement = state.displacement.clone();
     next.velocity = state.velocity.clone();
@@ -249,6 +267,9 @@ fn carried(state: &State, from: &Model, to: &Model) -> State {
     };
     fitting(&state.stiffness, &mut next.stiffness);
     fitting(&state.pairs, &mut next.pairs);
+    if from.laid.as_ref().map(|laid| &laid.line) == to.laid.as_ref().map(|laid| &laid.line) {
+        on_the_same_path(state, &mut next);
+    }
     if state.cut_samples.len() == next.cut_samples.len() {
         next.cut_samples.clone_from(&state.cut_samples);
     }
@@ -269,6 +290,15 @@ fn carried(state: &State, from: &Model, to: &Model) -> State {
         }
     }
     next
+}
+
+/// What the scheme `opening` remembers of a path, as far as the other one begins alike.
+pub(super) fn on_the_same_path(state: &State, next: &mut State) {
+    for (new, old) in next.stations.iter_mut().zip(&state.stations) {
+        *new = *old;
+    }
+    (next.opening_resistance, next.opening_spreading) = (state.opening_resistance, state.opening_spreading);
+    next.touch = state.touch;
 }
 
 /// Which of its surfaces a contact node stands for.

@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::flexible_needle::NeedleImage;
+use super::laying::Laying;
 use super::stiffening::DueStep;
 use super::{Purpose, Simulation};
 use crate::engine::clock::Clock;
@@ -30,6 +31,9 @@ pub struct Checkpoint {
     pub(super) judge: Judge,
     pub(super) unbalanced_frames: u64,
     pub(super) buckling_told: bool,
+    /// Absent in checkpoints of scenes whose path is not laid.
+    #[serde(default)]
+    pub(super) laying: Option<Laying>,
 }
 
 impl Simulation {
@@ -50,6 +54,7 @@ impl Simulation {
             judge: self.judge.clone(),
             unbalanced_frames: self.unbalanced_frames,
             buckling_told: self.buckling_told,
+            laying: self.laying.clone(),
         })
     }
 
@@ -73,6 +78,7 @@ impl Simulation {
         let mut next =
             Simulation::prepare(scene, mesh, self.device.clone(), Vec::new(), most_steps, Purpose::default())?;
         next.take_clock(clock)?;
+        next.take_laying(checkpoint.laying.clone())?;
         next.engine.write_state(&state)?;
         if let (Some(needle), Some(image)) = (&mut next.needle, &checkpoint.needle) {
             needle.restore(image);
@@ -104,6 +110,7 @@ impl Simulation {
         if same {
             self.take_clock(checkpoint.clock)?;
         }
+        self.take_laying(checkpoint.laying.clone())?;
         self.engine.restore(&checkpoint.engine)?;
         if let (Some(needle), Some(image)) = (&mut self.needle, &checkpoint.needle) {
             needle.restore(image);

@@ -17,6 +17,8 @@ pub mod flexible_needle;
 #[allow(missing_docs)]
 pub mod investigation;
 #[allow(missing_docs)]
+mod laying;
+#[allow(missing_docs)]
 pub mod reach;
 #[allow(missing_docs)]
 mod run_engine;
@@ -48,6 +50,7 @@ use crate::observables::{CoreSample, FrameRecord, Judge, Recorder, TargetRecord}
 use crate::scene::MOST_STEPS_PER_FRAME;
 use crate::verdict::Verdict;
 use flexible_needle::FlexibleNeedle;
+use laying::Laying;
 use stiffening::DueStep;
 
 /// Frames that may be under way before the oldest result is awaited.
@@ -103,6 +106,8 @@ pub struct Simulation {
     /// Frames after which the state is read, so that no later frame may have been started.
     stops: BTreeSet<u64>,
     watch_stretch: bool,
+    /// Where the path is laid while the needle comes.
+    laying: Option<Laying>,
     /// The beam of a flexible needle; every frame waits for the one before.
     needle: Option<FlexibleNeedle>,
     /// Frames in which the beam did not find its balance.
@@ -231,6 +236,7 @@ impl Simulation {
             first_step,
             steps: (first_step..last)
                 .map(|step| StepInput { step, ..StepInput::with(&self.model, tool, clock.time_of(step), dt) })
+                .map(|input| self.laying.as_ref().map_or(input, |laying| laying.seen(input)))
                 .collect(),
             centre_line: None,
         };
@@ -273,6 +279,7 @@ impl Simulation {
         // A window wants each frame as soon as it can be had, not several at once.
         let waits = self.purpose.drawn
             || self.watch_stretch
+            || self.laying.is_some()
             || self.needle.is_some()
             || self.model.has_bore()
             || self.changes_step_at(frame)
@@ -291,6 +298,7 @@ impl Simulation {
     pub fn start_frames(&mut self) -> Result<()> {
         while self.may_start(self.started) {
             self.take_due_steps()?;
+            self.lay_path()?;
             let plan = self.plan(self.started);
             self.engine.start_frame(&plan)?;
             self.started += 1;

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec2, DVec3};
 
 use super::advice::tool_mach;
 use crate::mesh::BlockMesh;
-use crate::model::{FreePlan, Model};
+use crate::model::{Model, Skin};
 use crate::needle::motion::HandPose;
 
 /// Tool speed over the scaled shear wave speed beyond which inertia, not tissue, answers the hand.
@@ -38,7 +38,7 @@ pub struct FreeReach<'a> {
     /// Height of the lowest place of a tip [m], < 0.
     pub floor: f64,
     /// What knows the skin; `None`: the top face, 0.
-    pub skin: Option<(&'a FreePlan, &'a BlockMesh)>,
+    pub skin: Option<(&'a Skin, &'a BlockMesh)>,
 }
 
 /// Where a hand may lead the needle, and how fast.
@@ -58,12 +58,11 @@ impl<'a> Reach<'a> {
         let (low, high) = model.mesh.bounds();
         // A tip that leaves through a side has nothing around it that holds it.
         let margin = 2.0 * model.scene.tissue.cell_size;
-        let plan = model.puncture.as_ref().and_then(|p| p.free.as_ref());
-        let free = plan.map(|plan| FreeReach {
+        let free = model.skin().map(|skin| FreeReach {
             low: low.truncate() + margin,
             high: high.truncate() - margin,
             floor: FLOOR_PART * low.z,
-            skin: model.mesh.as_block().map(|mesh| (plan, mesh)),
+            skin: model.mesh.as_block().map(|mesh| (skin, mesh)),
         });
         Reach { speed, deepest: model.scene.motion.deepest(), free }
     }
@@ -122,7 +121,7 @@ impl<'a> Reach<'a> {
 impl FreeReach<'_> {
     /// The point of the skin above or below a point; `None` where there is no tissue below.
     fn on_skin(&self, x: DVec2) -> Option<DVec3> {
-        let height = self.skin.map_or(Some(0.0), |(plan, mesh)| plan.skin_at(mesh, x.extend(0.0)));
+        let height = self.skin.map_or(Some(0.0), |(skin, mesh)| skin.skin_at(mesh, x.extend(0.0)));
         height.map(|height| x.extend(height))
     }
 

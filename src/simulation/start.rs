@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::advice::advice;
 use super::flexible_needle::FlexibleNeedle;
+use super::laying::Laying;
 use super::{LONGEST_LED, Purpose, RunEngine, Simulation, stretch};
 use crate::cpu::unknown_to_lanes;
 use crate::engine::clock::Clock;
@@ -207,6 +208,7 @@ impl Simulation {
             // The first frame is a single step.
             needle: FlexibleNeedle::new(&model, kinematics.as_ref(), dt),
             kinematics,
+            laying: Laying::of(&model),
             led_frames: 0,
             unbalanced_frames: 0,
             buckling_told: false,

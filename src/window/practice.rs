@@ -486,7 +486,7 @@ impl Practice {
 
     /// True where a hand may choose the angle and the point of entry.
     pub fn path_is_free(&self) -> bool {
-        self.simulation.model.puncture.as_ref().is_some_and(|p| p.free.is_some())
+        self.simulation.model.skin().is_some()
     }
 
     /// What the tissue can follow of what the hand wants.

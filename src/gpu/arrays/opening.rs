@@ -142,8 +142,8 @@ fn params(source: &Source) -> OpeningParams {
     let (Some(opening), Some(plan)) = (model.opening(), &model.puncture) else { return OpeningParams::zeroed() };
     let Some(contact) = &plan.contact else { return OpeningParams::zeroed() };
     let friction = model.effects.friction.unwrap_or_default();
-    let shaft = opening.map.shaft;
-    let [x, y, z, _] = vec4(opening.map.direction);
+    let shaft = opening.shaft;
+    let [x, y, z, _] = vec4(plan.path.direction);
     let [ex, ey, ez, _] = vec4(plan.path.entry);
     let stick = friction.stiffness_ratio * opening.stick;
     let [clusters, cells, nodes] = opening_counts(model);
@@ -153,7 +153,7 @@ fn params(source: &Source) -> OpeningParams {
         numbers: [
             opening.spacing as f32,
             opening.guide as f32,
-            (opening.map.least / (shaft * shaft)) as f32,
+            (opening.least / (shaft * shaft)) as f32,
             opening.advance_limit(0.0, dt) as f32,
         ],
         friction: [friction.coefficient as f32, stick as f32, friction.fade_length.max(1e-9) as f32, 0.0],
@@ -317,7 +317,7 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
         let end = tables.entries.len() as u32;
         let cut_from = station.depth.abs().max(0.5 * opening.spacing);
         tables.stations.push(OpeningStation {
-            depth: [station.depth as f32, cut_from as f32, station.opened(opening.map.shaft) as f32, 0.0],
+            depth: [station.depth as f32, cut_from as f32, station.opened(opening.shaft) as f32, 0.0],
             lists: [first, middle, middle, end],
             ..OpeningStation::zeroed()
         });

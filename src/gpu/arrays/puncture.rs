@@ -161,7 +161,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             };
             // An anchor acts on the corners of its cell.
             anchor_reach = 1.001 * (plan.needle.radius + (0..free.cell_count()).map(diagonal).fold(0.0, f64::max));
-            for (out, value) in free_low.iter_mut().zip(free.low).chain(free_count.iter_mut().zip(free.count)) {
+            for (out, value) in free_low.iter_mut().zip(free.skin.low).chain(free_count.iter_mut().zip(free.skin.count)) {
                 *out = value as u32;
             }
             for (out, i) in segments.iter_mut().zip(0..) {
@@ -229,7 +229,7 @@ fn free_cells(model: &Model, samples: &[u64]) -> Vec<FreeCell> {
             let [i, j, k] = free.cell(index);
             let cell = mesh.cell_index(i, j, k);
             let marked = samples.get(index).copied().unwrap_or(0);
-            let heights = free.corner_heights([i - free.low[0], j - free.low[1]]).map(|h| h as f32);
+            let heights = free.skin.corner_heights([i - free.skin.low[0], j - free.skin.low[1]]).map(|h| h as f32);
             let with = |v: DVec3, w: f32| [v.x as f32, v.y as f32, v.z as f32, w];
             FreeCell {
                 low: with(DVec3::new(mesh.lines[0][i], mesh.lines[1][j], mesh.lines[2][k]), heights[0]),

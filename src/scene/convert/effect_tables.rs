@@ -88,15 +88,16 @@ impl Check<'_> {
     }
 
     /// What the scheme `opening` does not carry yet.
-    pub(super) fn opening_limits(&mut self, effects: &EffectSet, tool: Option<&Tool>, motion: &Motion, tets: bool) {
-        let Some(puncture) = effects.puncture.filter(|p| p.scheme == SchemeWord::Opening) else { return };
+    pub(super) fn opening_limits(&mut self, effects: &EffectSet, tool: Option<&Tool>, tets: bool) {
+        if effects.puncture.is_none_or(|p| p.scheme != SchemeWord::Opening) {
+            return;
+        }
         let needle = match tool {
             Some(Tool::Needle(needle)) => Some(needle),
             _ => None,
         };
         let without = [
             (tets, "a mesh of tetrahedra"),
-            (puncture.always_free || motion.is_free(), "a free path"),
             (effects.cohesive.is_some(), "the effect cohesive"),
             (effects.plasticity.is_some(), "the effect plasticity"),
             (effects.viscoelastic.is_some(), "the effect viscoelastic"),
@@ -109,7 +110,7 @@ impl Check<'_> {
             self.problems.report(
                 "puncture.scheme",
                 format!("the scheme opening does not carry {} yet", found.join(", ")),
-                "a solid needle on one straight path through elastic tissue",
+                "a solid needle in elastic tissue",
                 "leave the key out for the scheme ring",
             );
         }

@@ -28,7 +28,7 @@ impl WithSimd for SomeCells<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let SomeCells { step, first, found, sums } = self;
-        let map = step.plan.map.in_radii(Lanes::splat(simd, 0.0));
+        let map = step.map.in_radii(Lanes::splat(simd, 0.0));
         for i in 0..found.len() {
             let sums = &mut sums[i * CELL_SUMS * WIDEST..(i + 1) * CELL_SUMS * WIDEST];
             found[i] = cell_vector(simd, &step, &map, first + i, sums);

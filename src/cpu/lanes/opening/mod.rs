@@ -26,7 +26,7 @@ use crate::material::regular::{Constants, Regular};
 use crate::mesh::{BlockMesh, CORNERS, trilinear};
 use crate::model::Model;
 use crate::model::opening::OpeningPlan;
-use crate::needle::opening::{Beside, Derivatives, MapIn, Station};
+use crate::needle::opening::{Beside, Derivatives, MapIn, OpeningMap, Station};
 use crate::number::{Number, Tensor};
 
 /// Rows of a vector of points: place in the cell, 0..1; volume [m^3]; edges of the cell [radii]; c1, c2, c3, c01 and bulk modulus; what a
@@ -196,7 +196,7 @@ impl LaneOpening {
         materials: &[LaneMaterial],
         first_number: impl Fn(usize) -> usize,
     ) -> Self {
-        let shaft = plan.map.shaft;
+        let shaft = plan.shaft;
         let by_bits = corner_of_bits();
         let nodes_of = |cell: usize| {
             let nodes = block.cell_nodes(cell);
@@ -355,12 +355,12 @@ impl LaneOpening {
             + size_of_val(self.cells.as_slice())
     }
 
-    /// Computes all points and cells, for stations and a displacement; `measures`: with energies. Returns the vectors of points and the cells
+    /// Computes all points and cells, for a map, stations and a displacement; `measures`: with energies. Returns the vectors of points and the cells
     /// that the caller has to compute.
     pub fn compute(
         &mut self,
         team: &Team,
-        plan: &OpeningPlan,
+        map: &OpeningMap,
         stations: &[Station],
         u: &[DVec3],
         measures: bool,
@@ -369,7 +369,7 @@ impl LaneOpening {
         let of_span =
             |(first, count): &(u16, u16)| Station::mean(&stations[usize::from(*first)..][..usize::from(*count)]);
         let spans: Vec<Station> = self.spans.iter().map(of_span).collect();
-        let step = Step { all: self, plan, stations, spans: &spans, u, measures };
+        let step = Step { all: self, map, stations, spans: &spans, u, measures };
         let part = team.part(self.vectors.len());
         let mut runs = out.runs.as_mut_slice();
         let vectors = out.vectors.chunks_mut(part).zip(out.points.chunks_mut(part * POINT_SUMS * WIDEST));
@@ -563,7 +563,7 @@ enum Part<'a> {
 #[derive(Clone, Copy)]
 struct Step<'a> {
     all: &'a LaneOpening,
-    plan: &'a OpeningPlan,
+    map: &'a OpeningMap,
     stations: &'a [Station],
     /// The path in cells.
     spans: &'a [Station],
@@ -577,6 +577,7 @@ struct Gathered {
     rate: [[f32; WIDEST]; 3],
     radius: [f32; WIDEST],
     radius_rate: [f32; WIDEST],
+    rest_direction: [[f32; WIDEST]; 3],
     /// 1 where the path is open.
     open: [f32; WIDEST],
     is_any_open: bool,
@@ -585,7 +586,15 @@ struct Gathered {
 impl Gathered {
     fn new() -> Self {
         let none = [0.0; WIDEST];
-        Gathered { offset: [none; 3], rate: [none; 3], radius: none, radius_rate: none, open: none, is_any_open: false }
+        Gathered {
+            offset: [none; 3],
+            rate: [none; 3],
+            radius: none,
+            radius_rate: none,
+            rest_direction: [none; 3],
+            open: none,
+            is_any_open: false,
+        }
     }
 
     /// Takes in a station, seen from the place `at` [m].
@@ -599,6 +608,7 @@ impl Gathered {
         for axis in 0..3 {
             self.offset[axis][lane] = offset[axis] as f32;
             self.rate[axis][lane] = station.centre_rate[axis] as f32;
+            self.rest_direction[axis][lane] = station.rest_direction[axis] as f32;
         }
         self.radius[lane] = (station.radius * over_shaft) as f32;
         self.radius_rate[lane] = station.radius_rate as f32;
@@ -625,6 +635,7 @@ impl Gathered {
             centre_rate: vector(&self.rate),
             radius: Lanes::load(simd, &self.radius, at),
             radius_rate: Lanes::load(simd, &self.radius_rate, at),
+            rest_direction: vector(&self.rest_direction),
         }
     }
 }

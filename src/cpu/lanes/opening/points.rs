@@ -31,7 +31,7 @@ impl WithSimd for SomePoints<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let SomePoints { step, first, found, runs, sums } = self;
-        let map = step.plan.map.in_radii(Lanes::splat(simd, 0.0));
+        let map = step.map.in_radii(Lanes::splat(simd, 0.0));
         let all = step.all;
         let first_run = all.vectors[first].first_run;
         let mut scratch =

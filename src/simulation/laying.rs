@@ -1,0 +1,288 @@
+//! A path that is laid while the needle comes: a free path in the scheme `opening`.
+//!
+//! The scheme carries the tissue beside one line through the material. Where a hand leads the needle, or a motion turns it, that line is not
+//! known before the run, so it is laid between two frames: along the needle where the tip meets the skin, anew where it slides over the skin
+//! before it has cut, and anew ahead of the tip where the needle has turned, along `F^-1 t`. What is cut stays. A tip that comes out leaves its
+//! track, and takes it up again where it comes back to it: there it cuts nothing until the end of the track.
+//!
+//! Nothing acts on a needle that is on no line: the engine sees it far above the surface.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::change::{Change, carried, on_the_same_path};
+use super::start::choose_step;
+use super::{RunEngine, Simulation};
+use crate::effects::adhesion::Bond;
+use crate::engine::stable_dt::wave_speed_bound;
+use crate::engine::{State, StepInput};
+use crate::error::Result;
+use crate::mesh::BlockMesh;
+use crate::mesh::material_place::{material_place, pulled_back, rest_position_at};
+use crate::model::{LaidPath, Model};
+use crate::needle::ToolPose;
+use crate::needle::path_line::PathLine;
+
+/// Height over the skin at which a tip comes to it, and at which it has left it [m].
+const COMES: f64 = 0.02e-3;
+/// See [`COMES`].
+const LEFT: f64 = 0.3e-3;
+
+/// Depth behind which nobody asks whether a tip has left the tissue: by so much friction may lift the skin [m].
+const DEEP: f64 = 2.0e-3;
+
+/// By so much the needle turns until the line ahead of it is looked at, and by so much it has to be off to be laid anew [rad].
+const TURNED: f64 = 0.5 * std::f64::consts::PI / 180.0;
+
+/// Part of its radius that a needle moves aside until the line is looked at.
+const ASIDE: f64 = 0.25;
+
+/// A track is the same where it begins within this part of the radius of the needle, at an angle below this [rad].
+const SAME_ENTRY: f64 = 0.5;
+/// See [`SAME_ENTRY`].
+const SAME_ANGLE: f64 = 3.0 * std::f64::consts::PI / 180.0;
+
+/// Where the engine sees a needle that is on no line, above the entry [m].
+const PARKED: f64 = 20.0e-3;
+
+/// A line that a needle has left, cut up to a material coordinate [m].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Track {
+    line: PathLine,
+    cut: f64,
+}
+
+/// How far the laying has come.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Laying {
+    /// The needle is on the line.
+    is_on: bool,
+    /// The present line.
+    line: PathLine,
+    /// The needle as it was when its line was looked at last.
+    tip: DVec3,
+    direction: DVec3,
+    /// Lines that were left.
+    tracks: Vec<Track>,
+}
+
+/// The tissue as it is between two frames.
+struct Tissue<'a> {
+    mesh: &'a BlockMesh,
+    laid: &'a LaidPath,
+    u: &'a [DVec3],
+}
+
+impl Tissue<'_> {
+    /// The rest position that is at a place.
+    fn rest(&self, x: DVec3) -> DVec3 {
+        rest_position_at(self.mesh, self.u, x, x, |at| self.laid.skin.nearest(self.mesh, at))
+    }
+
+    /// Height of a rest position over the skin [m]; `None` beside the tissue.
+    fn height(&self, rest: DVec3) -> Option<f64> {
+        self.laid.skin.skin_at(self.mesh, rest).map(|skin| rest.z - skin)
+    }
+
+    /// A direction in space as one in the material.
+    fn pulled_back(&self, rest: DVec3, direction: DVec3) -> DVec3 {
+        let at = material_place(self.mesh, self.u, self.laid.skin.nearest(self.mesh, rest));
+        pulled_back(at.gradient, direction).normalize()
+    }
+
+    /// The line of a needle whose tip comes to the rest position, from the skin on; `None` where it points out of the tissue.
+    fn line(&self, rest: DVec3, direction: DVec3) -> Option<PathLine> {
+        /// The skin is flat nearly enough over the way of one round.
+        const ROUNDS: usize = 8;
+        let along = self.pulled_back(rest, direction);
+        let mut entry = rest;
+        for _ in 0..ROUNDS {
+            entry -= along * (self.height(entry)? / along.z);
+        }
+        (along.z < 0.0).then(|| PathLine::straight(entry, along))
+    }
+}
+
+impl Laying {
+    /// Before the run the tip stands on the surface, on the line of the scene.
+    pub(super) fn of(model: &Model) -> Option<Self> {
+        let laid = model.laid.as_ref()?;
+        let motion = &model.scene.motion;
+        let (tip, direction) = (motion.entry, motion.direction);
+        Some(Laying { is_on: true, line: laid.line.clone(), tip, direction, tracks: Vec::new() })
+    }
+
+    /// The line that the needle is on.
+    pub(super) fn line(&self) -> &PathLine {
+        &self.line
+    }
+
+    /// The needle as the engine sees it where it is on no line.
+    pub(super) fn seen(&self, input: StepInput) -> StepInput {
+        if self.is_on {
+            return input;
+        }
+        let ahead = self.line.piece(0.0);
+        let parked = |pose: ToolPose| ToolPose {
+            tip: ahead.origin - ahead.direction * PARKED,
+            direction: ahead.direction,
+            velocity: DVec3::ZERO,
+            angular_velocity: DVec3::ZERO,
+            velocity_ahead: DVec3::ZERO,
+            angular_velocity_ahead: DVec3::ZERO,
+            depth: -PARKED,
+            ..pose
+        };
+        StepInput { pose: input.pose.map(parked), ..input }
+    }
+
+    /// True where the tissue has to be looked at before the needle moves on to `next`.
+    fn must_look(&self, next: &ToolPose, radius: f64) -> bool {
+        let near = (next.tip - self.line.piece(0.0).origin).dot(next.direction) < DEEP;
+        let turned = self.direction.angle_between(next.direction) > TURNED;
+        let aside = next.tip - self.tip;
+        let aside = (aside - self.direction * aside.dot(self.direction)).length() > ASIDE * radius;
+        !self.is_on || near || turned || aside
+    }
+}
+
+/// What a look at the tissue has found.
+enum Found {
+    /// Nothing new.
+    Nothing,
+    /// The tip has left the tissue.
+    Left,
+    /// Another line, cut up to a material coordinate [m].
+    Line(PathLine, f64),
+}
+
+impl Simulation {
+    /// Lays the path of the frame that starts next, where it has to be.
+    pub(super) fn lay_path(&mut self) -> Result<()> {
+        let (Some(laying), Some(kinematics)) = (&self.laying, &self.kinematics) else { return Ok(()) };
+        let time = |frame: u64| self.clock.time_of(self.clock.first_step(frame));
+        let (now, next) = (kinematics.pose(time(self.started)), kinematics.pose(time(self.started + 1)));
+        let radius = self.model.scene.needle().map_or(0.0, |needle| needle.radius);
+        if !laying.must_look(&next, radius) {
+            return Ok(());
+        }
+        let state = self.engine.read_state()?;
+        let found = self.look(&state, (&now, &next), radius);
+        let Some(laying) = &mut self.laying else { return Ok(()) };
+        match found {
+            Found::Nothing => Ok(()),
+            Found::Left => {
+                laying.is_on = false;
+                if state.tip_coordinate > 0.0 {
+                    laying.tracks.push(Track { line: laying.line.clone(), cut: state.tip_coordinate });
+                }
+                Ok(())
+            }
+            Found::Line(line, cut) => {
+                (laying.is_on, laying.tip, laying.direction) = (true, next.tip, next.direction);
+                laying.tracks.retain(|track| track.line != line);
+                self.take_line(line, Some((&state, cut)))
+            }
+        }
+    }
+
+    /// What the tissue says of a needle that moves from one pose to another.
+    fn look(&self, state: &State, (now, next): (&ToolPose, &ToolPose), radius: f64) -> Found {
+        let (Some(laying), Some(laid), Some(mesh)) = (&self.laying, &self.model.laid, self.model.mesh.as_block()) else {
+            return Found::Nothing;
+        };
+        let tissue = Tissue { mesh, laid, u: &state.displacement };
+        let rest = tissue.rest(next.tip);
+        let height = tissue.height(rest).unwrap_or(f64::INFINITY);
+        if !laying.is_on {
+            if height > COMES {
+                return Found::Nothing;
+            }
+            let Some(line) = tissue.line(rest, next.direction) else { return Found::Nothing };
+            return match laying.tracks.iter().find(|track| track.is_the_same(&line, radius)) {
+                Some(track) => Found::Line(track.line.clone(), track.cut),
+                None => Found::Line(line, 0.0),
+            };
+        }
+        let was = tissue.height(tissue.rest(now.tip)).unwrap_or(f64::INFINITY);
+        if height > LEFT && was > LEFT {
+            return Found::Left;
+        }
+        let cut = state.tip_coordinate;
+        if cut == 0.0 {
+            // Without friction the tip slides over the skin; the entry is where it presses.
+            let slid = tissue.line(rest, next.direction).filter(|line| {
+                let (new, old) = (line.piece(0.0), laying.line.piece(0.0));
+                let aside = new.origin - old.origin;
+                aside.length() > ASIDE * radius || old.direction.angle_between(new.direction) > TURNED
+            });
+            return slid.map_or(Found::Nothing, |line| Found::Line(line, 0.0));
+        }
+        // What is open ends where the tip has cut.
+        let end = cut + self.model.opening().map_or(0.0, |opening| opening.spacing);
+        let ahead = tissue.pulled_back(laying.line.point(end), next.direction);
+        let advances = next.depth > now.depth && ahead.z < 0.0;
+        match advances && laying.line.ahead().direction.angle_between(ahead) > TURNED {
+            true => Found::Line(laying.line.turned(end, ahead), cut),
+            false => Found::Nothing,
+        }
+    }
+
+    /// Goes on as far as the laying had come in a checkpoint.
+    pub(super) fn take_laying(&mut self, laying: Option<Laying>) -> Result<()> {
+        let line = |laying: &Option<Laying>| laying.as_ref().map(|l| l.line.clone());
+        let (old, new) = (line(&self.laying), line(&laying));
+        self.laying = laying;
+        match new {
+            Some(new) if old.as_ref() != Some(&new) => self.take_line(new, None),
+            _ => Ok(()),
+        }
+    }
+
+    /// Goes on along another line. `from`: the state to go on from, and how far the line is cut [m]; without one the engine has none yet.
+    pub(super) fn take_line(&mut self, line: PathLine, from: Option<(&State, f64)>) -> Result<()> {
+        let model = Arc::new(self.model.relaid(line.clone()));
+        let stable_dt = wave_speed_bound(&model);
+        let (mut dt, mut steps_per_frame) = choose_step(&model, stable_dt);
+        if self.dt() <= dt || model.scene.solver.time_step.is_some() {
+            (dt, steps_per_frame) = (self.dt(), self.steps_per_frame());
+        }
+        let most_steps = self.purpose.most_steps(steps_per_frame);
+        let mut engine = RunEngine::new(&model, self.device.as_ref(), dt, most_steps, self.purpose)?;
+        let Some((state, cut)) = from else {
+            (self.engine, self.model) = (engine, model);
+            if let Some(laying) = &mut self.laying {
+                laying.line = line;
+            }
+            return Ok(());
+        };
+        let change = Change::to_line(model, (stable_dt, dt, steps_per_frame), self.device.clone(), self.purpose);
+        let before = self.measured()?;
+        let goes_on = self.laying.as_ref().is_some_and(|laying| laying.line.piece(0.0) == line.piece(0.0));
+        let mut next = carried(state, &self.model, change.model());
+        match goes_on && cut > 0.0 {
+            true => on_the_same_path(state, &mut next),
+            false => (next.tip_coordinate, next.bond) = (cut, Bond::default()),
+        }
+        engine.write_state(&next)?;
+        let due_steps = std::mem::take(&mut self.due_steps);
+        self.engine = engine;
+        if let Some(laying) = &mut self.laying {
+            laying.line = line;
+        }
+        self.adopted(&change, before)?;
+        self.due_steps = due_steps;
+        Ok(())
+    }
+}
+
+impl Track {
+    /// True where a needle that would go along `line` comes back to this track.
+    fn is_the_same(&self, line: &PathLine, radius: f64) -> bool {
+        let (own, other) = (self.line.piece(0.0), line.piece(0.0));
+        own.origin.distance(other.origin) < SAME_ENTRY * radius
+            && own.direction.angle_between(other.direction) < SAME_ANGLE
+    }
+}
