@@ -26,12 +26,16 @@ pub(super) struct StationSums {
     /// By rc [N] and rc_Z [J].
     radius: f64,
     radius_rate: f64,
+    /// Moment of the forces on nodes (with the sign of f_int) about the centre [N m]: what a needle that turns feels.
+    moment: DVec3,
     energy: f64,
 }
 
 impl StationSums {
     /// Adds derivatives of an energy per volume, of the volume `by` [m^3].
-    fn add(&mut self, d: &Derivatives<f64>, by: f64) {
+    /// `moment`: that of its forces about the centre, per volume.
+    fn add(&mut self, d: &Derivatives<f64>, moment: DVec3, by: f64) {
+        self.moment += moment * by;
         self.centre -= DVec3::from(d.place) * by;
         self.centre_rate += DVec3::from(d.centre_rate) * by;
         self.radius += d.radius * by;
@@ -43,13 +47,14 @@ impl StationSums {
         self.centre_rate += other.centre_rate;
         self.radius += other.radius;
         self.radius_rate += other.radius_rate;
+        self.moment += other.moment;
     }
 }
 
 impl From<&PointSums> for StationSums {
     fn from(p: &PointSums) -> Self {
-        let PointSums { place, centre_rate, radius, radius_rate, energy } = *p;
-        StationSums { centre: -place, centre_rate, radius, radius_rate, energy }
+        let PointSums { place, centre_rate, radius, radius_rate, moment, energy } = *p;
+        StationSums { centre: -place, centre_rate, radius, radius_rate, moment, energy }
     }
 }
 
@@ -57,6 +62,8 @@ impl From<&PointSums> for StationSums {
 #[derive(Debug, Clone, Copy, Default)]
 struct Now {
     section: Station,
+    /// Middle of the section of the needle [m].
+    disc: DVec3,
     /// Distance behind the tip [m].
     behind: f64,
     cut: f64,
@@ -91,13 +98,14 @@ impl CpuEngine {
                 return Now::default();
             }
             let centre = mean_place(&station.centre, &station.nodes, rest, u);
-            let behind = (pose.tip - mean_place(&station.disc, &station.nodes, rest, u)).dot(t) - shift;
+            let disc = mean_place(&station.disc, &station.nodes, rest, u);
+            let behind = (pose.tip - disc).dot(t) - shift;
             let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.shaft));
             let (full, slope) = (radius * opened, rate * opened);
             let (cut, cut_rate) = opening.cut(station, a);
             let section =
                 Station { centre, radius: full * cut, rest_direction: station.direction, ..Station::default() };
-            Now { section, behind, cut, cut_rate, full, slope, radius, rate }
+            Now { section, disc, behind, cut, cut_rate, full, slope, radius, rate }
         });
         for i in 0..now.len() {
             let (before, behind, by) = neighbours(i, now.len(), opening.spacing);
@@ -160,10 +168,10 @@ impl CpuEngine {
 
     /// Adds a near cell to its nodes and stations; returns its energy.
     fn add_near_cell(&mut self, near: &NearCell, found: &NearCellForces, sums: &mut [StationSums]) -> f64 {
-        let (forces, derivatives, energy) = found;
+        let (forces, (derivatives, moment), energy) = found;
         self.add_to_cell(near.cell as usize, forces);
         for sums in &mut sums[usize::from(near.first)..][..usize::from(near.count)] {
-            sums.add(derivatives, 1.0 / f64::from(near.count));
+            sums.add(derivatives, *moment, 1.0 / f64::from(near.count));
         }
         *energy
     }
@@ -188,11 +196,11 @@ impl CpuEngine {
                 if section.radius > 0.0 {
                     let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
                     let point = &station.points[index];
-                    let (d, energy) =
+                    let (d, moment, energy) =
                         point_force(shape(point.cell), map, point, section, &u, |place, force, bound| {
                             added.add(station.nodes[place] as usize, -force, bound);
                         });
-                    found = PointSums::new(&d, energy, point.volume);
+                    found = PointSums::new(&d, moment, energy, point.volume);
                 }
                 lanes.set_point(number, lane, &found);
             }
@@ -234,14 +242,14 @@ impl CpuEngine {
         let count = now.len();
         // By rc with all that follows from it, and by the centre.
         let mut radius: Vec<f64> = sums.iter().map(|s| s.radius).collect();
-        let mut centre: Vec<DVec3> = sums.iter().map(|s| s.centre).collect();
+        let mut rates = vec![DVec3::ZERO; count];
         for (i, s) in sums.iter().enumerate() {
             let (before, behind, by) = neighbours(i, count, opening.spacing);
             radius[behind] += s.radius_rate * by;
             radius[before] -= s.radius_rate * by;
             let rate = s.centre_rate - t * s.centre_rate.dot(t);
-            centre[behind] += rate * by;
-            centre[before] -= rate * by;
+            rates[behind] += rate * by;
+            rates[before] -= rate * by;
         }
         let guides: Vec<Guide> = now.iter().map(|n| self.guide(opening, plan, pose, step, n)).collect();
         // Along the needle: by how rc and the axis change behind the tip.
@@ -292,15 +300,22 @@ impl CpuEngine {
             for (place, w) in station.disc.iter().filter(|_| along != DVec3::ZERO) {
                 self.added.add(station.nodes[usize::from(*place)] as usize, along * *w, 0.0);
             }
-            let across = guide - centre[i];
+            let across = guide - sums[i].centre - rates[i];
             for (place, w) in station.centre.iter().filter(|_| across != DVec3::ZERO || held > 0.0) {
                 let node = station.nodes[usize::from(*place)] as usize;
                 self.added.add(node, across * *w, 2.0 * held * w);
             }
             booked.normal += t * spread + guide;
             booked.friction += t * rubbing;
+            // As the moment of all forces on the tissue.
             let lever = n.section.centre - pose.tip;
-            booked.torque += (lever - t * lever.dot(t) - t * n.behind).cross(guide);
+            booked.torque += match model.laid {
+                Some(_) => {
+                    let along_at = n.disc - pose.tip;
+                    lever.cross(guide - rates[i]) + along_at.cross(along) - sums[i].moment
+                }
+                None => (lever - t * lever.dot(t) - t * n.behind).cross(guide),
+            };
             if let Some(line) = self.centre_line {
                 let impulse = (t * (spread + rubbing) + guide) * self.dt;
                 line.share(&mut self.sums.needle_loads, n.behind, impulse);
@@ -409,17 +424,17 @@ fn point_forces<'a>(
     let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
     let mut local = vec![(DVec3::ZERO, 0.0); u.len()];
     for point in &station.points {
-        let (d, energy) = point_force(shape(point.cell), map, point, section, &u, |place, force, bound| {
+        let (d, moment, energy) = point_force(shape(point.cell), map, point, section, &u, |place, force, bound| {
             local[place].0 += force;
             local[place].1 += bound;
         });
         sums.energy += point.volume * energy;
-        sums.add(&d, point.volume);
+        sums.add(&d, moment, point.volume);
     }
     (sums, local)
 }
 
-/// What opening adds at a point: derivatives and energy per volume; `add` gets places of its corners in the station, forces and bounds.
+/// What opening adds at a point: derivatives, moment about the centre and energy per volume; `add` gets places of its corners in the station, forces and bounds.
 fn point_force(
     shape: Shape,
     map: &OpeningMap,
@@ -427,7 +442,7 @@ fn point_force(
     section: &Station,
     u: &[DVec3],
     mut add: impl FnMut(usize, DVec3, f64),
-) -> (Derivatives<f64>, f64) {
+) -> (Derivatives<f64>, DVec3, f64) {
     let (y, h) = point.place_and_gradient(u);
     let map = map.at(section, y, h);
     let (d, energy, tangent) = shape.opened(&map, h);
@@ -443,11 +458,17 @@ fn point_force(
         let force = (by_gradient * point.gradients[c] + by_place * point.weights[c]) * point.volume;
         add(usize::from(*place), force, bound * sizes[c]);
     }
-    (d, energy)
+    (d, moment_of(DMat3::IDENTITY + h, y - section.centre, by_gradient, by_place), energy)
 }
 
-/// Forces and bounds of a near cell, derivatives of its energy, and that energy [J].
-type NearCellForces = (CellForces, Derivatives<f64>, f64);
+/// Moment of forces on nodes that have these derivatives of an energy by the gradient and by the place, about what lies at `-offset`.
+fn moment_of(gradient: DMat3, offset: DVec3, by_gradient: DMat3, by_place: DVec3) -> DVec3 {
+    let of_columns = [0, 1, 2].map(|a| gradient.col(a).cross(by_gradient.col(a)));
+    offset.cross(by_place) + of_columns[0] + of_columns[1] + of_columns[2]
+}
+
+/// Forces and bounds of a near cell, derivatives of its energy with their moment about the path, and that energy [J].
+type NearCellForces = (CellForces, (Derivatives<f64>, DVec3), f64);
 
 /// What opening adds to a cell: forces, derivatives of its energy by the path, and that energy. The gradient of y is that of its centre,
 /// as elsewhere; the volume is taken at four places, the shape at one.
@@ -525,5 +546,6 @@ fn near_cell_forces(
     for (i, b) in shape.gradients().iter().enumerate() {
         forces.force[i] = by_gradient * *b + by_place / 8.0;
     }
-    Some((forces, sum, energy))
+    let moment = moment_of(gradient, middle - section.centre, by_gradient, by_place);
+    Some((forces, (sum, moment), energy))
 }

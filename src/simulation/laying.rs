@@ -36,6 +36,9 @@ const DEEP: f64 = 2.0e-3;
 /// By so much the needle turns until the line ahead of it is looked at, and by so much it has to be off to be laid anew [rad].
 const TURNED: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
+/// Angle between a needle that comes back along its track and this track from which on it cuts a way of its own [rad]. A choice.
+const BRANCHES: f64 = 10.0 * std::f64::consts::PI / 180.0;
+
 /// Part of its radius that a needle moves aside until the line is looked at.
 const ASIDE: f64 = 0.25;
 
@@ -141,10 +144,14 @@ impl Laying {
     /// True where the tissue has to be looked at before the needle moves on to `next`.
     fn must_look(&self, next: &ToolPose, radius: f64) -> bool {
         let near = (next.tip - self.line.piece(0.0).origin).dot(next.direction) < DEEP;
-        let turned = self.direction.angle_between(next.direction) > TURNED;
+        !self.is_on || near || self.has_moved(next, radius)
+    }
+
+    /// True where the needle has turned or gone aside since its line was looked at.
+    fn has_moved(&self, next: &ToolPose, radius: f64) -> bool {
         let aside = next.tip - self.tip;
-        let aside = (aside - self.direction * aside.dot(self.direction)).length() > ASIDE * radius;
-        !self.is_on || near || turned || aside
+        let aside = aside - self.direction * aside.dot(self.direction);
+        aside.length() > ASIDE * radius || self.direction.angle_between(next.direction) > TURNED
     }
 }
 
@@ -211,21 +218,23 @@ impl Simulation {
             return Found::Left;
         }
         let cut = state.tip_coordinate;
+        if !laying.has_moved(next, radius) {
+            return Found::Nothing;
+        }
         if cut == 0.0 {
             // Without friction the tip slides over the skin; the entry is where it presses.
-            let slid = tissue.line(rest, next.direction).filter(|line| {
-                let (new, old) = (line.piece(0.0), laying.line.piece(0.0));
-                let aside = new.origin - old.origin;
-                aside.length() > ASIDE * radius || old.direction.angle_between(new.direction) > TURNED
-            });
-            return slid.map_or(Found::Nothing, |line| Found::Line(line, 0.0));
+            return tissue.line(rest, next.direction).map_or(Found::Nothing, |line| Found::Line(line, 0.0));
         }
-        // What is open ends where the tip has cut.
-        let end = cut + self.model.opening().map_or(0.0, |opening| opening.spacing);
+        // What is open ends where the tip has cut, or where it is if it was drawn back.
+        let spacing = self.model.opening().map_or(0.0, |opening| opening.spacing);
+        let (_, at) = laying.line.coordinates(rest);
+        let is_back = at + spacing < cut;
+        let end = at.min(cut).max(0.0) + spacing;
         let ahead = tissue.pulled_back(laying.line.point(end), next.direction);
         let advances = next.depth > now.depth && ahead.z < 0.0;
-        match advances && laying.line.ahead().direction.angle_between(ahead) > TURNED {
-            true => Found::Line(laying.line.turned(end, ahead), cut),
+        let angle = laying.line.piece(end).direction.angle_between(ahead);
+        match advances && angle > if is_back { BRANCHES } else { TURNED } {
+            true => Found::Line(laying.line.turned(end, ahead), if is_back { at } else { cut }),
             false => Found::Nothing,
         }
     }
@@ -259,7 +268,6 @@ impl Simulation {
             return Ok(());
         };
         let change = Change::to_line(model, (stable_dt, dt, steps_per_frame), self.device.clone(), self.purpose);
-        let before = self.measured()?;
         let goes_on = self.laying.as_ref().is_some_and(|laying| laying.line.piece(0.0) == line.piece(0.0));
         let mut next = carried(state, &self.model, change.model());
         match goes_on && cut > 0.0 {
@@ -272,7 +280,8 @@ impl Simulation {
         if let Some(laying) = &mut self.laying {
             laying.line = line;
         }
-        self.adopted(&change, before)?;
+        // No energy changes with what is ahead of the tip.
+        self.adopted(&change, None)?;
         self.due_steps = due_steps;
         Ok(())
     }

@@ -6,7 +6,7 @@
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
-use super::{CELL, CELL_SUMS, Found, Gathered, Lanes, Step, law_in_lanes, opened};
+use super::{CELL, CELL_SUMS, Found, Gathered, Lanes, Step, law_in_lanes, moment_of, opened};
 use crate::cpu::lanes::WIDEST;
 use crate::cpu::lanes::corners::SIGNS;
 use crate::mesh::CORNERS;
@@ -196,6 +196,12 @@ fn cell_lanes<S: Simd>(
     sum.radius.store(out, 15 * WIDEST + at);
     sum.radius_rate.store(out, 16 * WIDEST + at);
     energy.store(out, 17 * WIDEST + at);
-    bound.store(out, 18 * WIDEST + at);
+    if all.turns {
+        let moment = moment_of(&h, middle.offset, &sum.gradient, sum.place);
+        for a in 0..3 {
+            moment[a].store(out, (18 + a) * WIDEST + at);
+        }
+    }
+    bound.store(out, (CELL_SUMS - 1) * WIDEST + at);
     true
 }

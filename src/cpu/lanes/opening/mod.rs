@@ -35,7 +35,7 @@ const POINT: usize = 4 + 3 + LAW + SIGNS;
 /// Constants of a law.
 const LAW: usize = 5;
 /// Rows of what a vector of points gives: see [`PointSums`].
-const POINT_SUMS: usize = 9;
+const POINT_SUMS: usize = 12;
 /// Rows of what is summed up for a cell: forces by mode of the displacement and axis, then bounds of the corners.
 const RUN_SUMS: usize = 4 * SIGNS;
 /// f32 of a row in which vectors begin at any lane.
@@ -45,8 +45,8 @@ const STRIDES: [usize; 4] = [1, 2, 4, 8];
 /// Rows of a vector of cells: edges and place of what points do not carry [radii], volume [m^3], share of that, edge of the bound [radii],
 /// `|b|^2` [1/m^2], then the law: c1, c2, c3, c01 and bulk modulus.
 const CELL: usize = 10 + LAW;
-/// Rows of what a vector of cells gives: by the gradient, by the place, by rate, radius and its rate, energy, bound.
-const CELL_SUMS: usize = 9 + 3 + 3 + 1 + 1 + 1 + 1;
+/// Rows of what a vector of cells gives: by the gradient, by the place, by rate, radius and its rate, energy, moment, bound.
+const CELL_SUMS: usize = 9 + 3 + 3 + 1 + 1 + 1 + 3 + 1;
 
 /// Points side by side, at most [`WIDEST`].
 struct Vector {
@@ -89,6 +89,8 @@ pub(in crate::cpu) struct LaneOpening {
     shaft: f64,
     is_linear: bool,
     has_c01: bool,
+    /// The needle may turn: moments are wanted.
+    turns: bool,
     vectors: Vec<Vector>,
     runs: Vec<Run>,
     /// [`POINT`] rows per vector of points.
@@ -142,6 +144,8 @@ pub(in crate::cpu) struct PointSums {
     pub centre_rate: DVec3,
     pub radius: f64,
     pub radius_rate: f64,
+    /// Moment of the forces on nodes about the path.
+    pub moment: DVec3,
     pub energy: f64,
 }
 
@@ -150,9 +154,9 @@ pub(in crate::cpu) type OfSpan = ((u16, u16), PointSums);
 
 impl PointSums {
     /// Of derivatives and an energy per volume.
-    pub fn new(d: &Derivatives<f64>, energy: f64, volume: f64) -> Self {
+    pub fn new(d: &Derivatives<f64>, moment: DVec3, energy: f64, volume: f64) -> Self {
         let (place, centre_rate) = (DVec3::from(d.place), DVec3::from(d.centre_rate));
-        PointSums { place, centre_rate, radius: d.radius, radius_rate: d.radius_rate, energy }.times(volume)
+        PointSums { place, centre_rate, radius: d.radius, radius_rate: d.radius_rate, moment, energy }.times(volume)
     }
 
     fn add(&mut self, other: &Self) {
@@ -160,6 +164,7 @@ impl PointSums {
         self.centre_rate += other.centre_rate;
         self.radius += other.radius;
         self.radius_rate += other.radius_rate;
+        self.moment += other.moment;
         self.energy += other.energy;
     }
 
@@ -169,13 +174,20 @@ impl PointSums {
     }
 
     fn rows(&self) -> [f64; POINT_SUMS] {
-        let (p, r) = (self.place, self.centre_rate);
-        [p.x, p.y, p.z, r.x, r.y, r.z, self.radius, self.radius_rate, self.energy]
+        let (p, r, m) = (self.place, self.centre_rate, self.moment);
+        [p.x, p.y, p.z, r.x, r.y, r.z, self.radius, self.radius_rate, self.energy, m.x, m.y, m.z]
     }
 
     fn of(rows: [f64; POINT_SUMS]) -> Self {
-        let [px, py, pz, rx, ry, rz, radius, radius_rate, energy] = rows;
-        PointSums { place: DVec3::new(px, py, pz), centre_rate: DVec3::new(rx, ry, rz), radius, radius_rate, energy }
+        let [px, py, pz, rx, ry, rz, radius, radius_rate, energy, mx, my, mz] = rows;
+        PointSums {
+            place: DVec3::new(px, py, pz),
+            centre_rate: DVec3::new(rx, ry, rz),
+            radius,
+            radius_rate,
+            moment: DVec3::new(mx, my, mz),
+            energy,
+        }
     }
 }
 
@@ -321,6 +333,7 @@ impl LaneOpening {
             shaft,
             is_linear: materials.iter().all(|m| m.law.is_linear()),
             has_c01: materials.iter().any(|m| m.law.c01 != 0.0),
+            turns: model.laid.is_some(),
             out: Out {
                 points: vec![0.0; vectors.len() * POINT_SUMS * WIDEST],
                 vectors: vec![Found::Closed; vectors.len()],
@@ -510,6 +523,7 @@ impl LaneOpening {
                     radius: row(15) * over_shaft,
                     radius_rate: row(16),
                     energy: row(17),
+                    moment: vector(18),
                 });
             }
             let by_axis = [vector(0) * cell.quarter.x, vector(3) * cell.quarter.y, vector(6) * cell.quarter.z];
@@ -651,6 +665,24 @@ fn law_in_lanes<S: Simd>(simd: S, all: &LaneOpening, rows: &[f32], first: usize,
         is_linear: all.is_linear,
         has_c01: all.has_c01,
     }
+}
+
+/// Moment about the path of forces on nodes that have these derivatives of an energy by `I + h` and by the place at `offset`.
+#[inline(always)]
+fn moment_of<N: Number>(h: &Tensor<N>, offset: [N; 3], by_gradient: &Tensor<N>, by_place: [N; 3]) -> [N; 3] {
+    let cross = |a: [N; 3], b: [N; 3]| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
+    let mut moment = cross(offset, by_place);
+    for a in 0..3 {
+        let mut column = h[a];
+        column[a] = column[a] + column[a].of(1.0);
+        let of_column = cross(column, by_gradient[a]);
+        for b in 0..3 {
+            moment[b] = moment[b] + of_column[b];
+        }
+    }
+    moment
 }
 
 /// What opening adds at places, per volume, and what bounds of the stiffness need.

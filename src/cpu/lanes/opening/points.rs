@@ -7,7 +7,7 @@ use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
 use super::{
-    AtCorners, Found, Gathered, LAW, Lanes, Opened, POINT, POINT_SUMS, ROOM, RUN_SUMS, STRIDES, Step, law_in_lanes,
+    AtCorners, Found, Gathered, LAW, Lanes, Opened, POINT, POINT_SUMS, ROOM, RUN_SUMS, STRIDES, Step, law_in_lanes, moment_of,
     opened,
 };
 use crate::cpu::lanes::WIDEST;
@@ -220,5 +220,11 @@ fn point_lanes<S: Simd>(
     (d.radius * volume * over_shaft).store(out, 6 * WIDEST + at);
     (d.radius_rate * volume).store(out, 7 * WIDEST + at);
     (energy * volume).store(out, 8 * WIDEST + at);
+    if all.turns {
+        let moment = moment_of(&h, beside.offset, &d.gradient, d.place);
+        for axis in 0..3 {
+            (moment[axis] * volume).store(out, (9 + axis) * WIDEST + at);
+        }
+    }
     true
 }
