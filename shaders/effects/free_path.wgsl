@@ -1,4 +1,5 @@
 // A path that is found while the tip moves: state and pure functions. Equations: src/needle/free_path.rs.
+#import shared/swing
 
 // Where the tip is in the material.
 struct FreeTip {
@@ -70,12 +71,6 @@ fn anchor_offset(anchor: u32) -> vec2<f32> {
     let angle = 6.2831853 * number / count;
     let radius = select(puncture.needle_radius, 0.5 * puncture.needle_radius, inner);
     return vec2<f32>(cos(angle), sin(angle)) * select(radius, 0.0, anchor == 0u);
-}
-
-// The rotation without spin that brings the unit vector `a` to `b`, applied to `v`.
-fn swing(a: vec3<f32>, b: vec3<f32>, v: vec3<f32>) -> vec3<f32> {
-    let w = cross(a, b);
-    return v + cross(w, v) + cross(w, cross(w, v)) / max(1.0 + dot(a, b), 1e-6);
 }
 
 // Columns of the inverse of F, transposed, times v; v itself where the material is turned inside out.

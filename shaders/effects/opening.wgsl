@@ -2,9 +2,12 @@
 // Lengths across the path are in needle radii R here, so that all numbers are near 1.
 #import shared/params
 #import shared/kinematics
+#ifdef LAID
+#import shared/step_input
+#endif
 
 struct OpeningParams {
-    // Direction of the needle and of the path; w: R [m].
+    // Direction of the path ahead of the tip, and of the needle where the path is planned; w: R [m].
     direction: vec4<f32>,
     // Where the path enters [m]; w: length of the tip [m].
     entry: vec4<f32>,
@@ -30,7 +33,7 @@ struct OpeningStation {
     depth: vec4<f32>,
     // Entries of the means over nodes: first, end; entries of the slots that tell of it: first, end.
     lists: vec4<u32>,
-    // Displacement of the middle of the path, across it [m]; w: radius rc [m].
+    // Displacement of the middle of the path, across it [m], where the path is laid its place from the entry; w: radius rc [m].
     centre: vec4<f32>,
     // Their rates with Z.
     centre_rate: vec4<f32>,
@@ -48,6 +51,13 @@ struct OpeningStation {
     across: vec4<f32>,
     // Impulse of the needle on the tissue there in this frame [N s]; w unused.
     impulse: vec4<f32>,
+    // On a path that is laid while the needle comes. Rest position from the entry [m] and direction t0 at rest, of a run the mean of the
+    // directions; w unused.
+    rest: vec4<f32>,
+    rest_direction: vec4<f32>,
+    // Middle of the section of the needle from the entry [m]; moment of the forces on nodes about the centre [N m]. w unused.
+    disc: vec4<f32>,
+    by_moment: vec4<f32>,
 }
 
 // Place in a list, and two weights.
@@ -62,6 +72,8 @@ struct OpeningEntry {
 struct OpeningSum {
     by_centre: vec4<f32>,
     by_rate: vec4<f32>,
+    // Moment of the forces on nodes about the centre [N m], where the needle may turn.
+    by_moment: vec4<f32>,
 }
 
 // What the scheme has summed in this frame, and what it holds.
@@ -91,11 +103,37 @@ fn dimple_closing(a: f32) -> f32 {
     return 4.0 * x * (1.0 - x * x) / opening.surface.x;
 }
 
+// Direction of the needle.
+fn needle_direction() -> vec3<f32> {
+#ifdef LAID
+    return step_input.direction.xyz;
+#else
+    return opening.direction.xyz;
+#endif
+}
+
+// Direction of the path at rest.
+fn rest_direction(station: OpeningStation) -> vec3<f32> {
+#ifdef LAID
+    return station.rest_direction.xyz;
+#else
+    return opening.direction.xyz;
+#endif
+}
+
+// Moment of forces on nodes that have these derivatives of an energy by the gradient of y and by y, about what lies at -`offset`.
+fn moment_of(gradient: mat3x3<f32>, offset: vec3<f32>, by_gradient: mat3x3<f32>, by_place: vec3<f32>) -> vec3<f32> {
+    return cross(offset, by_place) + cross(gradient[0], by_gradient[0]) + cross(gradient[1], by_gradient[1])
+        + cross(gradient[2], by_gradient[2]);
+}
+
 // The path at one place, across it in R.
 struct PathSection {
     centre_rate: vec3<f32>,
     radius: f32,
     radius_rate: f32,
+    // t0.
+    rest_direction: vec3<f32>,
 }
 
 struct OpenedPlace {
@@ -108,6 +146,7 @@ struct OpenedPlace {
     gr1: f32,
     grr: f32,
     radius_rate: f32,
+    rest_direction: vec3<f32>,
     H: mat3x3<f32>,
 }
 
@@ -121,7 +160,8 @@ struct OpeningDerivatives {
 }
 
 fn across(v: vec3<f32>) -> vec3<f32> {
-    return v - opening.direction.xyz * dot(v, opening.direction.xyz);
+    let t = needle_direction();
+    return v - t * dot(v, t);
 }
 
 // Radius up to which the hole is exact, and over which it fades from there, in needle radii.
@@ -163,7 +203,8 @@ fn opened_place(section: PathSection, eta: vec3<f32>, gradient: mat3x3<f32>) -> 
     out.gr1 = rc * v.y / g - out.gr * out.g1 / g;
     out.grr = v.x / g - out.gr * out.gr / g;
     out.radius_rate = section.radius_rate;
-    let t = opening.direction.xyz;
+    let t = section.rest_direction;
+    out.rest_direction = t;
     out.H = mat3x3<f32>(
         across(gradient[0]) - section.centre_rate * t.x,
         across(gradient[1]) - section.centre_rate * t.y,
@@ -191,14 +232,14 @@ fn outer(a: vec3<f32>, b: vec3<f32>) -> mat3x3<f32> {
 // F = grad x.
 fn opened_gradient(place: OpenedPlace, gradient: mat3x3<f32>) -> mat3x3<f32> {
     let turned = transpose(place.H) * place.eta;
-    let row = turned * (2.0 * place.g1) + opening.direction.xyz * (place.gr * place.radius_rate);
+    let row = turned * (2.0 * place.g1) + place.rest_direction * (place.gr * place.radius_rate);
     return gradient + place.H * (place.g - 1.0) + outer(place.eta, row);
 }
 
 // Derivatives of an energy, from its derivative P by F.
 fn pull_back(place: OpenedPlace, P: mat3x3<f32>) -> OpeningDerivatives {
     let eta = place.eta;
-    let t = opening.direction.xyz;
+    let t = place.rest_direction;
     let h_eta = transpose(place.H) * eta;
     let p_eta = transpose(P) * eta;
     let h_p = double_dot(place.H, P);

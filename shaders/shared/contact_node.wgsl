@@ -156,7 +156,7 @@ fn book_contact(
     let torque = cross(lever, total);
     var power = dot(total, step_input.velocity.xyz);
     var power_ahead = dot(total, step_input.velocity_ahead.xyz);
-#ifdef FREE_PATH
+#ifdef TURNS
     power += dot(torque, angular_velocity());
     power_ahead += dot(torque, step_input.angular_velocity_ahead.xyz);
 #endif

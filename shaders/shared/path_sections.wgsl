@@ -18,20 +18,40 @@ fn place_sections(lane: u32, coordinate: f32, shift: f32) {
 #ifdef WIDE
         // By stage path_means.
         let middle = path_stations[i].centre.xyz;
+#ifndef LAID
         let moved = path_stations[i].rubbing.y;
+#endif
 #else
         let lists = path_stations[i].lists;
         var middle = vec3<f32>(0.0);
+#ifdef LAID
+        var disc = path_stations[i].rest.xyz;
+        middle = disc;
+#else
         var moved = 0.0;
+#endif
         for (var e = lists.x; e < lists.y; e++) {
             let entry = path_entries[e];
             let u = vec3<f32>(node_displacement[entry.index].xyz) * DISPLACEMENT_UNIT;
             middle += u * entry.first;
+#ifdef LAID
+            disc += u * entry.second;
+#else
             moved += dot(u, opening.direction.xyz) * entry.second;
+#endif
         }
+#ifdef LAID
+        path_stations[i].disc = vec4<f32>(disc, 0.0);
+#else
         middle = across(middle);
 #endif
+#endif
+#ifdef LAID
+        // The needle may be turned against its path.
+        let behind = dot(step_input.tip.xyz - opening.entry.xyz - path_stations[i].disc.xyz, step_input.direction.xyz) - shift;
+#else
         let behind = step_input.depth - depth.x - moved - shift;
+#endif
         let part = (coordinate - depth.y) / spacing + 0.5;
         let cut = clamp(part, 0.0, 1.0);
         let rate = select(0.0, 1.0 / spacing, part > 0.0 && part < 1.0);
@@ -50,7 +70,12 @@ fn place_sections(lane: u32, coordinate: f32, shift: f32) {
         let before = max(i, 1u) - 1u;
         let behind = min(i + 1u, count - 1u);
         let by = 1.0 / (spacing * f32(behind - before));
-        path_stations[i].centre_rate = (path_stations[behind].centre - path_stations[before].centre) * by;
+        let rate = (path_stations[behind].centre - path_stations[before].centre) * by;
+#ifdef LAID
+        path_stations[i].centre_rate = vec4<f32>(across(rate.xyz), rate.w);
+#else
+        path_stations[i].centre_rate = rate;
+#endif
     }
     storageBarrier();
     for (var run = lane; run < opening.sums.y; run += LANES) {

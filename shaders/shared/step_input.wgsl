@@ -29,7 +29,7 @@ struct StepInput {
 
 @group(0) @binding(1) var<uniform> step_input: StepInput;
 
-#ifdef FREE_PATH
+#ifdef TURNS
 // Angular velocity of the tool [rad/s]: its components stand beside tip, velocity and direction.
 fn angular_velocity() -> vec3<f32> {
     return vec3<f32>(step_input.tip.w, step_input.velocity.w, step_input.direction.w);

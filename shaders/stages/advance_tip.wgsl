@@ -57,7 +57,15 @@ var<private> near_cell: vec3<u32>;
 
 fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     let t = step_input.direction.xyz;
-    let X = tip_anchors[anchor].surface.xyz + t * a;
+#ifdef LAID
+    // The needle may be turned against its path.
+    let T = opening.direction.xyz;
+    let along_needle = dot(T, t);
+#else
+    let T = t;
+    let along_needle = 1.0;
+#endif
+    let X = tip_anchors[anchor].surface.xyz + T * a;
     let y0 = NODES_X;
     let z0 = NODES_X + NODES_Y;
 #ifdef BORE
@@ -77,9 +85,9 @@ fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
 #ifdef BORE
     local = vec3<f32>(tip_anchors[anchor].local.xy, local.z);
 #endif
-    let rate = t / width;
+    let rate = T / width;
     var along = 0.0;
-    var stretch = 1.0;
+    var stretch = along_needle;
     for (var corner = 0u; corner < 8u; corner++) {
         let bit = vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
         let at = cell + bit;
@@ -94,7 +102,7 @@ fn place_anchor(anchor: u32, a: f32) -> AnchorPlace {
     var place: AnchorPlace;
     place.cell = cell;
     place.local = local;
-    place.distance = step_input.depth - a - along;
+    place.distance = step_input.depth - a * along_needle - along;
     place.gap = select(0.0, max(0.0, place.distance), a < puncture.exit);
     place.stretch = stretch;
     return place;

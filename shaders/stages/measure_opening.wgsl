@@ -30,7 +30,12 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
         for (var i = cluster.points.x; i < end; i++) {
             let point = path_points[i];
             let station = path_stations[point.numbers.x];
-            let section = PathSection(station.centre_rate.xyz, station.centre.w * scale, station.centre_rate.w);
+            let section = PathSection(
+                station.centre_rate.xyz,
+                station.centre.w * scale,
+                station.centre_rate.w,
+                rest_direction(station),
+            );
             let p = point.place.xyz;
             let H = strain_at(modes, p, cluster.inverse.xyz);
             let y = cluster.middle.xyz - station.centre.xyz + p / cluster.inverse.xyz + displacement_at(modes, p);
@@ -42,7 +47,12 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
         let cell = near_cells[index];
         let mean = path_stations[opening.counts.x + cell.stations.x];
         for (var once = select(1u, 0u, mean.centre.w > 0.0); once == 0u; once++) {
-            let section = PathSection(mean.centre_rate.xyz, mean.centre.w * scale, mean.centre_rate.w);
+            let section = PathSection(
+                mean.centre_rate.xyz,
+                mean.centre.w * scale,
+                mean.centre_rate.w,
+                rest_direction(mean),
+            );
             let modes = cell_modes(cell.cell.xyz);
             let H = strain_at(modes, vec3<f32>(0.0), cell.inverse.xyz);
             let gradient = deformation_gradient(H);

@@ -16,19 +16,19 @@ fn opening_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     // Where nothing was ever cut nothing was ever written. A loop, since software adapters walk through an `if`.
     let run = opening.counts.x + near_cells[index].stations.x;
     for (var once = select(1u, 0u, path_stations[run].place.y > 0.0); once == 0u; once++) {
-        open_cell(index, path_stations[run].centre, path_stations[run].centre_rate);
+        open_cell(index, path_stations[run].centre, path_stations[run].centre_rate, rest_direction(path_stations[run]));
     }
 }
 
 // `centre`, `rate`: the path there, see OpeningStation.
-fn open_cell(index: u32, centre: vec4<f32>, rate: vec4<f32>) {
+fn open_cell(index: u32, centre: vec4<f32>, rate: vec4<f32>, along: vec3<f32>) {
     let cell = near_cells[index];
     let inverse = cell.inverse.xyz;
     let scale = 1.0 / opening.direction.w;
-    let section = PathSection(rate.xyz, centre.w * scale, rate.w);
+    let section = PathSection(rate.xyz, centre.w * scale, rate.w, along);
     let material = materials[cell.cell.w];
     var f: CellModes;
-    var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+    var sum = OpeningSum();
     let modes = cell_modes(cell.cell.xyz);
     let H = strain_at(modes, vec3<f32>(0.0), inverse);
     let gradient = deformation_gradient(H);
@@ -75,6 +75,10 @@ fn open_cell(index: u32, centre: vec4<f32>, rate: vec4<f32>) {
     by_gradient += now.derivatives.gradient * part + outer(by_place, p * width);
     sum.by_centre += vec4<f32>(-by_place, now.derivatives.radius * part);
     sum.by_rate += vec4<f32>(now.derivatives.centre_rate, now.derivatives.radius_rate) * part;
+#ifdef LAID
+    let from_centre = cell.middle.xyz + modes.mean - centre.xyz;
+    sum.by_moment = vec4<f32>(moment_of(gradient, from_centre, by_gradient, by_middle), 0.0);
+#endif
     let growth = amplification(place);
     let carries = part > 0.0;
     let grown = select(1.0, max(1.0, growth.x + growth.y * pow(width.x * width.y * width.z, 0.33333333)), carries);

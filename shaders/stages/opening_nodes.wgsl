@@ -60,7 +60,7 @@ fn gathered(node: OpeningNode, piece: u32) -> vec4<f32> {
         let corner = opening_corners[path_corners[e]];
         sum += vec4<f32>(-corner.xyz, corner.w);
     }
-    let t = opening.direction.xyz;
+    let t = needle_direction();
     for (var e = node.numbers.w + piece; e < node.more.x; e += PIECES) {
         let entry = path_entries[e];
         let along = path_stations[entry.index].along;

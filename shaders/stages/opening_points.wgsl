@@ -42,12 +42,17 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     // Of the corners below, and of those above.
     var lower = vec4<f32>(0.0);
     var upper = vec4<f32>(0.0);
-    var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+    var sum = OpeningSum();
     let modes = cell_modes(cluster.cell.xyz);
     for (var i = first; i < end; i++) {
         let point = path_points[i];
         let station = path_stations[point.numbers.x];
-        let section = PathSection(station.centre_rate.xyz, station.centre.w * scale, station.centre_rate.w);
+        let section = PathSection(
+            station.centre_rate.xyz,
+            station.centre.w * scale,
+            station.centre_rate.w,
+            rest_direction(station),
+        );
         let volume = select(0.0, point.place.w, section.radius > 0.0);
         let p = point.place.xyz;
         let H = strain_at(modes, p, inverse);
@@ -82,9 +87,13 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         upper += above * all;
         sum.by_centre += vec4<f32>(-now.derivatives.place, now.derivatives.radius) * volume;
         sum.by_rate += vec4<f32>(now.derivatives.centre_rate, now.derivatives.radius_rate) * volume;
+#ifdef LAID
+        let moment = moment_of(deformation_gradient(H), y, now.derivatives.gradient, now.derivatives.place);
+        sum.by_moment += vec4<f32>(moment * volume, 0.0);
+#endif
         for (var once = select(0u, 1u, point.numbers.z == 0u); once == 0u; once++) {
             opening_sums[point.numbers.y] = sum;
-            sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+            sum = OpeningSum();
         }
     }
 #ifdef WIDE

@@ -5,6 +5,9 @@
 #import effects/puncture
 #import effects/opening
 #import shared/tip_read
+#ifdef LAID
+#import shared/swing
+#endif
 #ifdef FLEXIBLE_NEEDLE
 #import shared/bent_axis
 #else
@@ -39,47 +42,62 @@ fn on_shaft(i: u32) -> f32 {
 
 @compute @workgroup_size(LANES)
 fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
-    let t = opening.direction.xyz;
+    let t = needle_direction();
     let count = opening.counts.x;
     let spacing = opening.numbers.x;
 #ifdef WIDE
     // By stage path_sums, but for the runs: behind the points in the list of a station.
     for (var i = lane; i < count; i += LANES) {
         let lists = path_stations[i].lists;
-        var sum = OpeningSum(path_stations[i].by_centre, path_stations[i].by_rate);
+        var sum = OpeningSum(path_stations[i].by_centre, path_stations[i].by_rate, path_stations[i].by_moment);
         for (var e = lists.w; e > lists.z && path_entries[e - 1u].index >= opening.sums.z; e--) {
             let entry = path_entries[e - 1u];
             let told = opening_sums[entry.index];
             sum.by_centre += told.by_centre * entry.first;
             sum.by_rate += told.by_rate * entry.first;
+#ifdef LAID
+            sum.by_moment += told.by_moment * entry.first;
+#endif
         }
         path_stations[i].by_centre = sum.by_centre;
         path_stations[i].by_rate = sum.by_rate;
+#ifdef LAID
+        path_stations[i].by_moment = sum.by_moment;
+#endif
     }
 #else
     // Cells around the same stations, once for all of these.
     for (var run = lane; run < opening.sums.y; run += LANES) {
         let slots = path_entries[run];
-        var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+        var sum = OpeningSum();
         for (var slot = slots.index; slot < slots.index + u32(slots.first); slot++) {
             let told = opening_sums[slot];
             sum.by_centre += told.by_centre;
             sum.by_rate += told.by_rate;
+#ifdef LAID
+            sum.by_moment += told.by_moment;
+#endif
         }
         opening_sums[opening.sums.z + run] = sum;
     }
     storageBarrier();
     for (var i = lane; i < count; i += LANES) {
         let lists = path_stations[i].lists;
-        var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+        var sum = OpeningSum();
         for (var e = lists.z; e < lists.w; e++) {
             let entry = path_entries[e];
             let told = opening_sums[entry.index];
             sum.by_centre += told.by_centre * entry.first;
             sum.by_rate += told.by_rate * entry.first;
+#ifdef LAID
+            sum.by_moment += told.by_moment * entry.first;
+#endif
         }
         path_stations[i].by_centre = sum.by_centre;
         path_stations[i].by_rate = sum.by_rate;
+#ifdef LAID
+        path_stations[i].by_moment = sum.by_moment;
+#endif
     }
 #endif
     storageBarrier();
@@ -126,7 +144,10 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         let held = per_radius * now.centre.w;
         let axis = axis_at(now.place.x);
         let lever = across(opening.entry.xyz + now.centre.xyz - step_input.tip.xyz);
-        let shift = opening.surface.yzw / now.depth.z;
+        var shift = opening.surface.yzw / now.depth.z;
+#ifdef LAID
+        shift = swing(puncture.reference.xyz, t, shift);
+#endif
         let offset = off_axis(axis, lever) - shift * now.rubbing.x;
         let guide = offset * -held;
         let by_radius = 0.5 * per_radius * dot(offset, offset);
@@ -155,7 +176,14 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
 #endif
         along += vec4<f32>(spread, rubbing, 0.0, 0.5 * held * dot(offset, offset));
         aside += vec4<f32>(guide, (by.w + by_radius) * now.rubbing.x * now.place.z);
+#ifdef LAID
+        // As the moment of all forces on the tissue.
+        let from_tip = opening.entry.xyz - step_input.tip.xyz;
+        turning += cross(from_tip + now.centre.xyz, guide - by_centre + across(now.by_centre.xyz))
+            + cross(from_tip + now.disc.xyz, t * (spread + rubbing)) - now.by_moment.xyz;
+#else
         turning += cross(lever - t * now.place.x, guide);
+#endif
         bend_work += axis_power(axis, guide) * params.dt;
 #ifdef FLEXIBLE_NEEDLE
         let before = select(now.impulse.xyz, vec3<f32>(0.0), step_input.step == centre_line.first_step);
@@ -189,9 +217,15 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         let dt = params.dt;
         let total = t * (along.x + along.y) + aside.xyz;
         let impulse = opening_record.impulse.xyz + total * dt;
-        opening_record.impulse = vec4<f32>(impulse, dot(total, step_input.velocity_ahead.xyz) * dt + bend_work);
+        var power = dot(total, step_input.velocity.xyz);
+        var power_ahead = dot(total, step_input.velocity_ahead.xyz);
+#ifdef TURNS
+        power += dot(turning, angular_velocity());
+        power_ahead += dot(turning, step_input.angular_velocity_ahead.xyz);
+#endif
+        opening_record.impulse = vec4<f32>(impulse, power_ahead * dt + bend_work);
         opening_record.angular_impulse += vec4<f32>(turning * dt, squeezed * dt);
-        opening_record.parts += vec4<f32>(along.x * dt, along.y * dt, dot(total, step_input.velocity.xyz) * dt + bend_work, along.z);
+        opening_record.parts += vec4<f32>(along.x * dt, along.y * dt, power * dt + bend_work, along.z);
         // The tip was told what the path took before it advanced: half of what that changed by comes off.
         let told = opening_record.now;
         opening_record.late.x += 0.5 * ((along.x - told.z) * tip_state.shifted - (aside.w - told.x) * tip_state.advanced);

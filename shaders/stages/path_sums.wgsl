@@ -19,11 +19,14 @@ fn path_sums(
     let runs = opening.sums.y;
     let is_run = item < runs;
     let station = min(max(item, runs) - runs, opening.counts.x - 1u);
-    var sum = OpeningSum(vec4<f32>(0.0), vec4<f32>(0.0));
+    var sum = OpeningSum();
     let slots = path_entries[min(item, runs - 1u)];
     for (var slot = slots.index + lane; is_run && slot < slots.index + u32(slots.first); slot += 64u) {
         sum.by_centre += opening_sums[slot].by_centre;
         sum.by_rate += opening_sums[slot].by_rate;
+#ifdef LAID
+        sum.by_moment += opening_sums[slot].by_moment;
+#endif
     }
     let lists = path_stations[station].lists;
     for (var e = lists.z + lane; !is_run && e < lists.w; e += 64u) {
@@ -32,6 +35,9 @@ fn path_sums(
         let weight = select(0.0, entry.first, entry.index < opening.sums.z);
         sum.by_centre += opening_sums[entry.index].by_centre * weight;
         sum.by_rate += opening_sums[entry.index].by_rate * weight;
+#ifdef LAID
+        sum.by_moment += opening_sums[entry.index].by_moment * weight;
+#endif
     }
     shares[lane] = sum;
     workgroupBarrier();
@@ -39,6 +45,9 @@ fn path_sums(
         if (lane < half) {
             shares[lane].by_centre += shares[lane + half].by_centre;
             shares[lane].by_rate += shares[lane + half].by_rate;
+#ifdef LAID
+            shares[lane].by_moment += shares[lane + half].by_moment;
+#endif
         }
         workgroupBarrier();
     }
@@ -48,6 +57,9 @@ fn path_sums(
         } else if (item - runs < opening.counts.x) {
             path_stations[station].by_centre = shares[0].by_centre;
             path_stations[station].by_rate = shares[0].by_rate;
+#ifdef LAID
+            path_stations[station].by_moment = shares[0].by_moment;
+#endif
         }
     }
 }

@@ -175,6 +175,7 @@ pub fn off_is_absent() -> Result<bool> {
             slit: false,
             free_path: false,
             opening: false,
+            laid: false,
             drawn: true,
             wide: false,
             empty_cells: false,

@@ -112,7 +112,7 @@ impl CpuEngine {
         self.load_tip(plan, pose, &mut tip_loads);
         let centre_line = self.centre_line;
         let line = centre_line.as_ref().map(|l| (l, (step - l.first_step) as f64 * self.dt));
-        let turned = swing(plan.path.direction, pose.direction, plan.profile.shift);
+        let turned = swing(plan.reference, pose.direction, plan.profile.shift);
         let profile = Profile { shift: turned, ..plan.profile };
         let (coordinate, tip) = (self.state.tip_coordinate, self.state.tip);
         let needle = Needle { model: &model, plan, pose, profile, d: -pose.direction, coordinate, tip, line };

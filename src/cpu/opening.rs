@@ -12,7 +12,7 @@ use crate::model::opening::{
     NearCell, OpeningPlan, OpeningStation, PathPoint, VOLUME_PLACE, is_volume_place, mean_place,
 };
 use crate::model::{Model, PuncturePlan};
-use crate::needle::ToolPose;
+use crate::needle::{ToolPose, swing};
 use crate::needle::centre_line::Bend;
 use crate::needle::opening::{Derivatives, Opening, OpeningMap, Station, outer, squared_norm_bound};
 use glam::{DMat3, DVec3};
@@ -338,7 +338,8 @@ impl CpuEngine {
             None => Bend::default(),
         };
         // Sections of a bevel lie aside of the tip as far as they are wide.
-        let axis = bend.offset + plan.profile.shift * now.radius;
+        let bevel = swing(plan.reference, t, plan.profile.shift);
+        let axis = bend.offset + bevel * now.radius;
         let aside = now.section.centre - pose.tip;
         let aside = aside - t * aside.dot(t) - axis;
         let per_radius = opening.guide / opening.shaft;
@@ -349,7 +350,7 @@ impl CpuEngine {
             held,
             stored: 0.5 * held * aside.length_squared(),
             by_radius,
-            along: by_radius * now.slope * now.cut - held * aside.dot(bend.slope + plan.profile.shift * now.rate),
+            along: by_radius * now.slope * now.cut - held * aside.dot(bend.slope + bevel * now.rate),
             rate: bend.rate,
         }
     }

@@ -42,13 +42,15 @@ pub const PARAMS: [(&str, &[&str]); 3] = [
 ];
 
 /// Names that `#ifdef` may test beside those of the effects: features of the scene that are no effects.
-pub const SCENE_DEFINES: [&str; 20] = [
+pub const SCENE_DEFINES: [&str; 22] = [
     "WIDE",
     "TIED",
     "INNER_BOUND",
     "SLIT",
     "BORE",
     "FREE_PATH",
+    "LAID",
+    "TURNS",
     "OPENING",
     "STEP_INPUT",
     "LOADED_FACES",

@@ -499,9 +499,10 @@ impl Engine for GpuEngine {
         }
         if let Some(buffer) = self.buffers.get(STEP_INPUT) {
             let numbered = (plan.first_step..).zip(&plan.steps);
+            let origin = self.model.laid.as_ref().and(self.model.puncture.as_ref()).map(|plan| plan.path.entry);
             let mut inputs = vec![0; plan.steps.len() * STEP_STRIDE];
             for (place, (n, s)) in inputs.chunks_exact_mut(STEP_STRIDE).zip(numbered) {
-                place[..size_of::<StepInput>()].copy_from_slice(bytemuck::bytes_of(&step_input(s, n, self.dt)));
+                place[..size_of::<StepInput>()].copy_from_slice(bytemuck::bytes_of(&step_input(s, n, self.dt, origin)));
             }
             buffer.write(&self.gpu.queue, &inputs);
         }

@@ -34,6 +34,8 @@ pub struct Features {
     pub free_path: bool,
     /// The tissue beside the path is carried by points.
     pub opening: bool,
+    /// That path is laid while the needle comes.
+    pub laid: bool,
     /// A window draws the fields.
     pub drawn: bool,
     /// The adapter has more lanes than short stages have threads: those get more, see [`Grain`].
@@ -53,6 +55,7 @@ impl Features {
             bore: model.has_surface(|s| matches!(s, ContactSurface::OuterWall | ContactSurface::Bore)),
             slit: model.has_surface(|s| matches!(s, ContactSurface::Slit { .. })),
             free_path: model.puncture.as_ref().is_some_and(|p| p.free.is_some()),
+            laid: model.laid.is_some(),
             opening: model.opening().is_some(),
             drawn: false,
             wide: false,
@@ -87,6 +90,9 @@ pub fn defines(effects: &EffectSet, features: &Features) -> Defines {
     define("INNER_BOUND", !features.tetrahedra && effects.bounds_inner_cells());
     define("BORE", features.bore && separates);
     define("SLIT", features.slit && separates);
+    // The path is laid while the needle comes, which may turn against it.
+    define("LAID", features.laid && effects.puncture.is_some() && !features.tetrahedra);
+    define("TURNS", (features.free_path || features.laid) && effects.puncture.is_some() && !features.tetrahedra);
     define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
     define("WIDE", features.wide);
     define("OPENING", features.opening && effects.puncture.is_some() && !features.tetrahedra);

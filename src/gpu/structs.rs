@@ -250,6 +250,10 @@ shared_structs! {
         along: [f32; 4],
         across: [f32; 4],
         impulse: [f32; 4],
+        rest: [f32; 4],
+        rest_direction: [f32; 4],
+        disc: [f32; 4],
+        by_moment: [f32; 4],
     }
     /// shaders/effects/opening.wgsl
     struct OpeningEntry {
@@ -262,6 +266,7 @@ shared_structs! {
     struct OpeningSum {
         by_centre: [f32; 4],
         by_rate: [f32; 4],
+        by_moment: [f32; 4],
     }
     /// shaders/effects/opening.wgsl
     struct OpeningRecord {

@@ -180,6 +180,7 @@ impl Model {
             ring_stiffness_per_volume: self.ring_stiffness_per_volume(params.contact_stiffness_factor),
             face_damping: 0.0,
             profile: Profile::new(&needle, motion.direction),
+            reference: motion.direction,
             params,
             needle,
             path,

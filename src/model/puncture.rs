@@ -97,6 +97,8 @@ pub struct PuncturePlan {
     pub needle: NeedleShape,
     /// Its outer surface in the frame of the tip.
     pub profile: Profile,
+    /// Direction of the needle to which that belongs: a needle that turns swings out of it.
+    pub reference: DVec3,
     pub path: PlannedPath,
     pub anchors: Vec<TipAnchor>,
     /// On tetrahedra the lines of the anchors, each counted from its `surface`; empty for a block.
@@ -177,7 +179,12 @@ impl Model {
             .map(|laid| laid.line.clone())
             .unwrap_or_else(|| PathLine::straight(self.scene.motion.entry, self.scene.motion.direction));
         let ahead = line.ahead();
-        let path = PlannedPath::into_block(ahead.origin, ahead.direction);
+        let mut path = PlannedPath::into_block(ahead.origin, ahead.direction);
+        // Where the line has turned the front of the tip is across it.
+        let has_turned = line.pieces().len() > 1;
+        if has_turned {
+            path.normal = -ahead.direction;
+        }
         // A hand may lead it as deep as there is tissue.
         let deepest = if params.anywhere { f64::INFINITY } else { self.scene.motion.deepest() };
         let Some(mesh) = self.mesh.as_block() else { return };
@@ -195,8 +202,7 @@ impl Model {
         let deepest = deepest.min(exit);
         let surfaces = self.separated_surfaces(&path);
         let anchors = match opening {
-            // Where the line has turned the front is across it.
-            true if line.pieces().len() > 1 => disc_offsets(&path, &needle)
+            true if has_turned => disc_offsets(&path, &needle)
                 .map(|o| TipAnchor { surface: path.entry + o, axial_offset: 0.0 })
                 .collect(),
             true => disc_offsets(&path, &needle).map(|o| anchor_beside(&path, o, case)).collect(),
@@ -246,6 +252,7 @@ impl Model {
         // As the nodes of a face would be damped, each with a half of the masses of its cells.
         let h = self.scene.tissue.cell_size;
         let contact_stiffness = self.contact_stiffness(params.contact_stiffness_factor);
+        let reference = if self.laid.is_some() { self.scene.motion.direction } else { path.direction };
         let face_mass = 0.5 * self.scaled_density() * h.powi(3);
         PuncturePlan {
             segments,
@@ -257,7 +264,8 @@ impl Model {
             ring_stiffness_per_volume: self.ring_stiffness_per_volume(params.contact_stiffness_factor),
             face_damping: 2.0 * params.contact_damping * (face_mass / contact_stiffness).sqrt(),
             params,
-            profile: Profile::new(&needle, path.direction),
+            profile: Profile::new(&needle, reference),
+            reference,
             needle,
             path,
             free: None,

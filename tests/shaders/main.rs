@@ -29,6 +29,7 @@ fn scene(loaded_faces: bool, driven_faces: bool) -> Features {
         tetrahedra: false,
         free_path: false,
         opening: false,
+        laid: false,
         drawn: true,
         wide: false,
         bore: false,
@@ -51,6 +52,8 @@ fn scenes() -> Vec<Features> {
     scenes.push(Features { opening: true, ..scene(false, false) });
     scenes.push(Features { opening: true, regions: true, ..scene(true, true) });
     scenes.push(Features { opening: true, wide: true, ..scene(false, false) });
+    scenes.push(Features { opening: true, laid: true, ..scene(false, false) });
+    scenes.push(Features { opening: true, laid: true, wide: true, ..scene(true, true) });
     scenes.push(Features { bore: true, ..scene(false, false) });
     scenes.push(Features { slit: true, ..scene(true, true) });
     scenes.push(Features { free_path: true, regions: true, ..scene(true, true) });

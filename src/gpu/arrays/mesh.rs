@@ -176,8 +176,8 @@ pub fn displacement(u: [i32; 4]) -> DVec3 {
     DVec3::new(u[0].into(), u[1].into(), u[2].into()) * DISPLACEMENT_UNIT
 }
 
-/// The input of step `number` in the layout of the shader.
-pub fn step_input(input: &crate::engine::StepInput, number: u64, dt: f64) -> StepInput {
+/// The input of step `number` in the layout of the shader. `origin`: where the piece of a laid path ahead of the tip begins to count [m].
+pub fn step_input(input: &crate::engine::StepInput, number: u64, dt: f64, origin: Option<DVec3>) -> StepInput {
     // Multiples of the golden ratio: any run of steps sees all offsets alike, so rounding errors cancel.
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let mut out = StepInput {
@@ -195,7 +195,7 @@ pub fn step_input(input: &crate::engine::StepInput, number: u64, dt: f64) -> Ste
         out.direction = with(pose.direction, spin.z);
         out.velocity_ahead = vec4(pose.velocity_ahead);
         out.angular_velocity_ahead = vec4(pose.angular_velocity_ahead);
-        out.depth = pose.depth as f32;
+        out.depth = origin.map_or(pose.depth, |origin| (pose.tip - origin).dot(pose.direction)) as f32;
     }
     for (out, drive) in out.drives.iter_mut().zip(&input.drives) {
         *out = DriveStep {

@@ -203,11 +203,17 @@ pub(super) fn tables_of(model: &Model, layout: &Layout, grain: Grain) -> Tables 
     // First, so that a run has the place of its number.
     tables.entries = runs.iter().map(|run| run_entry(point_sums(opening, grain), *run)).collect();
     let told = slots(&mut tables, model, opening, mesh, (plan.path.entry, &runs), grain);
-    lists(&mut tables, opening, mesh, layout, &told);
+    lists(&mut tables, opening, mesh, layout, (plan.path.entry, &told));
     // Behind the stations, the means of those in a run of cells.
     tables.stations.extend(runs.iter().map(|(first, _)| {
         let NearCell { first, count, .. } = opening.cells[*first];
-        OpeningStation { lists: [first.into(), (first + count).into(), 0, 0], ..OpeningStation::zeroed() }
+        let within = &opening.stations[usize::from(first)..][..usize::from(count)];
+        let direction = within.iter().map(|s| s.direction).sum::<DVec3>() / within.len() as f64;
+        OpeningStation {
+            lists: [first.into(), (first + count).into(), 0, 0],
+            rest_direction: vec4(direction),
+            ..OpeningStation::zeroed()
+        }
     }));
     tables
 }
@@ -292,7 +298,13 @@ fn slots(
 }
 
 /// Stations and nodes, with the lists of what they are made of.
-fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &Layout, told: &Told) {
+fn lists(
+    tables: &mut Tables,
+    opening: &OpeningPlan,
+    mesh: &BlockMesh,
+    layout: &Layout,
+    (entry, told): (DVec3, &Told),
+) {
     let mut sections: BTreeMap<u32, Vec<(u32, f32, f32)>> = BTreeMap::new();
     for (index, station) in opening.stations.iter().enumerate() {
         let mut weights: BTreeMap<u32, (f32, f32)> = BTreeMap::new();
@@ -319,6 +331,8 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
         tables.stations.push(OpeningStation {
             depth: [station.depth as f32, cut_from as f32, station.opened(opening.shaft) as f32, 0.0],
             lists: [first, middle, middle, end],
+            rest: vec4(station.middle - entry),
+            rest_direction: vec4(station.direction),
             ..OpeningStation::zeroed()
         });
     }

@@ -152,6 +152,10 @@ fn puncture_params(model: &Model) -> PunctureParams {
             }
             Mesh::Tets(mesh) => 1.001 * plan.anchor_reach(mesh),
         };
+        if let Some((_, mesh)) = model.laid.as_ref().zip(model.mesh.as_block()) {
+            // An anchor acts on the corners of its cell, whichever way the front is turned.
+            anchor_reach = 1.001 * (0..mesh.cell_count()).map(|cell| mesh.cell_size(cell).length()).fold(0.0, f64::max);
+        }
         let (mut free_low, mut free_count, mut path_cell_count) = ([0; 4], [0; 4], plan.cells.len());
         if let Some(free) = &plan.free {
             let mesh = model.mesh.block();
@@ -194,7 +198,7 @@ fn puncture_params(model: &Model) -> PunctureParams {
             face_stiffness: plan.face_stiffness() as f32,
             face_damping: plan.face_damping as f32,
             ring_stiffness: plan.ring_stiffness_per_volume as f32,
-            reference: vec4(plan.path.direction),
+            reference: vec4(plan.reference),
             free_low,
             free_count,
             segments,
