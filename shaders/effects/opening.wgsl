@@ -215,13 +215,9 @@ fn opened_place(section: PathSection, eta: vec3<f32>, gradient: mat3x3<f32>) -> 
 
 // det grad x / det F_h, and its derivatives by s and rc.
 fn dilation(radius: f32, s: f32) -> vec3<f32> {
+    // With s0 = 0: no volume on the path grows without bound.
     let w = fade(s);
-    let s0 = opening.numbers.z;
-    let part = s / (s + s0);
-    // d(s v)/ds and d^2(s v)/ds^2, without the difference of large numbers near the path.
-    let first = w.y * part + w.x * s0 / ((s + s0) * (s + s0));
-    let second = w.z * part + 2.0 * w.y * s0 / ((s + s0) * (s + s0)) - 2.0 * w.x * s0 / ((s + s0) * (s + s0) * (s + s0));
-    return vec3<f32>(1.0 + radius * radius * first, radius * radius * second, 2.0 * radius * first);
+    return vec3<f32>(1.0 + radius * radius * w.y, radius * radius * w.z, 2.0 * radius * w.y);
 }
 
 // a b^T.

@@ -229,7 +229,7 @@ impl Simulation {
         let spacing = self.model.opening().map_or(0.0, |opening| opening.spacing);
         let (_, at) = laying.line.coordinates(rest);
         let is_back = at + spacing < cut;
-        let end = at.min(cut).max(0.0) + spacing;
+        let end = if is_back { at.max(0.0) } else { cut } + spacing;
         let ahead = tissue.pulled_back(laying.line.point(end), next.direction);
         let advances = next.depth > now.depth && ahead.z < 0.0;
         let angle = laying.line.piece(end).direction.angle_between(ahead);
