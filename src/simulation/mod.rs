@@ -320,6 +320,9 @@ impl Simulation {
             return Err(Error::Device("the engine lost a frame".into()));
         };
         self.collected += 1;
+        if let Some(laying) = &mut self.laying {
+            laying.follow(sums.tip_coordinate);
+        }
         let bent = self.answer_of_the_needle(&mut sums);
         let when = (&self.clock, self.clock.first_step(sums.frame));
         let mut record = self.recorder.record(&self.model, self.kinematics.as_ref(), when, &sums);

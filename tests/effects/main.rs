@@ -9,6 +9,7 @@ mod flexible_needle;
 mod friction;
 mod gravity;
 mod indentation;
+mod laid_path;
 mod laws;
 mod mass_scaling;
 mod mooney_rivlin;

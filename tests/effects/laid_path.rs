@@ -1,0 +1,164 @@
+//! Free paths in the scheme `opening`: a line laid while the needle comes (src/simulation/laying.rs).
+
+use std::path::Path;
+
+use stylet::observables::FrameRecord;
+use stylet::{EngineChoice, Scene, Simulation};
+
+use crate::common::*;
+
+/// A 16G cone in muscle across the fibres, cells of 0.8 mm; the motion follows.
+const TISSUE: &str = r#"
+effects = ["puncture", "friction", "mass_scaling"]
+[tissue]
+size_mm = [20.0, 16.0, 14.0]
+cell_size_mm = 0.8
+[material]
+preset = "across-fibre"
+[needle]
+gauge = "16G"
+tip_half_angle_deg = 18.0
+[puncture]
+scheme = "opening"
+[outputs]
+pictures_at_depth_mm = []
+fields_at_depth_mm = []
+"#;
+
+/// In, turned by 20 degrees about the entry, and on.
+const TURN: &str = "{kind=\"insert\", speed_mm_s=4.0, depth_mm=5.5}, \
+                    {kind=\"turn\", angle_deg=20.0, rate_deg_s=40.0, pivot_mm=[0.0, 0.0, 0.0]}, \
+                    {kind=\"insert\", speed_mm_s=4.0, depth_mm=9.0}";
+
+fn scene(phases: &str, overrides: &[&str]) -> Scene {
+    let motion = format!("motion.phase=[{phases}]");
+    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_string()).chain([motion]).collect();
+    Scene::parse(Path::new("laid.toml"), TISSUE, &overrides).unwrap()
+}
+
+/// All frames; nothing may be clamped, turned inside out, lost or created.
+fn frames(scene: Scene, engine: EngineChoice) -> Vec<FrameRecord> {
+    let mut simulation = Simulation::new(scene, engine).unwrap();
+    let mut all = Vec::new();
+    while let Some(frame) = simulation.next_frame().unwrap() {
+        assert_eq!(frame.health.clamped_nodes, 0, "at {} s", frame.time);
+        assert_eq!(frame.health.inverted_cells, 0, "at {} s", frame.time);
+        all.push(frame);
+    }
+    assert_eq!(simulation.verdict().sentence(), None);
+    all
+}
+
+fn largest_imbalance(frames: &[FrameRecord]) -> f64 {
+    frames.iter().map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max)
+}
+
+fn in_phase(frames: &[FrameRecord], phase: usize) -> impl Iterator<Item = &FrameRecord> {
+    frames.iter().filter(move |f| f.phase == phase)
+}
+
+/// The only difference: the line is laid instead of planned.
+#[test]
+fn a_straight_free_path_is_the_planned_one() {
+    let phases = "{kind=\"insert\", speed_mm_s=4.0, depth_mm=7.0}, {kind=\"withdraw\", speed_mm_s=4.0, depth_mm=2.0}";
+    let mut engines = vec![EngineChoice::Cpu, EngineChoice::Cpu64];
+    engines.extend(gpu().map(|_| EngineChoice::Gpu));
+    for engine in engines {
+        let planned = frames(scene(phases, &[]), engine);
+        let free = frames(scene(phases, &["puncture.path=\"free\""]), engine);
+        let peak = planned.iter().map(|f| f.force.axial).fold(0.0, f64::max);
+        let pairs = planned.iter().zip(&free);
+        let apart = pairs.map(|(a, b)| (a.force.axial - b.force.axial).abs()).fold(0.0, f64::max) / peak;
+        println!("{engine:?}: {apart:.1e} of the peak {peak:.3} N apart");
+        assert_eq!(planned.len(), free.len());
+        match engine {
+            EngineChoice::Gpu => at_most("apart", apart, 1e-3),
+            _ => assert_eq!(apart, 0.0),
+        }
+    }
+}
+
+/// The work of a needle that turns is that of the moment of all forces on the tissue, and the line goes on along the needle.
+#[test]
+fn a_needle_that_turns_cuts_on_along_itself_and_loses_no_energy() {
+    let exact = frames(scene(TURN, &[]), EngineChoice::Cpu64);
+    println!("imbalance {:.2e}", largest_imbalance(&exact));
+    at_most("imbalance", largest_imbalance(&exact), 0.01);
+    let last = exact.last().unwrap();
+    // The tissue holds what it is turned against, and the tip has gone on to the end.
+    assert!(last.force.lateral.x > 0.05, "{:?}", last.force.lateral);
+    close("cut", last.tip_coordinate, 9e-3, 0.05);
+    let mut engines = vec![EngineChoice::Cpu];
+    engines.extend(gpu().map(|_| EngineChoice::Gpu));
+    for engine in engines {
+        let found = frames(scene(TURN, &[]), engine);
+        let peak = exact.iter().map(|f| f.force.axial).fold(0.0, f64::max);
+        // While the crack runs it is one step earlier or later.
+        let runs = |f: &FrameRecord| f.phase == 0 && f.depth > 4.5e-3 || f.phase == 2 && f.depth < 7e-3;
+        let pairs = exact.iter().zip(&found).filter(|(f, _)| !runs(f));
+        let apart = pairs.map(|(a, b)| (a.force.axial - b.force.axial).abs()).fold(0.0, f64::max) / peak;
+        println!("{engine:?}: {apart:.1e} of the peak {peak:.3} N apart, imbalance {:.2e}", largest_imbalance(&found));
+        at_most("apart", apart, 0.01);
+        at_most("imbalance", largest_imbalance(&found), 0.01);
+    }
+}
+
+/// Three passes: a track, another beside it, and the first one again, from a place within half a radius of its entry.
+const PASSES: &str = "{kind=\"insert\", speed_mm_s=5.0, depth_mm=7.0}, {kind=\"withdraw\", speed_mm_s=5.0, depth_mm=-2.0}, \
+                      {kind=\"reposition\", entry_mm=[4.0, 0.0]}, {kind=\"insert\", speed_mm_s=5.0, depth_mm=6.0}, \
+                      {kind=\"withdraw\", speed_mm_s=5.0, depth_mm=-2.0}, {kind=\"reposition\", entry_mm=[0.1, 0.0]}, \
+                      {kind=\"insert\", speed_mm_s=5.0, depth_mm=8.0}";
+
+#[test]
+fn a_needle_finds_its_old_track_again_and_cuts_a_new_one_beside_it() {
+    let engine = if gpu().is_some() { EngineChoice::Gpu } else { EngineChoice::Cpu };
+    let all = frames(scene(PASSES, &[]), engine);
+    at_most("imbalance", largest_imbalance(&all), 0.01);
+    let punctures = [0, 3].map(|phase| in_phase(&all, phase).map(|f| f.force.cutting).fold(0.0, f64::max));
+    close("puncture force beside the track", punctures[1], punctures[0], 0.03);
+    let cut = in_phase(&all, 0).last().unwrap().tip_coordinate;
+    // In the track the dimple alone presses; at its end the tip cuts again.
+    let back = in_phase(&all, 6).filter(|f| f.depth > 2e-3 && f.depth < cut - 0.5e-3);
+    let in_track = back.map(|f| f.force.cutting).fold(0.0, f64::max);
+    let beyond = in_phase(&all, 6).last().unwrap();
+    println!("punctures {punctures:?} N, in the track {in_track:.4} N, beyond {:.4} N at {:.4} m", beyond.force.cutting, cut);
+    at_most("cutting force in the track", in_track, 0.005);
+    assert!(beyond.force.cutting > 0.04 && beyond.tip_coordinate > cut, "{}", beyond.force.cutting);
+    // Nothing but its own inertia acts on a needle in the air.
+    let outside = all.iter().filter(|f| f.phase != 0 && f.depth < -0.5e-3);
+    let outside = outside.map(|f| (f.force.axial - f.force.inertia).abs()).fold(0.0, f64::max);
+    println!("outside {outside:.1e} N");
+    assert_eq!(outside, 0.0);
+}
+
+/// Without friction a tip slides over the skin, and punctures where it then is.
+#[test]
+fn a_tip_slides_over_the_skin_before_it_punctures() {
+    let phases = "{kind=\"insert\", speed_mm_s=4.0, depth_mm=3.0}, {kind=\"move\", to_mm=[2.0, 0.5, -3.0], speed_mm_s=2.0}, \
+                  {kind=\"insert\", speed_mm_s=4.0, depth_mm=6.0}";
+    let all = frames(scene(phases, &[]), EngineChoice::Cpu);
+    let aside = in_phase(&all, 1).map(|f| f.force.lateral.truncate().length()).fold(0.0, f64::max);
+    println!("aside {aside:.1e} N, imbalance {:.2e}", largest_imbalance(&all));
+    at_most("lateral force", aside, 1e-3);
+    at_most("imbalance", largest_imbalance(&all), 0.02);
+    let straight = frames(scene("{kind=\"insert\", speed_mm_s=4.0, depth_mm=6.0}", &[]), EngineChoice::Cpu);
+    let puncture = |frames: &[FrameRecord]| frames.iter().map(|f| f.force.cutting).fold(0.0, f64::max);
+    close("puncture force", puncture(&all), puncture(&straight), 0.05);
+}
+
+/// A run that goes on from a checkpoint on a line that was laid on the way gives the same numbers.
+#[test]
+fn a_checkpoint_keeps_the_line() {
+    let whole = frames(scene(PASSES, &[]), EngineChoice::Cpu);
+    let mut simulation = Simulation::new(scene(PASSES, &[]), EngineChoice::Cpu).unwrap();
+    let stop = in_phase(&whole, 3).last().unwrap().frame;
+    simulation.stop_after(stop);
+    while simulation.next_frame().unwrap().is_some_and(|frame| frame.frame < stop) {}
+    let checkpoint = simulation.checkpoint().unwrap();
+    let bytes = serde_json::to_vec(&checkpoint).unwrap();
+    let mut next = Simulation::new(scene(PASSES, &[]), EngineChoice::Cpu).unwrap();
+    next.resume(&serde_json::from_slice(&bytes).unwrap()).unwrap();
+    let rest = std::iter::from_fn(|| next.next_frame().unwrap());
+    let apart: Vec<_> = rest.zip(&whole[stop as usize + 1..]).filter(|(a, b)| a.force != b.force).collect();
+    assert!(apart.is_empty(), "{} frames, the first at {} s", apart.len(), apart[0].0.time);
+}
