@@ -183,6 +183,11 @@ impl CpuEngine {
         }
     }
 
+    /// What it computes.
+    pub(crate) fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
     /// The state at the end of the last frame.
     pub fn state(&self) -> &State {
         &self.state

@@ -12,9 +12,9 @@ use crate::model::opening::{
     NearCell, OpeningPlan, OpeningStation, PathPoint, VOLUME_PLACE, is_volume_place, mean_place,
 };
 use crate::model::{Model, PuncturePlan};
-use crate::needle::{ToolPose, swing};
 use crate::needle::centre_line::Bend;
 use crate::needle::opening::{Derivatives, Opening, OpeningMap, Station, outer, squared_norm_bound};
+use crate::needle::{ToolPose, swing};
 use glam::{DMat3, DVec3};
 
 /// What is derived of one station: of the energy E.
@@ -145,8 +145,8 @@ impl CpuEngine {
         // Points: every station its own.
         let (displacement, measures) = (&self.state.displacement, self.measures);
         let shape = |cell: u32| Shape { material: model.material(cell as usize), measures };
-        let points = self
-            .each(sections.len(), |i| point_forces(&shape, map, &opening.stations[i], &sections[i], displacement));
+        let points =
+            self.each(sections.len(), |i| point_forces(&shape, map, &opening.stations[i], &sections[i], displacement));
         for ((station, local), sums) in opening.stations.iter().zip(&points).zip(&mut sums) {
             for (node, (force, bound)) in station.nodes.iter().zip(&local.1) {
                 self.added.add(*node as usize, -*force, *bound);

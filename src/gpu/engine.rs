@@ -175,6 +175,11 @@ impl GpuEngine {
         self.buffers.get(name)
     }
 
+    /// What it computes.
+    pub(crate) fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
     /// Takes the displacement of a state that another engine computed, and nothing else of it.
     pub(crate) fn write_displacement(&mut self, state: &State) {
         let source = self.source();

@@ -7,9 +7,9 @@ use glam::{DMat3, DVec3};
 
 use crate::effects::puncture::LEAST_TRAVELS;
 use crate::mesh::{BlockMesh, CORNERS, trilinear};
+use crate::needle::NeedleShape;
 use crate::needle::lateral_axes;
 use crate::needle::opening::OpeningMap;
-use crate::needle::NeedleShape;
 use crate::needle::path_line::PathLine;
 
 /// Distance between stations, in needle radii.

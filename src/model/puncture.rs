@@ -202,9 +202,9 @@ impl Model {
         let deepest = deepest.min(exit);
         let surfaces = self.separated_surfaces(&path);
         let anchors = match opening {
-            true if has_turned => disc_offsets(&path, &needle)
-                .map(|o| TipAnchor { surface: path.entry + o, axial_offset: 0.0 })
-                .collect(),
+            true if has_turned => {
+                disc_offsets(&path, &needle).map(|o| TipAnchor { surface: path.entry + o, axial_offset: 0.0 }).collect()
+            }
             true => disc_offsets(&path, &needle).map(|o| anchor_beside(&path, o, case)).collect(),
             false => tip_anchors(&path, &needle, self.effects.cohesive.is_some(), case),
         };
@@ -230,9 +230,8 @@ impl Model {
             .collect();
         self.weigh_cut_carriers();
         self.join_slit_faces();
-        let segments = path_segments(&self.scene, &params, &needle, exit, |depth| {
-            self.scene.region_at(line.point(depth))
-        });
+        let segments =
+            path_segments(&self.scene, &params, &needle, exit, |depth| self.scene.region_at(line.point(depth)));
         self.puncture =
             Some(self.puncture_plan(params, needle, path, Way { segments, anchors, lines: Vec::new(), exit, cells }));
         if opening {

@@ -367,7 +367,9 @@ impl<N: Number> Opening<N> {
     /// Derivatives of an energy per volume, from its derivative P by F.
     #[inline(always)]
     pub fn pull_back(&self, p: &Tensor<N>) -> Derivatives<N> {
-        let Opening { eta, g_less, g1, g2, gr, gr1, grr, lateral: h, radius_rate: rcz, rest_direction: t0, map, .. } = *self;
+        let Opening {
+            eta, g_less, g1, g2, gr, gr1, grr, lateral: h, radius_rate: rcz, rest_direction: t0, map, ..
+        } = *self;
         let two = g1.of(2.0);
         let twice = two * g1;
         let (ht_eta, pt_eta) = (transposed_times(&h, eta), transposed_times(p, eta));

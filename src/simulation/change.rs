@@ -160,6 +160,8 @@ impl Simulation {
         if change.reach != Reach::Constants {
             return Ok(false);
         }
+        let present = self.on_the_present_line(change);
+        let change = present.as_ref().unwrap_or(change);
         let before = self.measured()?;
         if !self.engine.retune(change.model.clone(), change.dt, change.steps_per_frame as usize)? {
             return Ok(false);
@@ -174,11 +176,31 @@ impl Simulation {
     /// As [`Simulation::retune`].
     pub fn adopt(&mut self, change: &Change, mut engine: RunEngine) -> Result<()> {
         self.between_frames()?;
+        let present = self.on_the_present_line(change);
+        if let Some(present) = &present {
+            engine = present.engine()?;
+        }
+        let change = present.as_ref().unwrap_or(change);
         let before = self.measured()?;
         let state = self.engine.read_state()?;
         engine.write_state(&carried(&state, &self.model, &change.model))?;
         self.engine = engine;
+        self.engines += 1;
         self.adopted(change, before)
+    }
+
+    /// A change that was thought through before the path was laid anew, on the line that it has now; `None` where it is that.
+    fn on_the_present_line(&self, change: &Change) -> Option<Change> {
+        let (laying, laid) = self.laying.as_ref().zip(change.model.laid.as_ref())?;
+        (laid.line != *laying.line()).then(|| Change {
+            reach: change.reach,
+            model: Arc::new(change.model.relaid(laying.line().clone())),
+            stable_dt: change.stable_dt,
+            dt: change.dt,
+            steps_per_frame: change.steps_per_frame,
+            device: change.device.clone(),
+            purpose: change.purpose,
+        })
     }
 
     /// A change at once, whatever it takes; false where the run has to begin anew, and goes on unchanged.

@@ -12,9 +12,9 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::Simulation;
 use super::change::{Change, carried, on_the_same_path};
 use super::start::choose_step;
-use super::{RunEngine, Simulation};
 use crate::effects::adhesion::Bond;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::engine::{State, StepInput};
@@ -207,7 +207,8 @@ impl Simulation {
 
     /// What the tissue says of a needle that moves from one pose to another.
     fn look(&self, state: &State, (now, next): (&ToolPose, &ToolPose), radius: f64) -> Found {
-        let (Some(laying), Some(laid), Some(mesh)) = (&self.laying, &self.model.laid, self.model.mesh.as_block()) else {
+        let (Some(laying), Some(laid), Some(mesh)) = (&self.laying, &self.model.laid, self.model.mesh.as_block())
+        else {
             return Found::Nothing;
         };
         let tissue = Tissue { mesh, laid, u: &state.displacement };
@@ -269,7 +270,9 @@ impl Simulation {
             (dt, steps_per_frame) = (self.dt(), self.steps_per_frame());
         }
         let most_steps = self.purpose.most_steps(steps_per_frame);
-        let mut engine = RunEngine::new(&model, self.device.as_ref(), dt, most_steps, self.purpose)?;
+        let device = self.device.clone();
+        let mut engine = self.engine.on_another_line(&model, device.as_ref(), dt, most_steps, self.purpose)?;
+        self.engines += 1;
         let Some((state, cut)) = from else {
             (self.engine, self.model) = (engine, model);
             if let Some(laying) = &mut self.laying {

@@ -85,6 +85,8 @@ pub struct Simulation {
     /// Stable step: the wave-speed bound at rest [s].
     pub stable_dt: f64,
     engine: RunEngine,
+    /// Engines before this one.
+    engines: u64,
     device: Option<Gpu>,
     purpose: Purpose,
     recorder: Recorder,
@@ -168,6 +170,11 @@ impl Simulation {
     /// The engine on a device, for those who draw from its buffers.
     pub fn on_device(&self) -> Option<&GpuEngine> {
         self.engine.on_device()
+    }
+
+    /// How often the engine was replaced: whoever draws from its buffers takes those of the new one.
+    pub fn replaced_engines(&self) -> u64 {
+        self.engines
     }
 
     /// Brings the buffers on the device up to the present state, for those who draw from them: displacements, with `fields` all that

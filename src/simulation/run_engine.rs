@@ -5,6 +5,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 use super::Purpose;
+use super::change::carried;
 use crate::cpu::{CpuEngine, unknown_to_lanes};
 use crate::engine::Engine;
 use crate::error::Result;
@@ -63,6 +64,28 @@ impl RunEngine {
         })
     }
 
+    /// An engine for the same scene on another line of its path; the old one gives what draws from a state that another engine computes.
+    ///
+    /// # Errors
+    /// As [`GpuEngine::new`].
+    pub(super) fn on_another_line(
+        &mut self,
+        model: &Arc<Model>,
+        device: Option<&Gpu>,
+        dt: f64,
+        most_steps: usize,
+        purpose: Purpose,
+    ) -> Result<Self> {
+        match self {
+            RunEngine::Cpu { drawn, .. } => {
+                let make = if purpose.lanes { CpuEngine::in_lanes } else { CpuEngine::new };
+                let (engine, drawn) = (Box::new(make(model.clone(), dt)), drawn.take());
+                Ok(RunEngine::Cpu { engine, drawn, shown: Shown::default() })
+            }
+            RunEngine::Gpu(_) => RunEngine::new(model, device, dt, most_steps, purpose),
+        }
+    }
+
     /// The engine on a device, for those who draw from its buffers.
     pub fn on_device(&self) -> Option<&GpuEngine> {
         match self {
@@ -79,6 +102,10 @@ impl RunEngine {
         let RunEngine::Cpu { engine, drawn: Some(drawn), shown } = self else { return Ok(()) };
         if *shown < wanted {
             match wanted {
+                // A path that was laid meanwhile is not drawn.
+                Shown::Everything if !Arc::ptr_eq(engine.model(), drawn.model()) => {
+                    drawn.write_state(&carried(engine.state(), engine.model(), drawn.model()))?;
+                }
                 Shown::Everything => drawn.write_state(engine.state())?,
                 _ => drawn.write_displacement(engine.state()),
             }

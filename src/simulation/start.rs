@@ -171,10 +171,11 @@ impl Simulation {
             ));
         }
         if model.scene.motion.is_free() && model.puncture.is_some() {
-            notices.push(
-                "the motion leaves one straight line: the path is not planned but found while the tip moves (free path)"
-                    .into(),
-            );
+            let how = match &model.laid {
+                Some(_) => "the path is not planned but laid while the needle comes (free path)",
+                None => "the path is not planned but found while the tip moves (free path)",
+            };
+            notices.push(format!("the motion leaves one straight line: {how}"));
         }
         notices.extend(advice(&model));
         let most = purpose.most_steps(steps_per_frame);
@@ -192,6 +193,7 @@ impl Simulation {
             stable_dt,
             clock,
             engine,
+            engines: 0,
             device,
             purpose,
             recorder: Recorder::default(),

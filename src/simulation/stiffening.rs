@@ -84,6 +84,7 @@ impl Simulation {
             )?;
             engine.write_state(&state)?;
             self.engine = engine;
+            self.engines += 1;
         }
         let end = match self.purpose.led {
             true => LONGEST_LED,

@@ -121,7 +121,10 @@ fn a_needle_finds_its_old_track_again_and_cuts_a_new_one_beside_it() {
     let back = in_phase(&all, 6).filter(|f| f.depth > 2e-3 && f.depth < cut - 0.5e-3);
     let in_track = back.map(|f| f.force.cutting).fold(0.0, f64::max);
     let beyond = in_phase(&all, 6).last().unwrap();
-    println!("punctures {punctures:?} N, in the track {in_track:.4} N, beyond {:.4} N at {:.4} m", beyond.force.cutting, cut);
+    println!(
+        "punctures {punctures:?} N, in the track {in_track:.4} N, beyond {:.4} N at {:.4} m",
+        beyond.force.cutting, cut
+    );
     at_most("cutting force in the track", in_track, 0.005);
     assert!(beyond.force.cutting > 0.04 && beyond.tip_coordinate > cut, "{}", beyond.force.cutting);
     // Nothing but its own inertia acts on a needle in the air.

@@ -165,7 +165,8 @@ fn puncture_params(model: &Model) -> PunctureParams {
             };
             // An anchor acts on the corners of its cell.
             anchor_reach = 1.001 * (plan.needle.radius + (0..free.cell_count()).map(diagonal).fold(0.0, f64::max));
-            for (out, value) in free_low.iter_mut().zip(free.skin.low).chain(free_count.iter_mut().zip(free.skin.count)) {
+            for (out, value) in free_low.iter_mut().zip(free.skin.low).chain(free_count.iter_mut().zip(free.skin.count))
+            {
                 *out = value as u32;
             }
             for (out, i) in segments.iter_mut().zip(0..) {

@@ -136,6 +136,11 @@ impl PracticeScreen {
         encoder: &mut wgpu::CommandEncoder,
         panels: Option<Panels>,
     ) -> Result<()> {
+        // A path that was laid anew, or a shorter step, may have taken another engine.
+        let engines = self.practice.simulation.replaced_engines();
+        if std::mem::replace(&mut self.engines, engines) != engines {
+            self.take_buffers(stage)?;
+        }
         let place = self.place_tool(stage);
         // Stress is computed where it is looked at.
         let fields = self.shows_fields();

@@ -67,6 +67,8 @@ pub struct PracticeScreen {
     pub(super) overlay: Vec<egui::ClippedPrimitive>,
     /// When the range of the field was looked at last.
     pub(super) ranged: Option<Instant>,
+    /// Of which engine of the simulation the buffers are that are drawn.
+    pub(super) engines: u64,
     /// When the panels were drawn last, and how often.
     pub(super) panelled: Option<Instant>,
     pub(super) panel_count: u64,
@@ -128,6 +130,7 @@ impl PracticeScreen {
             area: egui::Rect::NOTHING,
             overlay: Vec::new(),
             ranged: None,
+            engines: 0,
             panelled: None,
             panel_count: 0,
             scene_file: Watch::new([path]),

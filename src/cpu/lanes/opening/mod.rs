@@ -670,9 +670,8 @@ fn law_in_lanes<S: Simd>(simd: S, all: &LaneOpening, rows: &[f32], first: usize,
 /// Moment about the path of forces on nodes that have these derivatives of an energy by `I + h` and by the place at `offset`.
 #[inline(always)]
 fn moment_of<N: Number>(h: &Tensor<N>, offset: [N; 3], by_gradient: &Tensor<N>, by_place: [N; 3]) -> [N; 3] {
-    let cross = |a: [N; 3], b: [N; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
+    let cross =
+        |a: [N; 3], b: [N; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let mut moment = cross(offset, by_place);
     for a in 0..3 {
         let mut column = h[a];

@@ -7,8 +7,8 @@ use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
 use super::{
-    AtCorners, Found, Gathered, LAW, Lanes, Opened, POINT, POINT_SUMS, ROOM, RUN_SUMS, STRIDES, Step, law_in_lanes, moment_of,
-    opened,
+    AtCorners, Found, Gathered, LAW, Lanes, Opened, POINT, POINT_SUMS, ROOM, RUN_SUMS, STRIDES, Step, law_in_lanes,
+    moment_of, opened,
 };
 use crate::cpu::lanes::WIDEST;
 use crate::cpu::lanes::corners::{HOURGLASS, SIGNS};
