@@ -328,6 +328,11 @@ impl Model {
         model
     }
 
+    /// The tip on the surface, in the scheme `opening`.
+    pub fn tip_contact(&self) -> Option<&TipContact> {
+        self.puncture.as_ref().and_then(|plan| plan.contact.as_ref())
+    }
+
     /// The scheme `opening`, where the scene has it.
     pub fn opening(&self) -> Option<&OpeningPlan> {
         self.puncture.as_ref().and_then(|plan| plan.opening.as_ref())

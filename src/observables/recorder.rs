@@ -25,6 +25,11 @@ impl Recorder {
         self.totals.changes += stored(&after.energy) - stored(&before.energy);
     }
 
+    /// Books what the springs of the tip hold more after its path was laid anew [J].
+    pub fn book_laying(&mut self, work: f64) {
+        self.totals.changes += work;
+    }
+
     /// Books the frame whose steps begin with number `first` and returns its record.
     pub fn record(
         &mut self,

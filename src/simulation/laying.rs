@@ -15,15 +15,15 @@ use serde::{Deserialize, Serialize};
 use super::Simulation;
 use super::change::{Change, carried, on_the_same_path};
 use super::start::choose_step;
-use crate::effects::adhesion::Bond;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::engine::{State, StepInput};
 use crate::error::Result;
 use crate::mesh::BlockMesh;
 use crate::mesh::material_place::{material_place, pulled_back, rest_position_at};
-use crate::model::{LaidPath, Model};
+use crate::model::{LaidPath, Model, TipAnchor};
 use crate::needle::ToolPose;
 use crate::needle::path_line::PathLine;
+use crate::needle::tip_contact::Touch;
 
 /// Height over the skin at which a tip comes to it, and at which it has left it [m].
 const COMES: f64 = 0.02e-3;
@@ -38,6 +38,10 @@ const TURNED: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 /// Angle between a needle that comes back along its track and this track from which on it cuts a way of its own [rad]. A choice.
 const BRANCHES: f64 = 10.0 * std::f64::consts::PI / 180.0;
+
+/// Way over which the line ahead turns to a needle that has turned, in radii of the needle. A choice: that of F^-1 t before a tip, whose dent
+/// cells of a radius or two hardly resolve, goes to and fro by 10 to 25 degrees.
+const FOLLOWS: f64 = 3.0;
 
 /// Part of its radius that a needle moves aside until the line is looked at: in the tissue, and on the skin. There a new place of the tip is
 /// one where the skin is less deep, by the square of the way: with a quarter of the radius a slide of 3 mm created 3.9 % of the work.
@@ -99,15 +103,23 @@ impl Tissue<'_> {
         pulled_back(at.gradient, direction).normalize()
     }
 
-    /// The line of a needle whose tip comes to the rest position, from the skin on; `None` where it points out of the tissue.
-    fn line(&self, rest: DVec3, direction: DVec3) -> Option<PathLine> {
-        /// The skin is flat nearly enough over the way of one round.
-        const ROUNDS: usize = 8;
-        let along = self.pulled_back(rest, direction);
-        let mut entry = rest;
+    /// The line of a needle from where its axis meets the deformed skin, looked for from the rest position `near`; `None` where there is no
+    /// tissue, or the needle points out of it.
+    fn line(&self, near: DVec3, pose: &ToolPose) -> Option<PathLine> {
+        const ROUNDS: usize = 12;
+        let mut entry = near;
         for _ in 0..ROUNDS {
-            entry -= along * (self.height(entry)? / along.z);
+            entry.z = self.laid.skin.skin_at(self.mesh, entry)?;
+            let at = material_place(self.mesh, self.u, self.laid.skin.nearest(self.mesh, entry));
+            let away = pose.tip - at.position;
+            let aside = away - pose.direction * away.dot(pose.direction);
+            if aside.length() < 1e-8 {
+                break;
+            }
+            entry += pulled_back(at.gradient, aside);
         }
+        entry.z = self.laid.skin.skin_at(self.mesh, entry)?;
+        let along = self.pulled_back(entry, pose.direction);
         (along.z < 0.0).then(|| PathLine::straight(entry, along))
     }
 }
@@ -200,7 +212,7 @@ impl Simulation {
             Found::Line(line, cut) => {
                 (laying.is_on, laying.tip, laying.direction) = (true, next.tip, next.direction);
                 laying.tracks.retain(|track| track.line != line);
-                self.take_line(line, Some((&state, cut)))
+                self.take_line(line, Some((&state, cut, now)))
             }
         }
     }
@@ -213,18 +225,20 @@ impl Simulation {
         };
         let tissue = Tissue { mesh, laid, u: &state.displacement };
         let rest = tissue.rest(next.tip);
-        let height = tissue.height(rest).unwrap_or(f64::INFINITY);
+        // Beside the tissue, over the level of the entry.
+        let beside = if laying.is_on { rest.z - laying.line.piece(0.0).origin.z } else { f64::INFINITY };
+        let height = tissue.height(rest).unwrap_or(beside);
         if !laying.is_on {
             if height > COMES {
                 return Found::Nothing;
             }
-            let Some(line) = tissue.line(rest, next.direction) else { return Found::Nothing };
+            let Some(line) = tissue.line(rest, next) else { return Found::Nothing };
             return match laying.tracks.iter().find(|track| track.is_the_same(&line, radius)) {
                 Some(track) => Found::Line(track.line.clone(), track.cut),
                 None => Found::Line(line, 0.0),
             };
         }
-        let was = tissue.height(tissue.rest(now.tip)).unwrap_or(f64::INFINITY);
+        let was = tissue.height(tissue.rest(now.tip)).unwrap_or(height);
         if height > LEFT && was > LEFT {
             return Found::Left;
         }
@@ -234,20 +248,34 @@ impl Simulation {
         }
         if cut == 0.0 {
             // Without friction the tip slides over the skin; the entry is where it presses.
-            return tissue.line(rest, next.direction).map_or(Found::Nothing, |line| Found::Line(line, 0.0));
+            let near = laying.line.piece(0.0).origin;
+            return tissue.line(near, next).map_or(Found::Nothing, |line| Found::Line(line, 0.0));
+        }
+        if next.depth <= now.depth {
+            return Found::Nothing;
         }
         // What is open ends where the tip has cut, or where it is if it was drawn back.
-        let spacing = self.model.opening().map_or(0.0, |opening| opening.spacing);
         let (_, at) = laying.line.coordinates(rest);
-        let is_back = at + spacing < cut;
-        let end = if is_back { at.max(0.0) } else { cut } + spacing;
-        let ahead = tissue.pulled_back(laying.line.point(end), next.direction);
-        let advances = next.depth > now.depth && ahead.z < 0.0;
-        let angle = laying.line.piece(end).direction.angle_between(ahead);
-        match advances && angle > if is_back { BRANCHES } else { TURNED } {
-            true => Found::Line(laying.line.turned(end, ahead), if is_back { at } else { cut }),
+        let is_back = at + radius < cut;
+        let cut = if is_back { at.max(0.0) } else { cut };
+        let end = cut + self.model.opening().map_or(0.0, |opening| opening.spacing);
+        let piece = laying.line.piece(end);
+        let wanted = self.direction_ahead(&tissue, laying.line.point(end), next.direction);
+        // The tip's own dent turns the tissue before it, and not its way: the line follows over some of it.
+        let part = if is_back { 1.0 } else { ((end - piece.start) / (FOLLOWS * radius)).clamp(0.0, 1.0) };
+        let ahead = piece.direction.lerp(wanted, part).normalize();
+        match piece.direction.angle_between(ahead) > if is_back { BRANCHES } else { TURNED } && ahead.z < 0.0 {
+            true => Found::Line(laying.line.turned(end, ahead), cut),
             false => Found::Nothing,
         }
+    }
+
+    /// Direction in the material of a needle that goes on along `direction` from the rest position `at`: the mean over the lines of the tip.
+    fn direction_ahead(&self, tissue: &Tissue, at: DVec3, direction: DVec3) -> DVec3 {
+        let Some(plan) = &self.model.puncture else { return direction };
+        let middle = plan.anchors[0].surface;
+        let of_anchor = |anchor: &TipAnchor| tissue.pulled_back(at + (anchor.surface - middle), direction);
+        plan.anchors.iter().map(of_anchor).sum::<DVec3>().normalize()
     }
 
     /// Goes on as far as the laying had come in a checkpoint.
@@ -261,8 +289,9 @@ impl Simulation {
         }
     }
 
-    /// Goes on along another line. `from`: the state to go on from, and how far the line is cut [m]; without one the engine has none yet.
-    pub(super) fn take_line(&mut self, line: PathLine, from: Option<(&State, f64)>) -> Result<()> {
+    /// Goes on along another line. `from`: the state to go on from, how far the line is cut [m], and the needle there; without one the
+    /// engine has none yet.
+    pub(super) fn take_line(&mut self, line: PathLine, from: Option<(&State, f64, ToolPose)>) -> Result<()> {
         let model = Arc::new(self.model.relaid(line.clone()));
         let stable_dt = wave_speed_bound(&model);
         let (mut dt, mut steps_per_frame) = choose_step(&model, stable_dt);
@@ -273,7 +302,7 @@ impl Simulation {
         let device = self.device.clone();
         let mut engine = self.engine.on_another_line(&model, device.as_ref(), dt, most_steps, self.purpose)?;
         self.engines += 1;
-        let Some((state, cut)) = from else {
+        let Some((state, cut, pose)) = from else {
             (self.engine, self.model) = (engine, model);
             if let Some(laying) = &mut self.laying {
                 laying.line = line;
@@ -283,10 +312,15 @@ impl Simulation {
         let change = Change::to_line(model, (stable_dt, dt, steps_per_frame), self.device.clone(), self.purpose);
         let goes_on = self.laying.as_ref().is_some_and(|laying| laying.line.piece(0.0) == line.piece(0.0));
         let mut next = carried(state, &self.model, change.model());
-        match goes_on && cut > 0.0 {
-            true => on_the_same_path(state, &mut next),
-            false => (next.tip_coordinate, next.bond) = (cut, Bond::default()),
+        next.tip_coordinate = cut;
+        if goes_on && cut > 0.0 {
+            on_the_same_path(state, &mut next);
         }
+        // The tip presses on another place of the tissue: what its springs hold there instead is work of the laying.
+        let held = |model: &Model, touch| model.tip_contact().map_or(0.0, |contact| contact.stored(touch));
+        let before = held(&self.model, state.touch);
+        (next.bond.gap, next.touch) = touch_at(change.model(), state, cut, &pose);
+        self.recorder.book_laying(held(change.model(), next.touch) - before);
         engine.write_state(&next)?;
         let due_steps = std::mem::take(&mut self.due_steps);
         self.engine = engine;
@@ -298,6 +332,20 @@ impl Simulation {
         self.due_steps = due_steps;
         Ok(())
     }
+}
+
+/// Mean distance of the tip beyond its anchors at the material coordinate `cut` [m], and the tip on the surface: as CpuEngine::advance_tip.
+fn touch_at(model: &Model, state: &State, cut: f64, pose: &ToolPose) -> (f64, Touch) {
+    let (Some(plan), Some(mesh)) = (&model.puncture, model.mesh.as_block()) else { return Default::default() };
+    let (path, t) = (plan.path, pose.direction);
+    let moved = |anchor: &TipAnchor| {
+        let x = anchor.surface + path.direction * cut;
+        (material_place(mesh, &state.displacement, x).position - x).dot(t)
+    };
+    let mean = plan.anchors.iter().map(moved).sum::<f64>() / plan.anchors.len() as f64;
+    let gap = (pose.tip - path.entry).dot(t) - cut * path.direction.dot(t) - mean;
+    let touch = plan.contact.as_ref().map(|contact| contact.touch(gap, contact.part(cut), state.opening_spreading));
+    (gap, touch.unwrap_or_default())
 }
 
 impl Track {
