@@ -7,17 +7,16 @@
 
 use std::sync::Arc;
 
+use super::carried::carried;
 use super::flexible_needle::FlexibleNeedle;
 use super::run_engine::takes_lanes;
 use super::start::{choose_step, sizes, too_many_steps};
 use super::{LONGEST_LED, Purpose, RunEngine, Simulation, stretch};
-use crate::cpu::CpuEngine;
 use crate::engine::clock::Clock;
 use crate::engine::stable_dt::wave_speed_bound;
-use crate::engine::{ContactState, Engine, FramePlan, FrameSums, State, StepInput};
+use crate::engine::{Engine, FramePlan, FrameSums, StepInput};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuEngine};
-use crate::material_point::PointState;
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::scene::{MOST_STEPS_PER_FRAME, Scene};
@@ -274,56 +273,4 @@ fn touching(scene: &Scene) -> ([bool; 4], Option<Vec<crate::effects::cohesive::P
     let e = &scene.effects;
     let kinds = [e.puncture.is_some(), e.indentation.is_some(), e.cohesive.is_some(), e.flexible_needle.is_some()];
     (kinds, e.cohesive.as_ref().map(|c| c.planes.clone()))
-}
-
-/// The state of a model in the terms of another one on the same mesh.
-pub(super) fn carried(state: &State, from: &Model, to: &Model) -> State {
-    let mut next = CpuEngine::new_state(to);
-    next.displacement = state.displacement.clone();
-    next.velocity = state.velocity.clone();
-    (next.tip_coordinate, next.tip, next.bond) = (state.tip_coordinate, state.tip, state.bond);
-    let fitting = |old: &Vec<f64>, new: &mut Vec<f64>| {
-        if old.len() == new.len() {
-            new.clone_from(old);
-        }
-    };
-    fitting(&state.stiffness, &mut next.stiffness);
-    fitting(&state.pairs, &mut next.pairs);
-    if from.laid.as_ref().map(|laid| &laid.line) == to.laid.as_ref().map(|laid| &laid.line) {
-        on_the_same_path(state, &mut next);
-    }
-    if state.cut_samples.len() == next.cut_samples.len() {
-        next.cut_samples.clone_from(&state.cut_samples);
-    }
-    // Contact is remembered by node; a node that is new in the ring begins anew. A node may have several surfaces.
-    let place = |model: &Model, n: usize| (model.contact_nodes[n].node, discriminant(model, n));
-    let known: std::collections::HashMap<_, ContactState> =
-        state.contact.iter().enumerate().map(|(n, memory)| (place(from, n), *memory)).collect();
-    for (n, memory) in next.contact.iter_mut().enumerate() {
-        if let Some(old) = known.get(&place(to, n)) {
-            *memory = *old;
-        }
-    }
-    let terms = to.prony_term_count();
-    for (new, old) in next.points.iter_mut().zip(&state.points) {
-        *new = PointState { ..old.clone() };
-        if to.effects.viscoelastic.is_none() || new.viscous.len() != terms {
-            new.viscous.clear();
-        }
-    }
-    next
-}
-
-/// What the scheme `opening` remembers of a path, as far as the other one begins alike.
-pub(super) fn on_the_same_path(state: &State, next: &mut State) {
-    for (new, old) in next.stations.iter_mut().zip(&state.stations) {
-        *new = *old;
-    }
-    (next.opening_resistance, next.opening_spreading) = (state.opening_resistance, state.opening_spreading);
-    next.touch = state.touch;
-}
-
-/// Which of its surfaces a contact node stands for.
-fn discriminant(model: &Model, n: usize) -> std::mem::Discriminant<crate::model::ContactSurface> {
-    std::mem::discriminant(&model.contact_nodes[n].surface)
 }

@@ -7,23 +7,15 @@
 //!
 //! Nothing acts on a needle that is on no line: the engine sees it far above the surface.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::Simulation;
-use super::change::{Change, carried, on_the_same_path};
-use super::start::choose_step;
-use crate::engine::stable_dt::wave_speed_bound;
 use crate::engine::{State, StepInput};
-use crate::error::Result;
 use crate::mesh::BlockMesh;
 use crate::mesh::material_place::{material_place, pulled_back, rest_position_at};
 use crate::model::{LaidPath, Model, TipAnchor};
 use crate::needle::ToolPose;
 use crate::needle::path_line::PathLine;
-use crate::needle::tip_contact::Touch;
 
 /// Height over the skin at which a tip comes to it, and at which it has left it [m].
 const COMES: f64 = 0.02e-3;
@@ -133,6 +125,25 @@ impl Laying {
         Some(Laying { is_on: true, has_cut: false, line: laid.line.clone(), tip, direction, tracks: Vec::new() })
     }
 
+    /// The needle has left its line, which is cut up to a material coordinate [m].
+    pub(super) fn leave(&mut self, cut: f64) {
+        self.is_on = false;
+        if cut > 0.0 {
+            self.tracks.push(Track { line: self.line.clone(), cut });
+        }
+    }
+
+    /// The needle comes to a line, or its line was looked at.
+    pub(super) fn come(&mut self, line: &PathLine, pose: &ToolPose) {
+        (self.is_on, self.tip, self.direction) = (true, pose.tip, pose.direction);
+        self.tracks.retain(|track| track.line != *line);
+    }
+
+    /// The model has this line now.
+    pub(super) fn take(&mut self, line: PathLine) {
+        self.line = line;
+    }
+
     /// The tip is at the material coordinate `cut` [m] at the end of a frame.
     pub(super) fn follow(&mut self, cut: f64) {
         self.has_cut = cut > 0.0;
@@ -163,7 +174,7 @@ impl Laying {
     }
 
     /// True where the tissue has to be looked at before the needle moves on to `next`.
-    fn must_look(&self, next: &ToolPose, radius: f64) -> bool {
+    pub(super) fn must_look(&self, next: &ToolPose, radius: f64) -> bool {
         let near = (next.tip - self.line.piece(0.0).origin).dot(next.direction) < DEEP;
         !self.is_on || near || self.has_moved(next, radius)
     }
@@ -178,7 +189,7 @@ impl Laying {
 }
 
 /// What a look at the tissue has found.
-enum Found {
+pub(super) enum Found {
     /// Nothing new.
     Nothing,
     /// The tip has left the tissue.
@@ -187,53 +198,22 @@ enum Found {
     Line(PathLine, f64),
 }
 
-impl Simulation {
-    /// Lays the path of the frame that starts next, where it has to be.
-    pub(super) fn lay_path(&mut self) -> Result<()> {
-        let (Some(laying), Some(kinematics)) = (&self.laying, &self.kinematics) else { return Ok(()) };
-        let time = |frame: u64| self.clock.time_of(self.clock.first_step(frame));
-        let (now, next) = (kinematics.pose(time(self.started)), kinematics.pose(time(self.started + 1)));
-        let radius = self.model.scene.needle().map_or(0.0, |needle| needle.radius);
-        if !laying.must_look(&next, radius) {
-            return Ok(());
-        }
-        let state = self.engine.read_state()?;
-        let found = self.look(&state, (&now, &next), radius);
-        let Some(laying) = &mut self.laying else { return Ok(()) };
-        match found {
-            Found::Nothing => Ok(()),
-            Found::Left => {
-                laying.is_on = false;
-                if state.tip_coordinate > 0.0 {
-                    laying.tracks.push(Track { line: laying.line.clone(), cut: state.tip_coordinate });
-                }
-                Ok(())
-            }
-            Found::Line(line, cut) => {
-                (laying.is_on, laying.tip, laying.direction) = (true, next.tip, next.direction);
-                laying.tracks.retain(|track| track.line != line);
-                self.take_line(line, Some((&state, cut, now)))
-            }
-        }
-    }
-
+impl Laying {
     /// What the tissue says of a needle that moves from one pose to another.
-    fn look(&self, state: &State, (now, next): (&ToolPose, &ToolPose), radius: f64) -> Found {
-        let (Some(laying), Some(laid), Some(mesh)) = (&self.laying, &self.model.laid, self.model.mesh.as_block())
-        else {
-            return Found::Nothing;
-        };
+    pub(super) fn look(&self, model: &Model, state: &State, (now, next): (&ToolPose, &ToolPose)) -> Found {
+        let (Some(laid), Some(mesh)) = (&model.laid, model.mesh.as_block()) else { return Found::Nothing };
+        let radius = model.scene.needle().map_or(0.0, |needle| needle.radius);
         let tissue = Tissue { mesh, laid, u: &state.displacement };
         let rest = tissue.rest(next.tip);
         // Beside the tissue, over the level of the entry.
-        let beside = if laying.is_on { rest.z - laying.line.piece(0.0).origin.z } else { f64::INFINITY };
+        let beside = if self.is_on { rest.z - self.line.piece(0.0).origin.z } else { f64::INFINITY };
         let height = tissue.height(rest).unwrap_or(beside);
-        if !laying.is_on {
+        if !self.is_on {
             if height > COMES {
                 return Found::Nothing;
             }
             let Some(line) = tissue.line(rest, next) else { return Found::Nothing };
-            return match laying.tracks.iter().find(|track| track.is_the_same(&line, radius)) {
+            return match self.tracks.iter().find(|track| track.is_the_same(&line, radius)) {
                 Some(track) => Found::Line(track.line.clone(), track.cut),
                 None => Found::Line(line, 0.0),
             };
@@ -243,109 +223,40 @@ impl Simulation {
             return Found::Left;
         }
         let cut = state.tip_coordinate;
-        if !laying.has_moved(next, radius) {
+        if !self.has_moved(next, radius) {
             return Found::Nothing;
         }
         if cut == 0.0 {
             // Without friction the tip slides over the skin; the entry is where it presses.
-            let near = laying.line.piece(0.0).origin;
+            let near = self.line.piece(0.0).origin;
             return tissue.line(near, next).map_or(Found::Nothing, |line| Found::Line(line, 0.0));
         }
         if next.depth <= now.depth {
             return Found::Nothing;
         }
         // What is open ends where the tip has cut, or where it is if it was drawn back.
-        let (_, at) = laying.line.coordinates(rest);
+        let (_, at) = self.line.coordinates(rest);
         let is_back = at + radius < cut;
         let cut = if is_back { at.max(0.0) } else { cut };
-        let end = cut + self.model.opening().map_or(0.0, |opening| opening.spacing);
-        let piece = laying.line.piece(end);
-        let wanted = self.direction_ahead(&tissue, laying.line.point(end), next.direction);
+        let end = cut + model.opening().map_or(0.0, |opening| opening.spacing);
+        let piece = self.line.piece(end);
+        let wanted = direction_ahead(model, &tissue, self.line.point(end), next.direction);
         // The tip's own dent turns the tissue before it, and not its way: the line follows over some of it.
         let part = if is_back { 1.0 } else { ((end - piece.start) / (FOLLOWS * radius)).clamp(0.0, 1.0) };
         let ahead = piece.direction.lerp(wanted, part).normalize();
         match piece.direction.angle_between(ahead) > if is_back { BRANCHES } else { TURNED } && ahead.z < 0.0 {
-            true => Found::Line(laying.line.turned(end, ahead), cut),
+            true => Found::Line(self.line.turned(end, ahead), cut),
             false => Found::Nothing,
         }
     }
-
-    /// Direction in the material of a needle that goes on along `direction` from the rest position `at`: the mean over the lines of the tip.
-    fn direction_ahead(&self, tissue: &Tissue, at: DVec3, direction: DVec3) -> DVec3 {
-        let Some(plan) = &self.model.puncture else { return direction };
-        let middle = plan.anchors[0].surface;
-        let of_anchor = |anchor: &TipAnchor| tissue.pulled_back(at + (anchor.surface - middle), direction);
-        plan.anchors.iter().map(of_anchor).sum::<DVec3>().normalize()
-    }
-
-    /// Goes on as far as the laying had come in a checkpoint.
-    pub(super) fn take_laying(&mut self, laying: Option<Laying>) -> Result<()> {
-        let line = |laying: &Option<Laying>| laying.as_ref().map(|l| l.line.clone());
-        let (old, new) = (line(&self.laying), line(&laying));
-        self.laying = laying;
-        match new {
-            Some(new) if old.as_ref() != Some(&new) => self.take_line(new, None),
-            _ => Ok(()),
-        }
-    }
-
-    /// Goes on along another line. `from`: the state to go on from, how far the line is cut [m], and the needle there; without one the
-    /// engine has none yet.
-    pub(super) fn take_line(&mut self, line: PathLine, from: Option<(&State, f64, ToolPose)>) -> Result<()> {
-        let model = Arc::new(self.model.relaid(line.clone()));
-        let stable_dt = wave_speed_bound(&model);
-        let (mut dt, mut steps_per_frame) = choose_step(&model, stable_dt);
-        if self.dt() <= dt || model.scene.solver.time_step.is_some() {
-            (dt, steps_per_frame) = (self.dt(), self.steps_per_frame());
-        }
-        let most_steps = self.purpose.most_steps(steps_per_frame);
-        let device = self.device.clone();
-        let mut engine = self.engine.on_another_line(&model, device.as_ref(), dt, most_steps, self.purpose)?;
-        self.engines += 1;
-        let Some((state, cut, pose)) = from else {
-            (self.engine, self.model) = (engine, model);
-            if let Some(laying) = &mut self.laying {
-                laying.line = line;
-            }
-            return Ok(());
-        };
-        let change = Change::to_line(model, (stable_dt, dt, steps_per_frame), self.device.clone(), self.purpose);
-        let goes_on = self.laying.as_ref().is_some_and(|laying| laying.line.piece(0.0) == line.piece(0.0));
-        let mut next = carried(state, &self.model, change.model());
-        next.tip_coordinate = cut;
-        if goes_on && cut > 0.0 {
-            on_the_same_path(state, &mut next);
-        }
-        // The tip presses on another place of the tissue: what its springs hold there instead is work of the laying.
-        let held = |model: &Model, touch| model.tip_contact().map_or(0.0, |contact| contact.stored(touch));
-        let before = held(&self.model, state.touch);
-        (next.bond.gap, next.touch) = touch_at(change.model(), state, cut, &pose);
-        self.recorder.book_laying(held(change.model(), next.touch) - before);
-        engine.write_state(&next)?;
-        let due_steps = std::mem::take(&mut self.due_steps);
-        self.engine = engine;
-        if let Some(laying) = &mut self.laying {
-            laying.line = line;
-        }
-        // No energy changes with what is ahead of the tip.
-        self.adopted(&change, None)?;
-        self.due_steps = due_steps;
-        Ok(())
-    }
 }
 
-/// Mean distance of the tip beyond its anchors at the material coordinate `cut` [m], and the tip on the surface: as CpuEngine::advance_tip.
-fn touch_at(model: &Model, state: &State, cut: f64, pose: &ToolPose) -> (f64, Touch) {
-    let (Some(plan), Some(mesh)) = (&model.puncture, model.mesh.as_block()) else { return Default::default() };
-    let (path, t) = (plan.path, pose.direction);
-    let moved = |anchor: &TipAnchor| {
-        let x = anchor.surface + path.direction * cut;
-        (material_place(mesh, &state.displacement, x).position - x).dot(t)
-    };
-    let mean = plan.anchors.iter().map(moved).sum::<f64>() / plan.anchors.len() as f64;
-    let gap = (pose.tip - path.entry).dot(t) - cut * path.direction.dot(t) - mean;
-    let touch = plan.contact.as_ref().map(|contact| contact.touch(gap, contact.part(cut), state.opening_spreading));
-    (gap, touch.unwrap_or_default())
+/// Direction in the material of a needle that goes on along `direction` from the rest position `at`: the mean over the lines of the tip.
+fn direction_ahead(model: &Model, tissue: &Tissue, at: DVec3, direction: DVec3) -> DVec3 {
+    let Some(plan) = &model.puncture else { return direction };
+    let middle = plan.anchors[0].surface;
+    let of_anchor = |anchor: &TipAnchor| tissue.pulled_back(at + (anchor.surface - middle), direction);
+    plan.anchors.iter().map(of_anchor).sum::<DVec3>().normalize()
 }
 
 impl Track {

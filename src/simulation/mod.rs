@@ -8,6 +8,8 @@
 
 pub mod advice;
 #[allow(missing_docs)]
+mod carried;
+#[allow(missing_docs)]
 pub mod change;
 #[allow(missing_docs)]
 pub mod checkpoint;
@@ -20,6 +22,8 @@ pub mod investigation;
 mod laying;
 #[allow(missing_docs)]
 pub mod reach;
+#[allow(missing_docs)]
+mod relaying;
 #[allow(missing_docs)]
 mod run_engine;
 #[allow(missing_docs)]

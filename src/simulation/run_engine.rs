@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 use super::Purpose;
-use super::change::carried;
+use super::carried::carried;
 use crate::cpu::{CpuEngine, unknown_to_lanes};
 use crate::engine::Engine;
 use crate::error::Result;

@@ -1,0 +1,110 @@
+//! A run goes on along the line that [`super::laying`] finds: another model and another engine between two frames.
+
+use std::sync::Arc;
+
+use super::Simulation;
+use super::carried::{carried, on_the_same_path};
+use super::change::Change;
+use super::laying::{Found, Laying};
+use super::start::choose_step;
+use crate::engine::State;
+use crate::engine::stable_dt::wave_speed_bound;
+use crate::error::Result;
+use crate::mesh::material_place::material_place;
+use crate::model::{Model, TipAnchor};
+use crate::needle::ToolPose;
+use crate::needle::path_line::PathLine;
+use crate::needle::tip_contact::Touch;
+
+impl Simulation {
+    /// Lays the path of the frame that starts next, where it has to be.
+    pub(super) fn lay_path(&mut self) -> Result<()> {
+        let (Some(laying), Some(kinematics)) = (&self.laying, &self.kinematics) else { return Ok(()) };
+        let time = |frame: u64| self.clock.time_of(self.clock.first_step(frame));
+        let (now, next) = (kinematics.pose(time(self.started)), kinematics.pose(time(self.started + 1)));
+        let radius = self.model.scene.needle().map_or(0.0, |needle| needle.radius);
+        if !laying.must_look(&next, radius) {
+            return Ok(());
+        }
+        let state = self.engine.read_state()?;
+        let found = laying.look(&self.model, &state, (&now, &next));
+        let Some(laying) = &mut self.laying else { return Ok(()) };
+        match found {
+            Found::Nothing => Ok(()),
+            Found::Left => {
+                laying.leave(state.tip_coordinate);
+                Ok(())
+            }
+            Found::Line(line, cut) => {
+                laying.come(&line, &next);
+                self.take_line(line, Some((&state, cut, now)))
+            }
+        }
+    }
+
+    /// Goes on as far as the laying had come in a checkpoint.
+    pub(super) fn take_laying(&mut self, laying: Option<Laying>) -> Result<()> {
+        let line = |laying: &Option<Laying>| laying.as_ref().map(|l| l.line().clone());
+        let (old, new) = (line(&self.laying), line(&laying));
+        self.laying = laying;
+        match new {
+            Some(new) if old.as_ref() != Some(&new) => self.take_line(new, None),
+            _ => Ok(()),
+        }
+    }
+
+    /// Goes on along another line. `from`: the state to go on from, how far the line is cut [m], and the needle there; without one the
+    /// engine has none yet.
+    pub(super) fn take_line(&mut self, line: PathLine, from: Option<(&State, f64, ToolPose)>) -> Result<()> {
+        let model = Arc::new(self.model.relaid(line.clone()));
+        let stable_dt = wave_speed_bound(&model);
+        let (mut dt, mut steps_per_frame) = choose_step(&model, stable_dt);
+        if self.dt() <= dt || model.scene.solver.time_step.is_some() {
+            (dt, steps_per_frame) = (self.dt(), self.steps_per_frame());
+        }
+        let most_steps = self.purpose.most_steps(steps_per_frame);
+        let device = self.device.clone();
+        let mut engine = self.engine.on_another_line(&model, device.as_ref(), dt, most_steps, self.purpose)?;
+        self.engines += 1;
+        let Some((state, cut, pose)) = from else {
+            (self.engine, self.model) = (engine, model);
+            return Ok(());
+        };
+        let change = Change::to_line(model, (stable_dt, dt, steps_per_frame), self.device.clone(), self.purpose);
+        let goes_on = self.laying.as_ref().is_some_and(|laying| laying.line().piece(0.0) == line.piece(0.0));
+        let mut next = carried(state, &self.model, change.model());
+        next.tip_coordinate = cut;
+        if goes_on && cut > 0.0 {
+            on_the_same_path(state, &mut next);
+        }
+        // The tip presses on another place of the tissue: what its springs hold there instead is work of the laying.
+        let held = |model: &Model, touch| model.tip_contact().map_or(0.0, |contact| contact.stored(touch));
+        let before = held(&self.model, state.touch);
+        (next.bond.gap, next.touch) = touch_at(change.model(), state, cut, &pose);
+        self.recorder.book_laying(held(change.model(), next.touch) - before);
+        engine.write_state(&next)?;
+        let due_steps = std::mem::take(&mut self.due_steps);
+        self.engine = engine;
+        if let Some(laying) = &mut self.laying {
+            laying.take(line);
+        }
+        // No energy changes with what is ahead of the tip.
+        self.adopted(&change, None)?;
+        self.due_steps = due_steps;
+        Ok(())
+    }
+}
+
+/// Mean distance of the tip beyond its anchors at the material coordinate `cut` [m], and the tip on the surface: as CpuEngine::advance_tip.
+fn touch_at(model: &Model, state: &State, cut: f64, pose: &ToolPose) -> (f64, Touch) {
+    let (Some(plan), Some(mesh)) = (&model.puncture, model.mesh.as_block()) else { return Default::default() };
+    let (path, t) = (plan.path, pose.direction);
+    let moved = |anchor: &TipAnchor| {
+        let x = anchor.surface + path.direction * cut;
+        (material_place(mesh, &state.displacement, x).position - x).dot(t)
+    };
+    let mean = plan.anchors.iter().map(moved).sum::<f64>() / plan.anchors.len() as f64;
+    let gap = (pose.tip - path.entry).dot(t) - cut * path.direction.dot(t) - mean;
+    let touch = plan.contact.as_ref().map(|contact| contact.touch(gap, contact.part(cut), state.opening_spreading));
+    (gap, touch.unwrap_or_default())
+}
