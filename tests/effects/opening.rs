@@ -91,7 +91,9 @@ fn ripple(frames: &[FrameRecord], from: f64, to: f64) -> f64 {
 
 #[test]
 fn a_tip_without_friction_meets_the_force_of_the_theory_wherever_the_axis_lies() {
-    let expected = predicted(&scene(&[])).tip_force;
+    // The theory of tissue that changes its volume, as this one does (nu 0.473): 4.3 % less than that of tissue that keeps it.
+    let law = scene(&[]).material.law;
+    let expected = predicted(&scene(&[])).with_change_of_volume(&law).unwrap().0;
     let mut forces = Vec::new();
     // Cell edge, place of the axis in a cell.
     for (cell, axis) in [("1.0", "[0.0,0.0]"), ("1.0", "[0.5,0.5]"), ("0.8", "[0.25,0.25]")] {
