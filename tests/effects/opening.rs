@@ -111,6 +111,19 @@ fn a_tip_without_friction_meets_the_force_of_the_theory_wherever_the_axis_lies()
     at_most("spread over meshes", most / least - 1.0, 0.03);
 }
 
+/// Tissue that keeps its volume, as the theory of the wedged crack has it.
+#[test]
+fn tissue_that_keeps_its_volume_meets_the_theory_that_keeps_it_wherever_the_axis_lies() {
+    for (cell, axis) in [("1.0", "[0.0,0.0]"), ("1.0", "[0.5,0.5]"), ("0.8", "[0.25,0.25]")] {
+        let overrides = [format!("tissue.cell_size_mm={cell}"), format!("tissue.axis_offset_cells={axis}")];
+        let [cell, axis] = overrides.each_ref().map(String::as_str);
+        let scene = scene(&[cell, axis, "material.poisson_ratio=0.498"]);
+        let expected = predicted(&scene).tip_force;
+        let frames = frames(scene, EngineChoice::Cpu);
+        close("steady force", mean(&frames, 7e-3, 8.9e-3, |f| f.force.axial), expected, 0.03);
+    }
+}
+
 /// There a volume once grew without bound, and the run was stopped.
 #[test]
 fn an_axis_through_the_places_where_volumes_are_taken_is_as_any_other() {
