@@ -8,6 +8,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod cells;
+mod gathered;
 mod points;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use glam::DVec3;
 use pulp::{Arch, Simd};
 
 use self::cells::SomeCells;
+use self::gathered::Gathered;
 use self::points::SomePoints;
 use super::corners::SIGNS;
 use super::number::Lanes;
@@ -583,75 +585,6 @@ struct Step<'a> {
     spans: &'a [Station],
     u: &'a [DVec3],
     measures: bool,
-}
-
-/// The path beside the lanes of a vector, entry by entry.
-struct Gathered {
-    offset: [[f32; WIDEST]; 3],
-    rate: [[f32; WIDEST]; 3],
-    radius: [f32; WIDEST],
-    radius_rate: [f32; WIDEST],
-    rest_direction: [[f32; WIDEST]; 3],
-    /// 1 where the path is open.
-    open: [f32; WIDEST],
-    is_any_open: bool,
-}
-
-impl Gathered {
-    fn new() -> Self {
-        let none = [0.0; WIDEST];
-        Gathered {
-            offset: [none; 3],
-            rate: [none; 3],
-            radius: none,
-            radius_rate: none,
-            rest_direction: [none; 3],
-            open: none,
-            is_any_open: false,
-        }
-    }
-
-    /// Takes in a station, seen from the place `at` [m].
-    #[inline(always)]
-    fn set(&mut self, lane: usize, station: &Station, at: DVec3, over_shaft: f64) {
-        if station.radius == 0.0 {
-            self.close(lane);
-            return;
-        }
-        let offset = (at - station.centre) * over_shaft;
-        for axis in 0..3 {
-            self.offset[axis][lane] = offset[axis] as f32;
-            self.rate[axis][lane] = station.centre_rate[axis] as f32;
-            self.rest_direction[axis][lane] = station.rest_direction[axis] as f32;
-        }
-        self.radius[lane] = (station.radius * over_shaft) as f32;
-        self.radius_rate[lane] = station.radius_rate as f32;
-        self.open[lane] = 1.0;
-        self.is_any_open = true;
-    }
-
-    /// No open path beside a lane.
-    #[inline(always)]
-    fn close(&mut self, lane: usize) {
-        for axis in 0..3 {
-            (self.offset[axis][lane], self.rate[axis][lane]) = (0.0, 0.0);
-        }
-        (self.radius[lane], self.radius_rate[lane], self.open[lane]) = (0.0, 0.0, 0.0);
-    }
-
-    #[inline(always)]
-    fn beside<S: Simd>(&self, simd: S, at: usize) -> Beside<Lanes<S>> {
-        let vector = |rows: &[[f32; WIDEST]; 3]| {
-            [Lanes::load(simd, &rows[0], at), Lanes::load(simd, &rows[1], at), Lanes::load(simd, &rows[2], at)]
-        };
-        Beside {
-            offset: vector(&self.offset),
-            centre_rate: vector(&self.rate),
-            radius: Lanes::load(simd, &self.radius, at),
-            radius_rate: Lanes::load(simd, &self.radius_rate, at),
-            rest_direction: vector(&self.rest_direction),
-        }
-    }
 }
 
 /// Constants of the laws of a vector, from their first row on.
