@@ -17,7 +17,10 @@ fn scene(overrides: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/training/hit_target.toml");
     let coarse = [
         "damage.failure_displacement_mm=0.6",
-        // Some of the effects that are switched need a planned path.
+        // Its own path is opened, and free: not all effects that are switched go with either.
+        "puncture.scheme=\"ring\"",
+        "puncture.puncture_force_n=0.6",
+        "puncture.cutting_force_n=0.3",
         "puncture.path=\"auto\"",
         "tissue.cell_size_mm=1.0",
         "tissue.size_mm=[14, 14, 12]",

@@ -11,8 +11,7 @@ struct OpeningParams {
     direction: vec4<f32>,
     // Where the path enters [m]; w: length of the tip [m].
     entry: vec4<f32>,
-    // Distance of stations [m], stiffness that holds the path on the needle per station [N/m], s0 in R^2, most that the tip advances in a
-    // step [m].
+    // Distance of stations [m], stiffness that holds the path on the needle per station [N/m], s0 in R^2; w unused.
     numbers: vec4<f32>,
     // Coefficient of friction, stiffness of the stick spring per station [N/m], length over which the coefficient grows [m]; w unused.
     friction: vec4<f32>,
@@ -24,6 +23,8 @@ struct OpeningParams {
     surface: vec4<f32>,
     // Table of the dimple: root of the force [N^(1/2)], depth u [m], its slope up to the next row, energy V [J].
     dimple: array<vec4<f32>, 26>,
+    // Most that a crack runs in a step [m], in every stretch of the path.
+    advances: array<vec4<f32>, 4>,
 }
 
 // A section of the path. The first three are known before the run. Of a run of cells only the mean of the sections in them: first and end

@@ -159,23 +159,25 @@ fn material_threshold(forces: vec4<f32>, way: f32) -> f32 {
     return forces.z + (forces.y - forces.z) * entry;
 }
 
+// Number of the stretch of the path at coordinate a.
+fn segment_at(a: f32) -> u32 {
+    var segment = 0u;
+    for (var i = 1u; i < 16u; i++) {
+        segment = select(segment, i, puncture.segments[i].x <= a);
+    }
+    return segment;
+}
+
 // Threshold of the tip force at material coordinate a of a needle that moves at `speed` [N].
 fn tip_threshold(a: f32, speed: f32) -> f32 {
-    var segment = puncture.segments[0];
-    for (var i = 1u; i < 16u; i++) {
-        segment = select(segment, puncture.segments[i], puncture.segments[i].x <= a);
-    }
+    let segment = puncture.segments[segment_at(a)];
     let left = clamp((puncture.exit - a) / puncture.transition_length, 0.0, 1.0);
     return material_threshold(segment, a - segment.x) * left * rate_factor(speed);
 }
 
 // 1 where the material at coordinate a is a membrane, else 0.
 fn membrane_share(a: f32) -> f32 {
-    var segment = 0u;
-    for (var i = 1u; i < 16u; i++) {
-        segment = select(segment, i, puncture.segments[i].x <= a);
-    }
-    return f32(extractBits(puncture.membranes, segment, 1u));
+    return f32(extractBits(puncture.membranes, segment_at(a), 1u));
 }
 
 // Weight of a node of the ring around the opened path.

@@ -157,8 +157,8 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         if (excess > 0.0) {
             let lambda = clamp(stretch / f32(ANCHOR_COUNT), LEAST_STRETCH, MOST_STRETCH);
 #ifdef OPENING
-            // No node can be left inside of the needle: a crack may run as fast as it will.
-            let cap = max(opening.numbers.w, LEAST_TRAVELS * speed * params.dt);
+            let stretch_of_path = segment_at(before);
+            let cap = max(opening.advances[stretch_of_path / 4u][stretch_of_path % 4u], LEAST_TRAVELS * speed * params.dt);
             let long = surface_gap(touch.force, part, spreading) - surface_gap(threshold, part, spreading);
             let closing = dimple_closing(before) * touch.dimple;
             advance = min(max(long, 0.0) / max(lambda - closing, LEAST_STRETCH), cap);

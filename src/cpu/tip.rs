@@ -150,7 +150,7 @@ impl CpuEngine {
             let lambda = bounded_stretch(anchors.iter().map(|p| p.stretch).sum::<f64>() / count);
             let (advance, cap) = match (&plan.opening, &plan.contact) {
                 (Some(opening), Some(contact)) => {
-                    let cap = opening.advance_limit(speed * self.dt, self.dt);
+                    let cap = opening.advance_limit(plan.segment(a).shear_wave_speed, speed * self.dt, self.dt);
                     let excess = contact.excess(now.force, threshold, contact.part(a), spreading);
                     let shortened = (lambda - contact.closing(a) * now.touch.dimple).max(puncture::LEAST_STRETCH);
                     ((excess / shortened).max(0.0).min(cap), cap)

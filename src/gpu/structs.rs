@@ -236,6 +236,7 @@ shared_structs! {
         sums: [u32; 4],
         surface: [f32; 4],
         dimple: [[f32; 4]; 26],
+        advances: [[f32; 4]; 4],
     }
     /// shaders/effects/opening.wgsl
     struct OpeningStation {

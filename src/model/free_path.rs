@@ -171,6 +171,7 @@ impl Model {
                 transition_length: params.transition_length,
                 membrane: false,
                 hole: 0.0,
+                shear_wave_speed: 0.0,
             }],
             exit: f64::INFINITY,
             anchors: Vec::new(),

@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::opening::{OpeningInput, OpeningPlan};
 use super::{ContactNode, ContactSurface, FreePlan, LaidPath, Model, tet_puncture};
 use crate::anatomy::Case;
-use crate::effects::puncture;
 use crate::effects::puncture::{Cutting, SchemeWord, left_before_exit};
+use crate::effects::{TissueMaterial, puncture};
 use crate::mesh::{BlockMesh, Bore};
 use crate::mesh::{Mesh, TetLine};
 use crate::needle::gap::Profile;
@@ -17,7 +17,6 @@ use crate::needle::slit::REFERENCE_EDGE;
 use crate::needle::tip_contact::{DISC, TipContact};
 use crate::needle::{NeedleShape, PlannedPath, Tool, lateral_axes, ring_around, tip_lines};
 use crate::penetration::surface::Surface;
-use crate::scene::Scene;
 
 /// Most stretches of one path.
 pub const LARGEST_SEGMENT_COUNT: usize = 16;
@@ -76,6 +75,8 @@ pub struct PathSegment {
     pub membrane: bool,
     /// Rest radius of the hole that the slit of the tip acts like, in the scheme `opening` [m].
     pub hole: f64,
+    /// Speed of shear waves there, with the scaled mass [m/s].
+    pub shear_wave_speed: f64,
 }
 
 /// A way through the tissue.
@@ -230,8 +231,7 @@ impl Model {
             .collect();
         self.weigh_cut_carriers();
         self.join_slit_faces();
-        let segments =
-            path_segments(&self.scene, &params, &needle, exit, |depth| self.scene.region_at(line.point(depth)));
+        let segments = self.path_segments(&params, &needle, exit, |depth| self.scene.region_at(line.point(depth)));
         self.puncture =
             Some(self.puncture_plan(params, needle, path, Way { segments, anchors, lines: Vec::new(), exit, cells }));
         if opening {
@@ -301,7 +301,6 @@ impl Model {
                 cell_size: self.scene.tissue.cell_size,
                 shear_modulus: self.scene.material.law.shear_modulus(),
                 p_wave_modulus: self.scene.material.law.p_wave_modulus(),
-                density: self.scaled_density(),
                 hole: &|depth| plan.segment(depth.max(0.0)).hole,
             },
         );
@@ -369,55 +368,82 @@ impl Model {
     }
 }
 
-/// Stretches of the path with their own tip forces, from the materials that its axis passes through on its way to where
-/// it leaves the tissue at `exit` [m]. `region_at`: the region at a depth along the axis [m].
-pub(super) fn path_segments(
-    scene: &Scene,
-    params: &puncture::Params,
-    needle: &NeedleShape,
-    exit: f64,
-    region_at: impl Fn(f64) -> Option<usize>,
-) -> Vec<PathSegment> {
-    let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
-    let mut starts: Vec<(f64, Option<usize>)> = Vec::new();
-    for i in 0..(exit / SEGMENT_STEP).ceil().max(1.0) as usize {
-        // The surface itself belongs to what lies under it.
-        let a = i as f64 * SEGMENT_STEP;
-        let region = region_at(a + 0.5 * SEGMENT_STEP);
-        if starts.last().is_none_or(|(_, last)| *last != region) {
-            starts.push((a, region));
+impl Model {
+    /// Stretches of the path with their own tip forces, from the materials that its axis passes through on its way to where
+    /// it leaves the tissue at `exit` [m]. `region_at`: the region at a depth along the axis [m].
+    pub(super) fn path_segments(
+        &self,
+        params: &puncture::Params,
+        needle: &NeedleShape,
+        exit: f64,
+        region_at: impl Fn(f64) -> Option<usize>,
+    ) -> Vec<PathSegment> {
+        let mut starts: Vec<(f64, Option<usize>)> = Vec::new();
+        for i in 0..(exit / SEGMENT_STEP).ceil().max(1.0) as usize {
+            // The surface itself belongs to what lies under it.
+            let a = i as f64 * SEGMENT_STEP;
+            let region = region_at(a + 0.5 * SEGMENT_STEP);
+            if starts.last().is_none_or(|(_, last)| *last != region) {
+                starts.push((a, region));
+            }
         }
+        let ends = starts.iter().skip(1).map(|s| s.0).chain([exit]);
+        let material = |region: Option<usize>| region.map_or(&self.scene.material, |r| &self.scene.regions[r].material);
+        let mut segments = Vec::new();
+        for (&(start, region), end) in starts.iter().zip(ends) {
+            segments.extend(self.segments_of(material(region), (params, needle), (start, end)));
+        }
+        segments.truncate(LARGEST_SEGMENT_COUNT);
+        segments
     }
-    let opening = params.scheme == SchemeWord::Opening;
-    let ends = starts.iter().skip(1).map(|s| s.0).chain([exit]);
-    starts
-        .iter()
-        .zip(ends)
-        .take(LARGEST_SEGMENT_COUNT)
-        .map(|(&(start, region), end)| {
-            let material = region.map_or(&scene.material, |r| &scene.regions[r].material);
-            let mut cutting = material.cutting.unwrap_or(own);
-            let mut transition_length = params.transition_length;
-            let mut hole = UNKNOWN_HOLE * needle.radius;
-            if let Some(Ok(steady)) = opening.then(|| material.steady(needle)).flatten() {
-                cutting = params.opening_cutting(material.cutting, &steady);
-                // An inner layer meets a crack that is there already and runs on: it is cut, not punctured.
-                if start > 0.0 && material.cutting.is_none() && !params.puncture_stated {
-                    cutting.puncture_force = cutting.cutting_force;
-                }
-                hole = steady.hole_radius;
-                if material.membrane_energy.is_none() {
-                    // The crack forms over its own length, which is not finer than the tip advances.
-                    transition_length = steady.crack_half_length.max(puncture::LARGEST_ADVANCE);
-                }
+
+    /// The stretch of the path from `start` to `end` [m] in one material: two where a membrane lies on a surface that takes more by itself.
+    fn segments_of(
+        &self,
+        material: &TissueMaterial,
+        (params, needle): (&puncture::Params, &NeedleShape),
+        (start, end): (f64, f64),
+    ) -> Vec<PathSegment> {
+        let own = Cutting { puncture_force: params.puncture_force, cutting_force: params.cutting_force };
+        let mut segment = PathSegment {
+            start,
+            cutting: material.cutting.unwrap_or(own),
+            transition_length: params.transition_length,
+            membrane: material.membrane_energy.is_some(),
+            hole: UNKNOWN_HOLE * needle.radius,
+            shear_wave_speed: (material.law.shear_modulus() / (material.density * self.mass_scaling())).sqrt(),
+        };
+        let opening = params.scheme == SchemeWord::Opening;
+        let steady = opening.then(|| material.steady(needle)).flatten().and_then(Result::ok);
+        if let Some(steady) = &steady {
+            segment.cutting = params.opening_cutting(material.cutting, steady);
+            // An inner layer meets a crack that is there already and runs on: it is cut, not punctured.
+            if start > 0.0 && material.cutting.is_none() && !params.puncture_stated {
+                segment.cutting.puncture_force = segment.cutting.cutting_force;
             }
-            if let Some(energy) = material.membrane_energy {
-                transition_length = transition_length.min(end - start);
-                cutting = cutting.of_membrane(energy, transition_length);
-            }
-            PathSegment { start, cutting, transition_length, membrane: material.membrane_energy.is_some(), hole }
-        })
-        .collect()
+            segment.hole = steady.hole_radius;
+            // The crack forms over its own length, which is not finer than the tip advances.
+            segment.transition_length = steady.crack_half_length.max(puncture::LARGEST_ADVANCE);
+        }
+        let Some(energy) = material.membrane_energy else { return vec![segment] };
+        let length = params.transition_length.min(end - start);
+        let bare = PathSegment { transition_length: length, ..segment };
+        let with_membrane = PathSegment { cutting: segment.cutting.of_membrane(energy, length), ..bare };
+        let Cutting { puncture_force, cutting_force } = segment.cutting;
+        if steady.is_none() || start > 0.0 || segment.transition_length >= length || puncture_force <= cutting_force {
+            return vec![with_membrane];
+        }
+        // The surface falls over the length of its crack from what it takes without the membrane, which adds what is left of its own fall.
+        let beyond = |way: f64| with_membrane.cutting.threshold(way, length) - cutting_force;
+        let after = cutting_force + beyond(segment.transition_length);
+        let first = Cutting { puncture_force: puncture_force + beyond(0.0), cutting_force: after };
+        let rest = Cutting { puncture_force: after, cutting_force };
+        let split = segment.transition_length;
+        vec![
+            PathSegment { cutting: first, ..segment },
+            PathSegment { start: start + split, cutting: rest, transition_length: length - split, ..segment },
+        ]
+    }
 }
 
 /// Lines on which the tip springs are anchored: one on the axis, 6 at R/2, 12 at R. Before a slit none lies on its plane,

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
-use super::puncture::{Way, path_segments};
+use super::puncture::Way;
 use super::{ContactNode, Model, PathCell, PuncturePlan, TipAnchor};
 use crate::effects::puncture;
 use crate::mesh::{Mesh, TetLine, TetMesh, TetPath};
@@ -50,7 +50,7 @@ impl Model {
             let tag = &mesh.regions[mesh.tags[way.axis.piece(depth).cell as usize] as usize];
             self.scene.region_in(path.entry + path.direction * depth, Some(tag))
         };
-        let segments = path_segments(&self.scene, &params, &needle, exit, region_at);
+        let segments = self.path_segments(&params, &needle, exit, region_at);
         let anchor = |(offset, axial_offset): (&DVec3, &f64)| TipAnchor {
             surface: path.entry + *offset + path.direction * *axial_offset,
             axial_offset: *axial_offset,

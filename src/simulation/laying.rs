@@ -125,6 +125,11 @@ impl Laying {
         Some(Laying { is_on: true, has_cut: false, line: laid.line.clone(), tip, direction, tracks: Vec::new() })
     }
 
+    /// The needle is on a line.
+    pub(super) fn is_on(&self) -> bool {
+        self.is_on
+    }
+
     /// The needle has left its line, which is cut up to a material coordinate [m].
     pub(super) fn leave(&mut self, cut: f64) {
         self.is_on = false;

@@ -16,6 +16,17 @@ use crate::needle::ToolPose;
 use crate::needle::path_line::PathLine;
 use crate::needle::tip_contact::Touch;
 
+/// What a run goes on from on another line.
+struct GoesOn<'a> {
+    state: &'a State,
+    /// How far that line is cut [m].
+    cut: f64,
+    /// The needle between the frames.
+    pose: ToolPose,
+    /// It was on a line.
+    from_line: bool,
+}
+
 impl Simulation {
     /// Lays the path of the frame that starts next, where it has to be.
     pub(super) fn lay_path(&mut self) -> Result<()> {
@@ -36,8 +47,9 @@ impl Simulation {
                 Ok(())
             }
             Found::Line(line, cut) => {
+                let from_line = laying.is_on();
                 laying.come(&line, &next);
-                self.take_line(line, Some((&state, cut, now)))
+                self.take_line(line, Some(GoesOn { state: &state, cut, pose: now, from_line }))
             }
         }
     }
@@ -53,9 +65,8 @@ impl Simulation {
         }
     }
 
-    /// Goes on along another line. `from`: the state to go on from, how far the line is cut [m], and the needle there; without one the
-    /// engine has none yet.
-    pub(super) fn take_line(&mut self, line: PathLine, from: Option<(&State, f64, ToolPose)>) -> Result<()> {
+    /// Goes on along another line; without a state the engine has none yet.
+    fn take_line(&mut self, line: PathLine, from: Option<GoesOn>) -> Result<()> {
         let model = Arc::new(self.model.relaid(line.clone()));
         let stable_dt = wave_speed_bound(&model);
         let (mut dt, mut steps_per_frame) = choose_step(&model, stable_dt);
@@ -66,7 +77,7 @@ impl Simulation {
         let device = self.device.clone();
         let mut engine = self.engine.on_another_line(&model, device.as_ref(), dt, most_steps, self.purpose)?;
         self.engines += 1;
-        let Some((state, cut, pose)) = from else {
+        let Some(GoesOn { state, cut, pose, from_line }) = from else {
             (self.engine, self.model) = (engine, model);
             return Ok(());
         };
@@ -79,7 +90,13 @@ impl Simulation {
         }
         // The tip presses on another place of the tissue: what its springs hold there instead is work of the laying.
         let held = |model: &Model, touch| model.tip_contact().map_or(0.0, |contact| contact.stored(touch));
-        let before = held(&self.model, state.touch);
+        // The touch of the state is a step older than its displacements; over that step the old line works as ever. A needle that was on no
+        // line held nothing.
+        let old_touch = match from_line {
+            true => touch_at(&self.model, state, state.tip_coordinate, &pose).1,
+            false => state.touch,
+        };
+        let before = held(&self.model, old_touch);
         (next.bond.gap, next.touch) = touch_at(change.model(), state, cut, &pose);
         self.recorder.book_laying(held(change.model(), next.touch) - before);
         engine.write_state(&next)?;

@@ -163,7 +163,7 @@ impl Watched {
 struct Yielding {
     layer: String,
     time: f64,
-    /// Largest force since [N].
+    /// Largest force since, and over [`DROP_TIME`] before [N].
     force: f64,
 }
 
@@ -180,6 +180,8 @@ pub struct Watcher {
 struct Attempt {
     track: Track,
     yielding: Option<Yielding>,
+    /// Times [s] and forces [N] of the last [`DROP_TIME`].
+    recent: Vec<(f64, f64)>,
     last: Option<Sample>,
     /// Layer at the end of the cut; none outside.
     layer: Option<String>,
@@ -268,11 +270,15 @@ impl Watcher {
     ) {
         let axis = axis_of(sample.tip, sample.direction);
         let force = record.force.axial;
+        // A crack that runs has taken the force down before it is through.
+        self.attempt.recent.retain(|(time, _)| record.time - time <= DROP_TIME);
+        self.attempt.recent.push((record.time, force));
+        let force_before = self.attempt.recent.iter().fold(force, |most, (_, force)| most.max(*force));
         let yielding = &mut self.attempt.yielding;
         self.attempt.track.advance(scene, (axis.0, axis.1), record, |layer, top| {
             // The surface itself is told as such.
             if top > 0.0 {
-                *yielding = Some(Yielding { layer: layer.into(), time: record.time, force });
+                *yielding = Some(Yielding { layer: layer.into(), time: record.time, force: force_before });
             }
         });
         if let Some(one) = &mut self.attempt.yielding {

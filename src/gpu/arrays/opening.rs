@@ -147,15 +147,14 @@ fn params(source: &Source) -> OpeningParams {
     let [ex, ey, ez, _] = vec4(plan.path.entry);
     let stick = friction.stiffness_ratio * opening.stick;
     let [clusters, cells, nodes] = opening_counts(model);
+    let advance = |segment: usize| {
+        let segment = plan.segments[segment.min(plan.segments.len() - 1)];
+        opening.advance_limit(segment.shear_wave_speed, 0.0, dt)
+    };
     OpeningParams {
         direction: [x, y, z, shaft as f32],
         entry: [ex, ey, ez, opening.tip_length as f32],
-        numbers: [
-            opening.spacing as f32,
-            opening.guide as f32,
-            (opening.least / (shaft * shaft)) as f32,
-            opening.advance_limit(0.0, dt) as f32,
-        ],
+        numbers: [opening.spacing as f32, opening.guide as f32, (opening.least / (shaft * shaft)) as f32, 0.0],
         friction: [friction.coefficient as f32, stick as f32, friction.fade_length.max(1e-9) as f32, 0.0],
         counts: [opening.stations.len() as u32, clusters, cells, nodes],
         sums: [
@@ -171,6 +170,7 @@ fn params(source: &Source) -> OpeningParams {
             plan.profile.shift.z as f32,
         ],
         dimple: contact.knots.map(|k| [k.root, k.depth, k.slope, k.stored].map(|x| x as f32)),
+        advances: std::array::from_fn(|i| std::array::from_fn(|j| advance(4 * i + j) as f32)),
     }
 }
 
