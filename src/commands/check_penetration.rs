@@ -164,7 +164,10 @@ fn in_scene(material: &TissueMaterial, params: &Params) -> [String; 2] {
     };
     let mut puncture = of(params.puncture_force, params.puncture_stated);
     if opening && !params.puncture_stated {
-        puncture += " at the surface; in an inner layer the crack is there already";
+        puncture += match material.membrane_energy {
+            Some(_) => " and the force of its membrane at the surface; in an inner layer the crack is there already",
+            None => " at the surface; in an inner layer the crack is there already",
+        };
     }
     [puncture, of(params.cutting_force, params.cutting_stated)]
 }

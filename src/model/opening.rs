@@ -29,6 +29,9 @@ const ADVANCE: f64 = 0.5;
 /// back beyond the limit on the speed of nodes over fat.
 const CRACK_SPEED: f64 = 0.6;
 
+/// Tissue snaps back behind a crack as fast as that runs: a part of what nodes may move in a step.
+const NODES_FOLLOW: f64 = 0.8;
+
 /// How far the stations go beyond the deepest place of the tip, in needle radii.
 const BEYOND: f64 = 1.5;
 
@@ -141,6 +144,8 @@ pub struct OpeningPlan {
     pub stick: f64,
     /// Half of the length over which the normal force is averaged for friction, in stations.
     pub averaged: usize,
+    /// Most that a crack runs in a step for the sake of the nodes behind it [m].
+    pub nodes_follow: f64,
 }
 
 impl NearCell {
@@ -172,10 +177,13 @@ impl OpeningPlan {
     }
 
     /// How far the tip may advance in a step of `dt` [s] in which the needle travels `travel` [m], in tissue with shear waves of this speed
-    /// [m/s]: no faster than a crack runs, and stations open one after the other. No node can be left inside of the needle here, so the
+    /// [m/s]: no faster than a crack runs, than nodes can follow, and stations open one after the other. No node can be left inside of the needle here, so the
     /// speed of the needle is no limit.
     pub fn advance_limit(&self, shear_wave_speed: f64, travel: f64, dt: f64) -> f64 {
-        (CRACK_SPEED * shear_wave_speed * dt).min(ADVANCE * self.spacing).max(LEAST_TRAVELS * travel)
+        (CRACK_SPEED * shear_wave_speed * dt)
+            .min(ADVANCE * self.spacing)
+            .min(self.nodes_follow)
+            .max(LEAST_TRAVELS * travel)
     }
 
     /// True where neither a station nor any that shares a cell with it is cut by a tip at the material coordinate a.
@@ -202,6 +210,8 @@ pub struct OpeningInput<'a> {
     /// Shear modulus and p-wave modulus of the tissue [Pa].
     pub shear_modulus: f64,
     pub p_wave_modulus: f64,
+    /// Largest way of a node in a step [m].
+    pub node_way: f64,
     /// Rest radius of the hole at a material coordinate [m].
     pub hole: &'a dyn Fn(f64) -> f64,
 }
@@ -273,6 +283,7 @@ impl OpeningPlan {
             guide: 50.0 * input.shear_modulus * spacing,
             stick: 2.0 * input.p_wave_modulus * spacing,
             averaged: ((average / spacing).round() as usize).max(1) / 2,
+            nodes_follow: NODES_FOLLOW * input.node_way,
         };
         plan.cells = near_cells(mesh, input, &plan, near, f64::from(count) * spacing);
         plan.longest_span = plan.cells.iter().map(|near| near.count).max().unwrap_or(0);

@@ -301,6 +301,7 @@ impl Model {
                 cell_size: self.scene.tissue.cell_size,
                 shear_modulus: self.scene.material.law.shear_modulus(),
                 p_wave_modulus: self.scene.material.law.p_wave_modulus(),
+                node_way: self.speed_limit(1.0),
                 hole: &|depth| plan.segment(depth.max(0.0)).hole,
             },
         );

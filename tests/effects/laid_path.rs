@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
+use glam::{DQuat, DVec3};
+use stylet::needle::motion::HandPose;
 use stylet::observables::FrameRecord;
+use stylet::simulation::Purpose;
 use stylet::{EngineChoice, Scene, Simulation};
 
 use crate::common::*;
@@ -164,4 +167,32 @@ fn a_checkpoint_keeps_the_line() {
     let rest = std::iter::from_fn(|| next.next_frame().unwrap());
     let apart: Vec<_> = rest.zip(&whole[stop as usize + 1..]).filter(|(a, b)| a.force != b.force).collect();
     assert!(apart.is_empty(), "{} frames, the first at {} s", apart.len(), apart[0].0.time);
+}
+
+/// A hand that presses fast, shakes and tilts lays its line anew in every frame before the puncture: no step of its work counts twice.
+#[test]
+fn a_hand_that_shakes_on_the_skin_creates_no_energy() {
+    let purpose = Purpose { led: true, drawn: false, lanes: true };
+    let straight = scene("{kind=\"insert\", speed_mm_s=10.0, depth_mm=10.0}", &["puncture.path=\"free\""]);
+    let mut simulation = Simulation::for_purpose(straight, None, purpose).unwrap();
+    let start = simulation.hand().unwrap();
+    let (mut all, mut lines) = (Vec::new(), 0);
+    for frame in 0..44 {
+        let phase = 0.9 * f64::from(frame);
+        let direction = DQuat::from_rotation_y(0.08 * phase.sin()) * start.direction;
+        let entry = start.entry + 0.15e-3 * DVec3::new((0.7 * phase).cos(), (1.3 * phase).sin(), 0.0);
+        simulation.lead(&HandPose { entry, direction, depth: 0.1e-3 * f64::from(frame) });
+        let engines = simulation.replaced_engines();
+        all.push(simulation.next_frame().unwrap().unwrap());
+        lines += u64::from(simulation.replaced_engines() != engines);
+    }
+    let last = all.last().unwrap();
+    println!(
+        "{lines} lines, {:.3} N at {:.2} mm, imbalance {:.2e}",
+        last.force.axial,
+        last.depth * 1e3,
+        largest_imbalance(&all)
+    );
+    assert!(lines > 10 && last.tip_coordinate == 0.0 && last.force.axial > 0.3, "{lines} {last:?}");
+    at_most("imbalance", largest_imbalance(&all), 0.01);
 }

@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+use stylet::mesh::BlockMesh;
+use stylet::model::Model;
 use stylet::observables::FrameRecord;
 use stylet::penetration::steady::{Indenter, Resistance, Steady};
 use stylet::{EngineChoice, Scene, Simulation};
@@ -379,4 +381,50 @@ fn a_membrane_costs_its_energy_where_it_lies() {
     println!("{:.4} mJ more, met at {:.3} mm", (cutting(&with) - cutting(&without)) * 1e3, first.tip_coordinate * 1e3);
     close("energy of the membrane", cutting(&with) - cutting(&without), 0.08e-3, 0.1);
     close("material depth of the membrane", first.tip_coordinate, 7.5e-3, 0.1 / 7.5);
+}
+
+/// On the surface a membrane adds its energy to what the surface takes by itself, so that it never gives way sooner.
+#[test]
+fn a_membrane_on_the_surface_adds_to_what_the_surface_takes() {
+    let plan = |membrane: &str| {
+        let skin =
+            format!("region=[{{name=\"skin\", layer_mm=[0.0, 1.0], material={{preset=\"across-fibre\"}}{membrane}}}]");
+        let scene = scene(&[&skin]);
+        let mesh = BlockMesh::for_scene(&scene);
+        Model::new(scene, mesh).puncture.unwrap()
+    };
+    let energy = 0.05e-3;
+    let (with, without) = (plan(", membrane={puncture_energy_mj=0.05}"), plan(""));
+    let length = with.params.transition_length;
+    // 2 W/l more at the surface.
+    close("puncture force", with.threshold(0.0) - without.threshold(0.0), 2.0 * energy / length, 1e-6);
+    let steps = 100_000;
+    let step = length / f64::from(steps);
+    let beyond = |i: i32| (with.threshold(step * f64::from(i)) - without.threshold(step * f64::from(i))) * step;
+    close("energy of the membrane", (0..steps).map(beyond).sum(), energy, 1e-3);
+    let marked: Vec<f64> = with.segments.iter().filter(|s| s.membrane).map(|s| s.start).collect();
+    assert_eq!((marked.len(), marked[0]), (2, 0.0));
+}
+
+/// A crack runs ahead of the needle in soft tissue whose mass is scaled: the force does not grow beyond that of the puncture, and falls.
+#[test]
+fn the_force_falls_behind_the_puncture_of_soft_tissue() {
+    let soft = "material={youngs_modulus_kpa=30.0, poisson_ratio=0.45, toughness_j_m2=164.0}";
+    let needle = ["needle.gauge=\"20G\"", "needle.tip_half_angle_deg=12.0", "motion.phase.0.speed_mm_s=5.0"];
+    let all = [&[soft, "tissue.cell_size_mm=0.8", "solver.mass_scaling=4000"][..], &needle].concat();
+    let surface = predicted(&scene(&all)).puncture_force;
+    for engine in engines_here() {
+        let found = frames(scene(&all), engine);
+        let peak = found.iter().max_by(|a, b| a.force.axial.total_cmp(&b.force.axial)).unwrap();
+        let behind = found.iter().find(|f| f.depth > peak.depth + 2e-3).unwrap();
+        println!(
+            "{engine:?}: {:.3} N at {:.2} mm, then {:.3} N",
+            peak.force.axial,
+            peak.depth * 1e3,
+            behind.force.axial
+        );
+        close("largest force", peak.force.axial, surface, 0.1);
+        at_most("part of it 2 mm behind", behind.force.axial / peak.force.axial, 0.5);
+        at_most("imbalance", found.iter().map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max), 0.01);
+    }
 }
