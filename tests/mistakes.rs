@@ -183,9 +183,9 @@ fn a_layer_is_run_through_or_holed_twice() {
     judged(
         &scene,
         vec![
-            passes("as planned", vec![planned(&scene, 6.9)]),
+            passes("as planned", vec![planned(&scene, scene.motion.deepest() / MM)]),
             fails("run on", "stop_in_layer", "", vec![planned(&scene, 9.5)]),
-            fails("two holes", "figure", "Passes", vec![planned(&scene, 3.0), planned(&scene, 6.9)]),
+            fails("two holes", "figure", "Passes", vec![planned(&scene, 3.0), planned(&scene, scene.motion.deepest() / MM)]),
         ],
     );
 }
