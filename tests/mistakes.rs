@@ -185,7 +185,12 @@ fn a_layer_is_run_through_or_holed_twice() {
         vec![
             passes("as planned", vec![planned(&scene, scene.motion.deepest() / MM)]),
             fails("run on", "stop_in_layer", "", vec![planned(&scene, 9.5)]),
-            fails("two holes", "figure", "Passes", vec![planned(&scene, 3.0), planned(&scene, scene.motion.deepest() / MM)]),
+            fails(
+                "two holes",
+                "figure",
+                "Passes",
+                vec![planned(&scene, 3.0), planned(&scene, scene.motion.deepest() / MM)],
+            ),
         ],
     );
 }

@@ -165,6 +165,15 @@ impl BlockMesh {
         self.bore.map_or(square, |bore| bore.map(square)).extend(self.lines[2][k])
     }
 
+    /// Longest edges around a node, along each axis [m].
+    pub fn edges_around(&self, node: usize) -> DVec3 {
+        let c = self.node_coordinates(node);
+        DVec3::from_array(std::array::from_fn(|a| {
+            let lines = &self.lines[a][c[a].saturating_sub(1)..(c[a] + 2).min(self.lines[a].len())];
+            lines.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max)
+        }))
+    }
+
     /// Edge lengths of a cell between its grid lines [m].
     pub fn cell_size(&self, cell: usize) -> DVec3 {
         let c = self.cell_coordinates(cell);

@@ -209,9 +209,18 @@ impl Model {
             true => disc_offsets(&path, &needle).map(|o| anchor_beside(&path, o, case)).collect(),
             false => tip_anchors(&path, &needle, self.effects.cohesive.is_some(), case),
         };
-        // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the outermost anchor.
+        // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the outermost anchor, and a path that is laid beside
+        // the fine cells has larger ones.
         let outermost = if opening { DISC * needle.radius } else { needle.radius };
-        let anchor_reach = outermost + self.scene.tissue.cell_size * 1.5;
+        let fine = self.scene.tissue.cell_size;
+        let reach_at = |node: usize| {
+            let edges = mesh.edges_around(node);
+            let coarse = edges.max_element() > 1.001 * fine;
+            (
+                if coarse { edges.length().max(1.5 * fine) } else { 1.5 * fine },
+                if coarse { 2.0 * edges.z.max(fine) } else { 2.0 * fine },
+            )
+        };
         let cohesive = self.cohesion.is_some();
         let volumes = self.node_volumes();
         self.contact_nodes = (0..mesh.node_count())
@@ -224,7 +233,8 @@ impl Model {
                 // What stands still is not pushed aside, but it carries the tip.
                 let stands = self.composition.held.get(node).is_some_and(|held| *held);
                 let pushed = !stands && (on_slit || s0 < deepest && if cohesive { on_face } else { in_ring });
-                let carries = r0 < anchor_reach && s0 < deepest + 2.0 * self.scene.tissue.cell_size;
+                let (aside, below) = reach_at(node);
+                let carries = r0 < outermost + aside && s0 < deepest + below;
                 let carrier = ContactNode::carrier(node, r0, s0, volumes[node]);
                 (pushed || carries).then_some(ContactNode { pushed, surface, ..carrier })
             })

@@ -425,6 +425,8 @@ fn the_force_falls_behind_the_puncture_of_soft_tissue() {
         );
         close("largest force", peak.force.axial, surface, 0.1);
         at_most("part of it 2 mm behind", behind.force.axial / peak.force.axial, 0.5);
-        at_most("imbalance", found.iter().map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max), 0.01);
+        // As soon as there is work to compare with.
+        let pressed = found.iter().filter(|f| f.depth > 1e-3);
+        at_most("imbalance", pressed.map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max), 0.01);
     }
 }
