@@ -1351,12 +1351,11 @@ fn toughness_of_materials() {
     };
     assert_eq!(own("preset = \"across-fibre\""), (Some(164.0), None));
     assert_eq!(own("preset = \"along-fibre\"\ntoughness_j_m2 = 80\ntear_stretch = 3"), (Some(80.0), Some(3.0)));
-    assert_eq!(own("preset = \"fat\""), (None, None));
+    assert_eq!(own("preset = \"muscle-relaxed\""), (None, None));
     assert_eq!(own("youngs_modulus_kpa = 20\npoisson_ratio = 0.45\ntoughness_j_m2 = 200"), (Some(200.0), None));
     let preset = stylet::TissueMaterial::preset("across-fibre").unwrap();
     assert_eq!(preset.toughness, Some(164.0));
-    let region =
-        "[[region]]\nname = \"a\"\nlayer_mm = [0, 2]\nmaterial = { preset = \"fat\", toughness_j_m2 = 50.0 }\n";
+    let region = "[[region]]\nname = \"a\"\nlayer_mm = [0, 2]\nmaterial = { preset = \"muscle-relaxed\", toughness_j_m2 = 50.0 }\n";
     assert_eq!(load_block("", &format!("{MATERIAL}{region}")).unwrap().regions[0].material.toughness, Some(50.0));
     for (key, value, range) in [
         ("toughness_j_m2", "0", "greater than 0"),
@@ -1364,10 +1363,10 @@ fn toughness_of_materials() {
         ("tear_stretch", "1.0", "1.01"),
         ("tear_stretch", "-2.0", "1.01"),
     ] {
-        let text = format!("[material]\npreset = \"fat\"\n{key} = {value}\n");
+        let text = format!("[material]\npreset = \"muscle-relaxed\"\n{key} = {value}\n");
         assert_block_refused("", &text, key, &[range]);
     }
-    let nan = load_block("", "[material]\npreset = \"fat\"\ntoughness_j_m2 = nan\n").unwrap_err();
+    let nan = load_block("", "[material]\npreset = \"muscle-relaxed\"\ntoughness_j_m2 = nan\n").unwrap_err();
     assert!(nan.contains("not a finite number"), "{nan}");
 }
 
@@ -1433,8 +1432,8 @@ fn the_scheme_opening_takes_its_numbers_from_the_toughness() {
 #[test]
 fn the_scheme_opening_is_refused_without_a_toughness() {
     for (material, line, expected) in [
-        ("preset = \"fat\"", "[material]", "and the tissue has none"),
-        ("preset = \"fat\"\ntoughness_j_m2 = 0.01", "toughness_j_m2", "computed from 0.06"),
+        ("preset = \"muscle-relaxed\"", "[material]", "and the tissue has none"),
+        ("preset = \"muscle-relaxed\"\ntoughness_j_m2 = 0.01", "toughness_j_m2", "computed from 0.06"),
         (
             "law = \"ogden\"\nmu_kpa = 1.0\nalpha = 9.0\npoisson_ratio = 0.47\ntoughness_j_m2 = 5000",
             "toughness_j_m2",
@@ -1445,7 +1444,7 @@ fn the_scheme_opening_is_refused_without_a_toughness() {
         assert!(message.contains(expected) && message.contains("scheme ring") && message.contains(line), "{message}");
         assert!(message.contains("scene.toml:1") && message.contains("= way out: "), "{message}");
     }
-    let layer = "[[region]]\nname = \"pad\"\nlayer_mm = [0, 3]\nmaterial = { preset = \"fat\" }\n";
+    let layer = "[[region]]\nname = \"pad\"\nlayer_mm = [0, 3]\nmaterial = { preset = \"muscle-relaxed\" }\n";
     let message = opening_scene(&format!("preset = \"across-fibre\"\n{layer}"), "").unwrap_err();
     assert!(
         message.contains("region `pad` has none") && message.contains("region.0.material.toughness_j_m2"),
@@ -1480,8 +1479,9 @@ fn check_tells_what_toughness_and_law_say() {
     {
         assert!(opening.contains(expected), "no `{expected}` in\n{opening}");
     }
-    // Layers: skin and fat have no toughness, muscle has.
-    let layers = told(&Scene::load(&repository().join("scenes/layers.toml"), &[]).unwrap());
+    // Layers: one has no toughness.
+    let unknown = ["region.1.material={preset=\"muscle-relaxed\"}".to_string()];
+    let layers = told(&Scene::load(&repository().join("scenes/layers.toml"), &unknown).unwrap());
     for expected in ["toughness not known: no prediction", "through all layers: no prediction"] {
         assert!(layers.contains(expected), "no `{expected}` in\n{layers}");
     }
@@ -1490,7 +1490,7 @@ fn check_tells_what_toughness_and_law_say() {
     let padded = told(&needle_scene(("", ""), pad));
     assert!(padded.contains("through all layers at 12 mm: "), "{padded}");
     assert!(padded.contains("the run takes 0.2 N (calibrated, of this material)"), "{padded}");
-    let unknown = told(&needle_scene(("preset = \"across-fibre\"", "preset = \"muscle-60kpa\""), ""));
+    let unknown = told(&needle_scene(("preset = \"across-fibre\"", "preset = \"muscle-relaxed\""), ""));
     assert!(unknown.contains("no toughness is known") && unknown.lines().count() == 1, "{unknown}");
     // No needle, no word.
     let sphere = Scene::load(&repository().join("scenes/effects/indentation.toml"), &[]).unwrap();

@@ -124,7 +124,10 @@ mod tests {
         let ran = Scene::parse(&path, &text, &overrides).unwrap();
         let read = Scene::parse(&path, &saved, &[]).unwrap_or_else(|e| panic!("{e}\n{saved}"));
         assert_eq!(fingerprint(&ran), fingerprint(&read));
-        assert!(saved.contains("coefficient = 0.45") && saved.contains("# calibration, as in the main job"), "{saved}");
+        assert!(
+            saved.contains("coefficient = 0.45") && saved.contains("# Entry, angle and depth are chosen"),
+            "{saved}"
+        );
         assert!(saved.starts_with("# Task:"), "the head is still there");
         assert_eq!(written(&text, &[]).unwrap(), text);
         assert!(written(&text, &["title.x=1".into()]).is_err());

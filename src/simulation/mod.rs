@@ -332,6 +332,10 @@ impl Simulation {
         };
         self.collected += 1;
         if let Some(laying) = &mut self.laying {
+            // The engine keeps the line that a needle has left.
+            if !laying.is_on() {
+                sums.tip_coordinate = 0.0;
+            }
             laying.follow(sums.tip_coordinate);
         }
         let bent = self.answer_of_the_needle(&mut sums);
