@@ -157,10 +157,10 @@ fn a_scene_is_saved_as_it_runs_and_never_over_another() {
 #[test]
 fn the_price_of_a_finer_mesh_is_told_before_it_is_paid() {
     let _english = english();
-    let panel = panel(&[]);
+    let panel = panel(&["tissue.cell_size_mm=0.68"]);
     let timing = Timing { simulated: 1.0 / 60.0, physics: 0.010, ..Default::default() };
     let mut harness = Harness::builder().with_size([400.0, 600.0]).build_ui_state(
-        move |ui, panel: &mut Panel| panel.accuracy.show(ui, &panel.scene, &mut panel.tuning, &timing, (5520, 8)),
+        move |ui, panel: &mut Panel| panel.accuracy.show(ui, &panel.scene, &mut panel.tuning, &timing, (4950, 8)),
         panel,
     );
     harness.run_steps(3);

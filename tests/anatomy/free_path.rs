@@ -115,9 +115,9 @@ fn a_hand_enters_where_it_wants_and_again() {
         let outside = records[before..].iter().map(felt_of_tissue).fold(0.0, f64::max);
         assert!(outside < 1e-6, "{outside} N before the skin at {skin}");
         go(&mut simulation, at(2.0 * MM), 5.0 * MM, &mut records);
-        // The skin gives way by some of it, a force is felt.
+        // A cone is felt by the square of its depth, behind the box's cut through the fat of the second place by little.
         let felt = records.last().unwrap().force.axial;
-        assert!(felt > 0.05, "{felt} N 2 mm behind the skin at {skin}");
+        assert!(felt > 0.005, "{felt} N 2 mm behind the skin at {skin}");
         go(&mut simulation, at(6.0 * MM), 5.0 * MM, &mut records);
         let inside = records.last().unwrap();
         assert!(inside.tip_coordinate > 3.0 * MM, "{}", inside.tip_coordinate);
