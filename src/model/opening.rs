@@ -177,8 +177,8 @@ impl OpeningPlan {
     }
 
     /// How far the tip may advance in a step of `dt` [s] in which the needle travels `travel` [m], in tissue with shear waves of this speed
-    /// [m/s]: no faster than a crack runs, than nodes can follow, and stations open one after the other. No node can be left inside of the needle here, so the
-    /// speed of the needle is no limit.
+    /// [m/s]: no faster than a crack runs, than nodes can follow, and stations open one after the other. No node can be left inside of the
+    /// needle here, so the speed of the needle is no limit.
     pub fn advance_limit(&self, shear_wave_speed: f64, travel: f64, dt: f64) -> f64 {
         (CRACK_SPEED * shear_wave_speed * dt)
             .min(ADVANCE * self.spacing)

@@ -215,11 +215,10 @@ impl Model {
         let fine = self.scene.tissue.cell_size;
         let reach_at = |node: usize| {
             let edges = mesh.edges_around(node);
-            let coarse = edges.max_element() > 1.001 * fine;
-            (
-                if coarse { edges.length().max(1.5 * fine) } else { 1.5 * fine },
-                if coarse { 2.0 * edges.z.max(fine) } else { 2.0 * fine },
-            )
+            match edges.max_element() > 1.001 * fine {
+                true => (edges.length().max(1.5 * fine), 2.0 * edges.z.max(fine)),
+                false => (1.5 * fine, 2.0 * fine),
+            }
         };
         let cohesive = self.cohesion.is_some();
         let volumes = self.node_volumes();
