@@ -91,7 +91,8 @@ struct TipState {
     // How far it advanced in this step, and how far the dimple shifted the path with it [m].
     advanced: f32,
     shifted: f32,
-    _pad0: f32,
+    // By how much the tissue at the tip moves along the needle per length of its path, d(x.t)/da.
+    touch_stretch: f32,
 }
 
 // Cell that the path passes: part of its stiffness that is left then, s0 range of the part that opens [m].

@@ -30,8 +30,9 @@ const LANES: u32 = 256u;
 #else
 const LANES: u32 = 64u;
 #endif
-// On all anchors alike; their mean distance before the advance [m].
+// On all anchors alike; their mean distance and stretch before the advance [m], [-].
 var<workgroup> mean_before: f32;
+var<workgroup> stretch_before: f32;
 var<workgroup> touch: SurfaceTouch;
 #else
 const LANES: u32 = 32u;
@@ -147,6 +148,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
 #ifdef OPENING
         let part = dimple_part(before);
         mean_before = distance / f32(ANCHOR_COUNT);
+        stretch_before = stretch / f32(ANCHOR_COUNT);
         touch = surface_touch(select(0.0, mean_before, before < puncture.exit), part, spreading);
         threshold += dimple_closing(before) * touch.dimple * spreading;
         let excess = touch.force - threshold;
@@ -211,6 +213,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
     if (lane < ANCHOR_COUNT) {
 #ifdef OPENING
         let force = touch.force / f32(ANCHOR_COUNT);
+        stretches[lane] = place.stretch;
 #else
         let force = spring * place.gap;
         // Force after the advance times the loss of stretch (trapezoidal rule of the leapfrog work).
@@ -238,12 +241,19 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
             distance += distances[i];
         }
 #ifdef OPENING
-        // Mean force of both steps times the way, less what is held now.
+        var stretch = 0.0;
+        for (var i = 0u; i < ANCHOR_COUNT; i++) {
+            stretch += stretches[i];
+        }
+        // Mean force of both steps times the way, less what is held now; the new force works where the tip has come to.
+        let way = mean_before - tip_state.gap;
+        let stretched = (after - before) * (stretch_before - tip_state.touch_stretch);
         let held = touch_energy(touch);
         let was = SurfaceTouch(tip_state.touch_force, tip_state.dimple);
         let shifted = dimple_part(after) * touch.dimple - dimple_part(before) * was.dimple;
-        lost = 0.5 * (was.force + touch.force) * (mean_before - tip_state.gap) + spreading * shifted
+        lost = 0.5 * (was.force * way + touch.force * (way - stretched)) + spreading * shifted
             - (held - touch_energy(was));
+        tip_state.touch_stretch = stretch / f32(ANCHOR_COUNT);
         stored = bond_energy + held;
         force = touch.force;
         tip_state.touch_force = touch.force;

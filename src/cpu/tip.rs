@@ -56,7 +56,9 @@ impl TipLoads {
         };
         let count = anchors.len() as f64;
         let gap = anchors.iter().map(|p| p.distance).sum::<f64>() / count;
-        let touch = contact.touch(if a < plan.exit { gap } else { 0.0 }, contact.part(a), spreading);
+        let stretch = anchors.iter().map(|p| p.stretch).sum::<f64>() / count;
+        let touch =
+            Touch { stretch, ..contact.touch(if a < plan.exit { gap } else { 0.0 }, contact.part(a), spreading) };
         let each = vec![touch.force / count; anchors.len()];
         TipLoads { force: touch.force, each, stored: contact.stored(touch), touch }
     }
@@ -139,6 +141,7 @@ impl CpuEngine {
             None => 0.0,
         };
         let mut now = loads(&anchors, a);
+        let stretch = now.touch.stretch;
         let p = &plan.params;
         let speed = pose.velocity.length();
         // The tissue that the tip opens as it advances is strained at once.
@@ -171,7 +174,9 @@ impl CpuEngine {
                     let way = mean_distance(&before) - self.state.bond.gap;
                     let shift = contact.part(a + advance) * new.dimple - contact.part(a) * old.dimple;
                     self.advanced = [advance, shift];
-                    contact.dissipated(old, new, way, shift, spreading)
+                    // What the stretch became over the step, at the place where the tip was.
+                    let stretched = advance * (stretch - old.stretch);
+                    contact.dissipated((old, new), (way, stretched), shift, spreading)
                 }
                 // Force after the advance times the loss of stretch: with the force of the next step this closes the
                 // trapezoidal rule of the leapfrog work; the loss of spring energy would count half a step twice.

@@ -213,7 +213,7 @@ shared_structs! {
         touch_force: f32,
         advanced: f32,
         shifted: f32,
-        _pad0: f32,
+        touch_stretch: f32,
     }
     /// shaders/effects/puncture.wgsl
     struct PathCell {

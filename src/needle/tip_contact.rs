@@ -50,6 +50,8 @@ pub struct Touch {
     pub force: f64,
     /// U [m].
     pub dimple: f64,
+    /// By how much the disc moves along the needle per length of its path, d(x.t)/da.
+    pub stretch: f64,
 }
 
 /// The law of one surface and tip.
@@ -117,7 +119,7 @@ impl TipContact {
         // Q/k + p^2 u(Q) = p (G + S/k).
         let pressed = self.pressed(part * (gap + spreading / self.stiffness), part * part);
         let dimple = self.depth(pressed.max(part * spreading).max(0.0));
-        Touch { force: self.stiffness * (gap - part * dimple).max(0.0), dimple }
+        Touch { force: self.stiffness * (gap - part * dimple).max(0.0), dimple, ..Touch::default() }
     }
 
     /// Q with `Q/k + by u(Q) = length` [N].
@@ -145,9 +147,10 @@ impl TipContact {
 
     /// What a step dissipates in which the gap grew by `way` [m] before the advance that ends it, the touch went from `old` to `new`, and the
     /// dimple moved the opened path by `shift` [m] against the force `spreading` [N]: mean force of both times the way, as the leapfrog
-    /// works, less what is held now [J].
-    pub fn dissipated(&self, old: Touch, new: Touch, way: f64, shift: f64, spreading: f64) -> f64 {
-        0.5 * (old.force + new.force) * way + spreading * shift - (self.stored(new) - self.stored(old))
+    /// works, less what is held now [J]. The new force works where the tip has come to: tissue that is longer there by `stretched` [m] than
+    /// it was has made less of the way.
+    pub fn dissipated(&self, (old, new): (Touch, Touch), (way, stretched): (f64, f64), shift: f64, spreading: f64) -> f64 {
+        0.5 * (old.force * way + new.force * (way - stretched)) + spreading * shift - (self.stored(new) - self.stored(old))
     }
 
     /// By how much the gap of the tip with the part p is longer under the force F than under the threshold F_c [N]: what an advance has to

@@ -7,6 +7,8 @@ use super::carried::{carried, on_the_same_path};
 use super::change::Change;
 use super::laying::{Found, Laying};
 use super::start::choose_step;
+use glam::DVec2;
+
 use crate::engine::State;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::error::Result;
@@ -118,10 +120,11 @@ fn touch_at(model: &Model, state: &State, cut: f64, pose: &ToolPose) -> (f64, To
     let (path, t) = (plan.path, pose.direction);
     let moved = |anchor: &TipAnchor| {
         let x = anchor.surface + path.direction * cut;
-        (material_place(mesh, &state.displacement, x).position - x).dot(t)
+        let at = material_place(mesh, &state.displacement, x);
+        DVec2::new((at.position - x).dot(t), (at.gradient * path.direction).dot(t))
     };
-    let mean = plan.anchors.iter().map(moved).sum::<f64>() / plan.anchors.len() as f64;
+    let [mean, stretch] = (plan.anchors.iter().map(moved).sum::<DVec2>() / plan.anchors.len() as f64).to_array();
     let gap = (pose.tip - path.entry).dot(t) - cut * path.direction.dot(t) - mean;
     let touch = plan.contact.as_ref().map(|contact| contact.touch(gap, contact.part(cut), state.opening_spreading));
-    (gap, touch.unwrap_or_default())
+    (gap, Touch { stretch, ..touch.unwrap_or_default() })
 }

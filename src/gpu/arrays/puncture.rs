@@ -28,7 +28,11 @@ pub(super) const ARRAYS: &[Array] = &[
             for tip in read_all::<TipState>(bytes) {
                 state.tip_coordinate = tip.coordinate.into();
                 state.bond = Bond { stretch: tip.bond_stretch.into(), slid: tip.bond_slid.into(), gap: tip.gap.into() };
-                state.touch = Touch { force: tip.touch_force.into(), dimple: tip.dimple.into() };
+                state.touch = Touch {
+                    force: tip.touch_force.into(),
+                    dimple: tip.dimple.into(),
+                    stretch: tip.touch_stretch.into(),
+                };
             }
         },
         |_, state| {
@@ -39,6 +43,7 @@ pub(super) const ARRAYS: &[Array] = &[
                 gap: state.bond.gap as f32,
                 dimple: state.touch.dimple as f32,
                 touch_force: state.touch.force as f32,
+                touch_stretch: state.touch.stretch as f32,
                 ..TipState::zeroed()
             }])
         },
