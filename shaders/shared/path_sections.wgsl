@@ -52,9 +52,11 @@ fn place_sections(lane: u32, coordinate: f32, shift: f32) {
 #else
         let behind = step_input.depth - depth.x - moved - shift;
 #endif
-        let part = (coordinate - depth.y) / spacing + 0.5;
-        let cut = clamp(part, 0.0, 1.0);
-        let rate = select(0.0, 1.0 / spacing, part > 0.0 && part < 1.0);
+        // OpeningPlan::cut: grows over two spacings, with a rate without steps.
+        let part = clamp((coordinate - depth.y) / spacing, -1.0, 1.0);
+        let left = 1.0 - abs(part);
+        let cut = select(1.0 - 0.5 * left * left, 0.5 * left * left, part < 0.0);
+        let rate = left / spacing;
         let shaft = opening.direction.w * depth.z;
         // OpeningPlan::radius: the corner between tip and shaft is rounded.
         let steep = shaft / tip_length;

@@ -191,11 +191,19 @@ impl OpeningPlan {
         station.depth > a + (f64::from(self.longest_span) + 2.0) * self.spacing
     }
 
-    /// Part of a station that a tip at the material coordinate a has cut, and its rate [1/m]. On an oblique path what lies before the
-    /// surface point of the axis opens as what lies as far behind it.
+    /// Part of a station that a tip at the material coordinate a has cut, and its rate [1/m]: 0 up to a spacing before it, 1 from a spacing
+    /// behind it on, with a rate without steps. With a part that grew evenly, over one spacing, the resistance to the advance was a saw
+    /// tooth, and a crack that ran by a third of a spacing in a step made 2 % of the energy.
     pub fn cut(&self, station: &OpeningStation, a: f64) -> (f64, f64) {
-        let part = (a - station.depth.abs().max(0.5 * self.spacing)) / self.spacing + 0.5;
-        (part.clamp(0.0, 1.0), if part > 0.0 && part < 1.0 { 1.0 / self.spacing } else { 0.0 })
+        let part = ((a - self.opens_at(station)) / self.spacing).clamp(-1.0, 1.0);
+        let left = 1.0 - part.abs();
+        (if part < 0.0 { 0.5 * left * left } else { 1.0 - 0.5 * left * left }, left / self.spacing)
+    }
+
+    /// Material coordinate of the tip at which half of a station is cut [m]. On an oblique path what lies before the surface point of the
+    /// axis opens as what lies as far behind it.
+    pub fn opens_at(&self, station: &OpeningStation) -> f64 {
+        station.depth.abs().max(self.spacing)
     }
 }
 

@@ -321,7 +321,7 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
             _pad: 0.0,
         }));
         let end = tables.entries.len() as u32;
-        let cut_from = station.depth.abs().max(0.5 * opening.spacing);
+        let cut_from = opening.opens_at(station);
         tables.stations.push(OpeningStation {
             depth: [station.depth as f32, cut_from as f32, station.opened(opening.shaft) as f32, 0.0],
             lists: [first, middle, middle, end],
