@@ -10,7 +10,7 @@ alias Axis = BentAxis;
 
 fn axis_at(s: f32) -> Axis {
     let bend = bend_at(s);
-    return Axis(step_input.velocity.xyz + bend.rate, bend);
+    return Axis(velocity_behind() + bend.rate, bend);
 }
 
 fn off_axis(axis: Axis, lever: vec3<f32>) -> vec3<f32> {

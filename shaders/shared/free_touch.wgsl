@@ -72,7 +72,7 @@ fn touch_weight(touch: Touch) -> f32 {
 }
 
 fn past_needle(v: vec3<f32>, lever: vec3<f32>) -> vec3<f32> {
-    return v - cross(angular_velocity(), lever);
+    return v - cross(angular_velocity_behind(), lever);
 }
 
 fn at_end(touch: Touch, overlap: Overlap, d: vec3<f32>, s: f32) -> Overlap {

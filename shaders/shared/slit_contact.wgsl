@@ -59,7 +59,7 @@ fn slit_force(index: u32) -> SlitForce {
             var from_axis = lever;
             var v = own_velocity * w.x + node_velocity[contact_nodes[first].numbers.x].xyz * w.y
                 + node_velocity[contact_nodes[second].numbers.x].xyz * w.z
-                + node_velocity[contact_nodes[far].numbers.x].xyz * w.w - step_input.velocity.xyz;
+                + node_velocity[contact_nodes[far].numbers.x].xyz * w.w - velocity_behind();
 #ifdef FLEXIBLE_NEEDLE
             let bend = bend_at(s);
             from_axis -= bend.offset;

@@ -29,9 +29,19 @@ struct StepInput {
 
 @group(0) @binding(1) var<uniform> step_input: StepInput;
 
+// Mean velocity of the tool over the step that ends now [m/s]: by what it has moved, as nodes have with their velocity.
+fn velocity_behind() -> vec3<f32> {
+    return 2.0 * step_input.velocity.xyz - step_input.velocity_ahead.xyz;
+}
+
 #ifdef TURNS
 // Angular velocity of the tool [rad/s]: its components stand beside tip, velocity and direction.
 fn angular_velocity() -> vec3<f32> {
     return vec3<f32>(step_input.tip.w, step_input.velocity.w, step_input.direction.w);
+}
+
+// The same over the step that ends now.
+fn angular_velocity_behind() -> vec3<f32> {
+    return 2.0 * angular_velocity() - step_input.angular_velocity_ahead.xyz;
 }
 #endif

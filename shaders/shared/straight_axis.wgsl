@@ -1,7 +1,7 @@
 // The axis of a rigid needle. The same functions as in shared/bent_axis.
 
 struct StraightAxis {
-    // Of the needle there [m/s].
+    // Of the needle there, over the step that ends now [m/s].
     velocity: vec3<f32>,
 }
 
@@ -9,7 +9,7 @@ alias Axis = StraightAxis;
 
 // The axis at the distance `s` behind the tip.
 fn axis_at(s: f32) -> Axis {
-    return Axis(step_input.velocity.xyz);
+    return Axis(velocity_behind());
 }
 
 // What `lever`, from the tip, is from the axis [m].

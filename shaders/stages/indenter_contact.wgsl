@@ -35,7 +35,7 @@ fn pressed_points(index: u32) -> PointForce {
     let lever = lever_of(index);
     let penetration = tool_penetration(lever, step_input.direction.xyz, contact.rest_radius);
     let n = penetration.xyz;
-    let vn = dot(node_velocity[contact.node].xyz - step_input.velocity.xyz, n);
+    let vn = dot(node_velocity[contact.node].xyz - velocity_behind(), n);
     let k = indentation.face_stiffness * contact.share;
     let depth = max(penetration.w, 0.0);
     let elastic = k * depth;
@@ -81,7 +81,7 @@ fn pressed_points(index: u32) -> PointForce {
             let n = penetration.xyz;
             let v = node_velocity[contact.node].xyz * w.x + node_velocity[contact_nodes[first].numbers.x].xyz * w.y
                 + node_velocity[contact_nodes[second].numbers.x].xyz * w.z
-                + node_velocity[contact_nodes[far].numbers.x].xyz * w.w - step_input.velocity.xyz;
+                + node_velocity[contact_nodes[far].numbers.x].xyz * w.w - velocity_behind();
             let vn = dot(v, n);
             let depth = max(penetration.w, 0.0);
             let elastic = k * depth;
@@ -106,7 +106,7 @@ fn indenter_contact(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_w
     }
     let contact = contact_at(index);
     let lever = lever_of(index);
-    let v = node_velocity[contact.node].xyz - step_input.velocity.xyz;
+    let v = node_velocity[contact.node].xyz - velocity_behind();
     let k = indentation.face_stiffness * contact.share;
     var memory = remembered(index);
     var normal = vec3<f32>(0.0);

@@ -166,7 +166,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         for (var e = now.lists.x; e < now.lists.y; e++) {
             speed += dot(node_velocity[path_entries[e].index].xyz, t) * path_entries[e].second;
         }
-        let trial = stick + (speed - dot(step_input.velocity.xyz, t)) * params.dt;
+        let trial = stick + (speed - dot(velocity_behind(), t)) * params.dt;
         let allowed = limit / kt;
         let stretch = select(0.0, clamp(trial, -allowed, allowed), limit > 0.0);
         rubbing = -kt * stretch;

@@ -22,7 +22,7 @@ impl CpuEngine {
         for (contact, memory) in model.contact_nodes.iter().zip(memories) {
             let node = contact.node as usize;
             let x = contact.place(&model.mesh) + displacement[node];
-            let v = velocity[node] - pose.velocity;
+            let v = velocity[node] - pose.velocity_behind();
             let k = plan.face_stiffness * contact.share;
             self.added.add(node, DVec3::ZERO, plan.stiffness_bound(contact.share));
             let mut sums = ContactSums::default();
@@ -111,7 +111,7 @@ fn pressed_points(
             let Some((depth, n)) = penetration(tool, lever, pose.direction, rest_radius).filter(|p| p.0 > 0.0) else {
                 continue;
             };
-            let vn = (at(nodes.map(|n| velocity[n])) - pose.velocity).dot(n);
+            let vn = (at(nodes.map(|n| velocity[n])) - pose.velocity_behind()).dot(n);
             let elastic = k * depth;
             let normal = (elastic - plan.face_damping * k * vn).max(0.0);
             let force = n * (w[0] * normal);
@@ -140,7 +140,7 @@ fn pressed_node(
     let Some((depth, n)) = found else { return PointForce::default() };
     let k = plan.face_stiffness * contact.share;
     let elastic = k * depth;
-    let normal = (elastic - plan.face_damping * k * (velocity[node] - pose.velocity).dot(n)).max(0.0);
+    let normal = (elastic - plan.face_damping * k * (velocity[node] - pose.velocity_behind()).dot(n)).max(0.0);
     PointForce {
         normal: n * normal,
         damping: n * (normal - elastic),

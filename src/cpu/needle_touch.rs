@@ -142,7 +142,7 @@ impl Needle<'_> {
             normal: force.normal,
             on_shaft: force.on_shaft,
             n: force.normal.normalize_or_zero(),
-            v: at.velocity - self.pose.velocity - at.bend.rate,
+            v: at.velocity - self.pose.velocity_behind() - at.bend.rate,
             damping: force.damping,
             torque: force.torque,
             stored: force.stored,
@@ -186,7 +186,8 @@ impl Needle<'_> {
         let gradient = gradient - d * gradient.dot(at.bend.slope);
         let steep = gradient.length();
         let n = -gradient / steep;
-        let v = at.velocity - self.pose.velocity - self.pose.angular_velocity.cross(at.lever) - at.bend.rate;
+        let turning = self.pose.angular_velocity_behind().cross(at.lever);
+        let v = at.velocity - self.pose.velocity_behind() - turning - at.bend.rate;
         let k = match contact.surface {
             ContactSurface::OpenedPath => plan.ring_stiffness(contact, touch.weight),
             _ => plan.contact_stiffness,

@@ -284,7 +284,7 @@ impl CpuEngine {
                 let velocity_of = |(place, w): &(u16, f64)| velocity[station.nodes[usize::from(*place)] as usize] * *w;
                 let mean_velocity: DVec3 = station.disc.iter().map(velocity_of).sum();
                 let kt = friction.stiffness_ratio * opening.stick;
-                let motion = (mean_velocity - pose.velocity).dot(t) * self.dt;
+                let motion = (mean_velocity - pose.velocity_behind()).dot(t) * self.dt;
                 let (old, trial) = (*memory, *memory + motion);
                 *memory = if limit > 0.0 { trial.clamp(-limit / kt, limit / kt) } else { 0.0 };
                 rubbing = -kt * *memory;

@@ -78,7 +78,7 @@ impl SlitContact<'_> {
                 let gradient = overlap.gradient - d * overlap.gradient.dot(bend.slope);
                 let steep = gradient.length();
                 let n = -gradient / steep;
-                let v = at(corners.map(|c| self.velocity[c.node as usize])) - self.pose.velocity - bend.rate;
+                let v = at(corners.map(|c| self.velocity[c.node as usize])) - self.pose.velocity_behind() - bend.rate;
                 let vn = v.dot(n);
                 let elastic = k * overlap.value * steep;
                 let normal = (elastic - self.plan.face_damping * k * vn).max(0.0);

@@ -40,6 +40,18 @@ pub struct ToolPose {
     pub phase: usize,
 }
 
+impl ToolPose {
+    /// Mean velocity over the step that ends with this pose [m/s]: by what the tool has moved, as nodes have with their velocity.
+    pub fn velocity_behind(&self) -> DVec3 {
+        2.0 * self.velocity - self.velocity_ahead
+    }
+
+    /// Mean angular velocity over the step that ends with this pose [rad/s].
+    pub fn angular_velocity_behind(&self) -> DVec3 {
+        2.0 * self.angular_velocity - self.angular_velocity_ahead
+    }
+}
+
 /// Pose of the tool over time, one leg per phase; a vibration of the hub on top.
 #[derive(Debug, Clone)]
 pub struct Kinematics {
