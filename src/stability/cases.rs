@@ -21,6 +21,13 @@ const PLAIN: Part = Part {
 /// The same with a tool.
 const TOOL: Part = Part { expected: BALANCED_WITH_TOOL, ..PLAIN };
 
+/// The same needle on the opened path, in tissue that gives way after a millimetre or two, and the bound of a scene without a tool.
+const OPENED: Part = Part {
+    label: "opened",
+    overrides: &["puncture.scheme=\"opening\"", "material.toughness_j_m2=5.0"],
+    ..PLAIN
+};
+
 /// A small block for a needle, in the short form.
 const SMALL: &str = "tissue.size_mm=[12.0, 12.0, 7.0]";
 
@@ -179,7 +186,7 @@ pub const CASES: &[Case] = &[
         hard: "45 deg on grid lines",
         scene: "hard/grid_lines.toml",
         short: &["tissue.size_mm=[16.0, 12.0, 8.0]", "motion.phase.0.depth_mm=4.0"],
-        parts: &[TOOL],
+        parts: &[Part { label: "ring", ..TOOL }, OPENED],
         spread: None,
         cure: NO_QUARTIC,
     },
@@ -188,7 +195,7 @@ pub const CASES: &[Case] = &[
         hard: "entry at 80 degrees",
         scene: "hard/glancing.toml",
         short: &["tissue.size_mm=[22.0, 12.0, 6.0]", "motion.phase.0.depth_mm=5.0"],
-        parts: &[TOOL],
+        parts: &[Part { label: "ring", ..TOOL }, Part { expected: BALANCED_WITH_TOOL, ..OPENED }],
         spread: None,
         cure: NO_QUARTIC,
     },
@@ -203,7 +210,7 @@ pub const CASES: &[Case] = &[
             "motion.phase.2.depth_mm=4.0",
             "solver.mass_scaling=4000",
         ],
-        parts: &[TOOL],
+        parts: &[Part { label: "ring", ..TOOL }, OPENED],
         spread: None,
         cure: NO_QUARTIC,
     },
@@ -221,7 +228,7 @@ pub const CASES: &[Case] = &[
         hard: "sudden reversals",
         scene: "hard/reversal.toml",
         short: SHORT_REVERSALS,
-        parts: &[TOOL],
+        parts: &[Part { label: "ring", ..TOOL }, OPENED],
         spread: None,
         cure: NO_QUARTIC,
     },
@@ -242,7 +249,7 @@ pub const CASES: &[Case] = &[
         hard: "100 mm/s",
         scene: "hard/stab.toml",
         short: &[SMALL, "motion.phase.0.depth_mm=5.0"],
-        parts: &[TOOL],
+        parts: &[Part { label: "ring", ..TOOL }, OPENED],
         spread: None,
         cure: Cure::Switch { what: "mass that waves cross", overrides: &["solver.mass_scaling=10000"] },
     },
