@@ -62,8 +62,9 @@ const COARSE: &str = "tissue.cell_size_mm=1.0";
 #[test]
 fn needle_scenes_go_on_bit_for_bit() {
     for engine in engines() {
-        // 2 mm/s and 60 frames a second: the tip is in from frame 80 on.
-        assert_goes_on("muscle_biopsy.toml", &[COARSE], engine, 90, 100);
+        // 2 mm/s and 60 frames a second: the tip is in from frame 80 on, and on the opened path from 145 on.
+        assert_goes_on("calibrated/muscle_biopsy.toml", &[COARSE], engine, 90, 100);
+        assert_goes_on("muscle_biopsy.toml", &[COARSE], engine, 150, 156);
         // The image of the CPU engine is its whole state; that of the GPU engine is a list of buffers.
         if engine == EngineChoice::Cpu {
             continue;

@@ -208,7 +208,7 @@ const SCENES: [(&str, &[&str]); 19] = [
     ("anatomy/neck_vein.toml", &["tissue.cell_size_mm=1.8"]),
     ("lv2022/hollow.toml", &[COARSE, FAST]),
     (
-        "muscle_biopsy.toml",
+        "calibrated/muscle_biopsy.toml",
         &["tissue.cell_size_mm=1.6", "motion.phase.0.depth_mm=5.0", "motion.phase.0.speed_mm_s=10.0"],
     ),
     ("opening.toml", &["tissue.cell_size_mm=1.6", "motion.phase.0.depth_mm=7.0", "motion.phase.0.speed_mm_s=10.0"]),
@@ -245,10 +245,10 @@ const SCENES: [(&str, &[&str]); 19] = [
     ("effects/plasticity.toml", &[]),
     ("effects/viscoelastic.toml", &[]),
     ("effects/fibres.toml", &[]),
-    ("muscle_biopsy.toml", &["tissue.cell_size_mm=1.6", UNDER_GRAVITY, "motion.phase.0.depth_mm=5.0", FAST]),
+    ("calibrated/muscle_biopsy.toml", &["tissue.cell_size_mm=1.6", UNDER_GRAVITY, "motion.phase.0.depth_mm=5.0", FAST]),
     // Points that f64 carries, for the fibres.
     ("opening.toml", &["tissue.cell_size_mm=1.6", WITH_FIBRES, "fibres.k2=0.001", "motion.phase.0.depth_mm=5.0", FAST]),
-    ("muscle_biopsy.toml", &["tissue.cell_size_mm=1.6", WITH_ALL, SLOW_FAILURE, "motion.phase.0.depth_mm=5.0", FAST]),
+    ("calibrated/muscle_biopsy.toml", &["tissue.cell_size_mm=1.6", WITH_ALL, SLOW_FAILURE, "motion.phase.0.depth_mm=5.0", FAST]),
 ];
 
 const SLOW_FAILURE: &str = "damage={failure_displacement_mm=2.0}";
@@ -331,8 +331,8 @@ fn cells_are_measured_as_by_the_f64_engine() {
 fn no_bit_hangs_on_the_number_of_threads() {
     // Cells enough for seven threads.
     for (name, changes) in [
-        ("muscle_biopsy.toml", &["tissue.cell_size_mm=0.65", FAST][..]),
-        ("muscle_biopsy.toml", &["tissue.cell_size_mm=0.65", FAST, WITH_ALL, SLOW_FAILURE]),
+        ("calibrated/muscle_biopsy.toml", &["tissue.cell_size_mm=0.65", FAST][..]),
+        ("calibrated/muscle_biopsy.toml", &["tissue.cell_size_mm=0.65", FAST, WITH_ALL, SLOW_FAILURE]),
         ("lv2022/hollow.toml", &["tissue.cell_size_mm=0.7", FAST]),
         ("opening.toml", &["tissue.cell_size_mm=0.52", FAST]),
     ] {
@@ -355,7 +355,7 @@ fn no_bit_hangs_on_the_number_of_threads() {
 #[test]
 fn a_checkpoint_of_lanes_goes_on_in_lanes_only() {
     for changes in [&["tissue.cell_size_mm=2.0"][..], &["tissue.cell_size_mm=2.0", WITH_ALL, SLOW_FAILURE, FAST]] {
-        goes_on_in_lanes_only(&|| scene("muscle_biopsy.toml", changes));
+        goes_on_in_lanes_only(&|| scene("calibrated/muscle_biopsy.toml", changes));
     }
 }
 

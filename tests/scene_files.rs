@@ -15,7 +15,7 @@ fn repository() -> PathBuf {
 }
 
 fn main_scene() -> PathBuf {
-    repository().join("scenes/muscle_biopsy.toml")
+    repository().join("scenes/calibrated/muscle_biopsy.toml")
 }
 
 /// All scene files below `folder`.

@@ -249,7 +249,7 @@ fn vibrating_insertions_keep_the_account() {
 /// stiffness alone, the needle swings up within twenty frames and the run is stopped at 3.6 mm.
 #[test]
 fn heavy_tissue_does_not_shake_the_needle() {
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/muscle_biopsy.toml");
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/calibrated/muscle_biopsy.toml");
     let overrides = [
         r#"effects=["puncture", "friction", "mass_scaling", "flexible_needle"]"#,
         "solver.mass_scaling=12000",

@@ -113,7 +113,7 @@ fn an_insertion_with_every_effect_keeps_its_energy() {
     let all = "effects=[\"mass_scaling\",\"gravity\",\"plasticity\",\"fibres\",\"viscoelastic\",\"damage\",\"puncture\",\"friction\"]";
     let overrides =
         [all, "damage.failure_displacement_mm=0.5", "motion.phase.0.depth_mm=4.0", "motion.phase.2.depth_mm=3.0"];
-    let run = run("muscle_biopsy.toml", &overrides, best_engine());
+    let run = run("calibrated/muscle_biopsy.toml", &overrides, best_engine());
     run.assert_sound();
     let energy = run.last().energy;
     assert!(energy.plastic > 0.0 && energy.viscous > 0.0, "{energy:?}");

@@ -39,7 +39,9 @@ fn the_force_has_the_shape_of_a_puncture() {
     let f = &run.figures;
     println!("{f:?}");
     let depth = f.puncture_depth.expect("no puncture peak");
-    assert!((1e-3..=4e-3).contains(&depth), "first peak at {depth} m");
+    assert!((4e-3..=5.5e-3).contains(&depth), "first peak at {depth} m");
+    // (n + 1) F_tip of the theory: docs/opening.md.
+    assert_near("puncture force [N]", f.puncture_force.unwrap(), 0.565, 0.02);
     // `force_after_puncture` is the smallest force within 0.5 mm after the peak.
     let drop = f.drop_fraction.unwrap();
     assert!(drop >= 0.20, "the force falls by {drop}");
@@ -47,8 +49,10 @@ fn the_force_has_the_shape_of_a_puncture() {
     assert!(r2 >= 0.95, "R2 of the line from 5 mm to 12 mm: {r2}");
     assert!(f.slope_after_puncture.unwrap() > 0.0);
     let (largest, end) = (f.peak_force.unwrap(), f.force_at_max_depth.unwrap());
-    assert!((1.2..=1.4).contains(&largest), "largest force {largest} N");
-    assert!((1.2..=1.4).contains(&end), "force at 12 mm {end} N");
+    assert!((1.05..=1.2).contains(&largest), "largest force {largest} N");
+    assert!((1.05..=1.2).contains(&end), "force at 12 mm {end} N");
+    // Normal force of the theory times the coefficient of friction.
+    assert_near("slope of the force [N/m]", f.slope_after_puncture.unwrap(), 116.0, 0.05);
     assert!((f.max_depth.unwrap() - 12e-3).abs() < 1e-4);
     // The largest force comes at the end, not at the puncture.
     let at = run.records.iter().find(|r| r.force.axial == largest).unwrap().depth;
@@ -88,7 +92,7 @@ fn energies_stay_in_balance() {
         s.clamped_nodes,
         s.inverted_cells
     );
-    assert!(s.energy_imbalance <= 0.02, "energy imbalance {}", s.energy_imbalance);
+    assert!(s.energy_imbalance <= 0.002, "energy imbalance {}", s.energy_imbalance);
     assert!(s.kinetic_to_internal <= 0.05, "kinetic over internal energy {}", s.kinetic_to_internal);
     assert!(s.hourglass_to_internal <= 0.05, "hourglass over internal energy {}", s.hourglass_to_internal);
     assert_eq!(s.clamped_nodes, 0);
@@ -126,7 +130,7 @@ fn both_engines_give_the_same_force() {
     } else {
         let coarse = [
             "tissue.cell_size_mm=1.0",
-            "motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 4.0}, {kind = \"withdraw\", speed_mm_s = 2.0, depth_mm = 3.0}]",
+            "motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 6.0}, {kind = \"withdraw\", speed_mm_s = 2.0, depth_mm = 5.0}]",
         ];
         let on = |engine| axial(&run(SCENE, &coarse, engine).records);
         (on(EngineChoice::Gpu), on(EngineChoice::Cpu))
@@ -147,9 +151,9 @@ fn both_engines_give_the_same_force() {
     assert!(a.max(b) > 0.02, "{a} {b}");
 }
 
-/// Sums of all frames and the final state of the first 4 mm, straight from the engine.
-fn four_millimetres() -> (Vec<FrameSums>, State) {
-    let scene = load(SCENE, &["motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 4.0}]"]);
+/// Sums of all frames and the final state of the first 6 mm, straight from the engine.
+fn six_millimetres() -> (Vec<FrameSums>, State) {
+    let scene = load(SCENE, &["motion.phase=[{kind = \"insert\", speed_mm_s = 2.0, depth_mm = 6.0}]"]);
     let mesh = BlockMesh::for_scene(&scene);
     let model = std::sync::Arc::new(Model::new(scene, mesh));
     let (dt, steps) = choose_step(&model, wave_speed_bound(&model));
@@ -170,9 +174,9 @@ fn two_runs_agree_bit_for_bit() {
     if !has_gpu() {
         return;
     }
-    let (a, state_a) = four_millimetres();
-    let (b, state_b) = four_millimetres();
-    assert_eq!(a.len(), 120);
+    let (a, state_a) = six_millimetres();
+    let (b, state_b) = six_millimetres();
+    assert_eq!(a.len(), 180);
     assert!(a.last().unwrap().impulse.length() > 0.0);
     for (x, y) in a.iter().zip(&b) {
         assert_eq!(x, y);
@@ -194,7 +198,7 @@ fn the_mesh_changes_the_force_by_little() {
     let high = forces.iter().copied().fold(0.0, f64::max);
     let low = forces.iter().copied().fold(f64::INFINITY, f64::min);
     println!("force at 12 mm with 0.8, 0.6, 0.5 mm: {forces:.4?} N, {:.2} %", 100.0 * (high / low - 1.0));
-    assert!(high / low <= 1.10, "{forces:?}");
+    assert!(high / low <= 1.04, "{forces:?}");
 }
 
 #[test]
@@ -204,14 +208,14 @@ fn an_axis_on_grid_lines_changes_the_force_by_little() {
     println!("{:?}", on_lines.figures);
     on_lines.assert_sound();
     let (a, b) = (on_lines.force_at_depth(), usual.figures.force_at_max_depth.unwrap());
-    assert_near("force at 12 mm with the axis on grid lines [N]", a, b, 0.10);
+    assert_near("force at 12 mm with the axis on grid lines [N]", a, b, 0.02);
     let (p, q) = (on_lines.figures.peak_force.unwrap(), usual.figures.peak_force.unwrap());
-    assert_near("largest force with the axis on grid lines [N]", p, q, 0.10);
+    assert_near("largest force with the axis on grid lines [N]", p, q, 0.02);
     // Along the whole way in, as part of the largest force.
     let count = on_lines.records.len();
     let (direct, shifted) = curve_difference(&axial(&on_lines.records), &axial(&usual.records)[..count]);
     println!("along the way: {:.2} %, {:.2} % beside drops, of the largest force", 100.0 * direct, 100.0 * shifted);
-    assert!(shifted <= 0.10, "{shifted}");
+    assert!(shifted <= 0.05, "{shifted}");
 }
 
 #[test]
@@ -221,10 +225,10 @@ fn oblique_entry() {
     run.assert_sound();
     assert!(run.summary.kinetic_to_internal <= 0.05);
     let f = &run.figures;
-    assert!(f.puncture_force.is_some_and(|p| (0.4..0.8).contains(&p)), "the puncture threshold is 0.6 N");
+    assert!(f.puncture_force.is_some_and(|p| (0.4..0.8).contains(&p)), "0.565 N by the theory");
     assert!((f.max_depth.unwrap() - 12e-3).abs() < 1e-4);
-    // Cutting alone takes 0.3 N, and the shaft adds to it.
-    assert!(f.force_at_max_depth.unwrap() > 0.5);
+    // As straight down, less what the shorter way through the top cells carries.
+    assert_near("force at 12 mm [N]", f.force_at_max_depth.unwrap(), 1.12, 0.05);
     // The block and the path are symmetric about the plane y = 0 but for the grid: a force along y is small beside one
     // in the plane of the path.
     let last: Vec<&FrameRecord> = run.records.iter().rev().take(15).collect();

@@ -15,23 +15,24 @@ fn assert_parts(run: &Run) {
 }
 
 #[test]
-fn through_a_phantom_the_force_drops_twice() {
+fn through_a_phantom_the_tip_loses_its_force_and_the_shaft_keeps_its_own() {
     let run = run("phantom_through.toml", &["outputs.pictures_at_depth_mm=[]"], best_engine());
+    run.assert_sound();
     assert_parts(&run);
-    assert!(run.summary.energy_imbalance <= 0.02, "{}", run.summary.energy_imbalance);
-    assert_eq!(run.summary.inverted_cells, 0);
+    assert!(run.summary.energy_imbalance <= 0.002, "{}", run.summary.energy_imbalance);
     let drops = major_drops(&run.records);
     println!("{drops:?}");
-    assert_eq!(drops.len(), 2, "{drops:?}");
     assert_eq!(drops, run.summary.drops);
-    // Entry: within the transition length of the surface. Exit: within the length over which the tip force fades, and
-    // farther on the needle's axis, by the dimple of the entry and the tent under the block.
-    assert!(drops[0].tip_coordinate_m < 0.6e-3 && drops[0].depth_m > 2e-3);
-    assert!((9.4e-3..=10.0e-3).contains(&drops[1].tip_coordinate_m) && drops[1].depth_m > 10.5e-3);
-    // Outside, nothing but the shaft rubs.
-    let force = run.last().force;
-    assert_eq!((force.cutting, force.tip_spreading), (0.0, 0.0), "{force:?}");
-    assert!(force.friction > 0.2);
+    assert!(drops[0].tip_coordinate_m < 0.1e-3 && drops[0].depth_m > 4e-3);
+    // On the needle's axis the underside is farther: it tents. The cone is 2.5 mm long.
+    let at = |mm: f64| run.records.iter().find(|r| r.depth > mm * 1e-3).unwrap();
+    let (inside, out, passed) = (at(10.0), at(11.2), at(15.5));
+    assert!(inside.force.cutting > 0.04 && inside.force.tip_spreading > 0.09, "{:?}", inside.force);
+    assert!(out.force.cutting == 0.0 && out.force.tip_spreading > 0.08, "{:?}", out.force);
+    assert!(passed.force.tip_spreading.abs() < 1e-3, "{:?}", passed.force);
+    // Nothing more to rub on.
+    assert_near("force at the end [N]", run.last().force.axial, passed.force.friction, 1e-2);
+    assert!(run.last().force.friction > 0.8);
 }
 
 #[test]
@@ -47,13 +48,12 @@ fn every_membrane_has_its_drop_at_its_depth() {
         assert!(drop.depth_m > top + 1e-3, "the surface follows the tip: {drop:?}");
     }
     // The tip is in a membrane or it is not: one of the two parts is the force of the tip, but for a frame in between.
-    assert!(run.records.iter().any(|r| r.force.membrane > 0.5));
-    assert!(run.records.iter().any(|r| r.force.cutting > 0.2 && r.force.membrane == 0.0));
+    assert!(run.records.iter().any(|r| r.force.membrane > 0.3));
     let between = |r: &FrameRecord| (5.0e-3..8.0e-3).contains(&r.tip_coordinate);
     let frames: Vec<_> = run.records.windows(2).filter(|pair| pair.iter().all(between)).map(|pair| &pair[1]).collect();
     assert!(frames.len() > 10, "{} frames between two membranes", frames.len());
     for r in frames {
-        assert!(r.force.membrane.abs() < 1e-9 && r.force.cutting > 0.2, "{:?}", r.force);
+        assert!(r.force.membrane.abs() < 1e-9 && r.force.cutting > 0.04, "{:?}", r.force);
     }
 }
 

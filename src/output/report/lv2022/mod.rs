@@ -9,6 +9,7 @@ mod unknown;
 
 use super::CaseResults;
 use super::words::{and, plain};
+use crate::effects::puncture::SchemeWord;
 use crate::output::page::{document, escape, table, words};
 use crate::output::plot::Plot;
 use crate::output::summary::Status;
@@ -226,6 +227,11 @@ fn speed_of(case: &CaseResults) -> String {
 }
 
 /// True where no law of the scene depends on a rate.
+/// True where the tip forces follow from the tissue: the scheme `opening`, in which nothing is calibrated.
+fn predicts(scene: &Scene) -> bool {
+    scene.effects.puncture.is_some_and(|p| p.scheme == SchemeWord::Opening && !p.puncture_stated && !p.cutting_stated)
+}
+
 fn rate_free(scene: &Scene) -> bool {
     let effects = &scene.effects;
     effects.viscoelastic.is_none() && effects.puncture.is_none_or(|p| p.rate_exponent == 0.0)

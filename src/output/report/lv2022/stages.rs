@@ -7,8 +7,8 @@ use crate::units::trimmed;
 
 /// Depths of Fig. 11 [m].
 const SPEED_PICTURES: [f64; 4] = [3e-3, 6e-3, 9e-3, 12e-3];
-/// Stages of Fig. 9 and the depths at which they are drawn here [m].
-const STAGES: [(f64, &str); 3] = [(0.5e-3, "first contact"), (3e-3, "tip inside the tissue"), (5e-3, "needle inside")];
+/// Depths at which the stages of Fig. 9 are drawn here [m].
+const STAGES: [f64; 3] = [0.5e-3, 3e-3, 5e-3];
 
 impl Report {
     pub(super) fn stages(&self) -> String {
@@ -18,7 +18,14 @@ impl Report {
         let mut text = String::from(
             "<div class=\"scroll\"><div class=\"pictures\" style=\"grid-template-columns: repeat(3, 1fr)\">\n",
         );
-        for (depth, name) in STAGES {
+        let broke_through = case.summary.puncture_depth_m.unwrap_or(f64::INFINITY);
+        for (number, depth) in STAGES.into_iter().enumerate() {
+            let name = match number {
+                0 => "first contact",
+                _ if depth < broke_through => "before the puncture",
+                2 if STAGES[1] > broke_through => "needle inside",
+                _ => "tip inside the tissue",
+            };
             let force = force_at(case, depth).map_or(String::new(), |f| format!(", {f:.2} N"));
             let caption = format!("{name}: {} mm{force}", trimmed(depth * 1e3));
             text += &picture_or_gap(case, depth, &caption);

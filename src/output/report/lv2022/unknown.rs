@@ -1,7 +1,7 @@
 //! What the paper leaves open, and what this model does not show.
 
 use super::force::largest_difference;
-use super::{Report, Role, rate_free};
+use super::{Report, Role, predicts, rate_free};
 use crate::needle::{TipShape, Tool};
 use crate::output::page::{escape, table, words};
 use crate::output::report::words::and;
@@ -66,15 +66,26 @@ impl Report {
         let materials = std::iter::once(&case.scene.material).chain(case.scene.regions.iter().map(|r| &r.material));
         if materials.into_iter().all(|material| material.membrane_energy.is_none()) {
             items.push(
-                "An outer membrane (\"biological valve\"). The larger force that opens the surface stands for it."
-                    .into(),
+                match predicts(&case.scene) {
+                    true => {
+                        "An outer membrane (\"biological valve\"). The surface opens at three times the steady force of the tip, as \
+                         the same tissue does under a cone that has not entered it."
+                    }
+                    false => {
+                        "An outer membrane (\"biological valve\"). The larger force that opens the surface stands for it."
+                    }
+                }
+                .into(),
             );
         }
-        items.push(
-            "Separated faces. The opened path is softened cells and a ring of nodes that the needle pushes aside; a gap \
-             between tissue and needle that widens with speed (Fig. 11) cannot appear."
-                .into(),
-        );
+        let path = match predicts(&case.scene) {
+            true => "tissue that lies on the needle",
+            false => "softened cells and a ring of nodes that the needle pushes aside",
+        };
+        items.push(format!(
+            "Separated faces. The opened path is {path}; a gap between tissue and needle that widens with speed (Fig. 11) \
+             cannot appear."
+        ));
         if !on("flexible_needle") {
             items.push(
                 "A flexible needle, its weight and the vibration of the platform, by which the paper explains its region Z."
@@ -151,9 +162,7 @@ fn of_tissue(scene: &Scene, rows: &mut Rows) {
         },
     );
     if let (Some(p), Some(Tool::Needle(needle))) = (&effects.puncture, &scene.tool) {
-        rows.add(
-            "separation law",
-            "\"bilinear cohesion model\" without strength, stiffness or energy",
+        let calibrated = || {
             format!(
                 "the tip needs {} N to open the surface and {} N to cut on ({:.0} J/m^2 over the diameter), falling \
                  over {} mm; cells within {} mm of its path keep {} % of their stiffness",
@@ -163,8 +172,19 @@ fn of_tissue(scene: &Scene, rows: &mut Rows) {
                 trimmed(p.transition_length * 1e3),
                 trimmed(p.softened_radius * 1e3),
                 trimmed(p.residual_stiffness * 100.0)
-            ),
-        );
+            )
+        };
+        let law = match scene.material.toughness {
+            Some(toughness) if predicts(scene) => {
+                format!(
+                    "a slit that costs {} J/m^2, as long as makes the force of the tip least; the surface opens at three \
+                     times that force",
+                    trimmed(toughness)
+                )
+            }
+            _ => calibrated(),
+        };
+        rows.add("separation law", "\"bilinear cohesion model\" without strength, stiffness or energy", law);
     }
     rows.add("density of the tissue", "not printed", format!("{} kg/m^3", trimmed(scene.material.density)));
     rows.add(
