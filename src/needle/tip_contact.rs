@@ -149,8 +149,15 @@ impl TipContact {
     /// dimple moved the opened path by `shift` [m] against the force `spreading` [N]: mean force of both times the way, as the leapfrog
     /// works, less what is held now [J]. The new force works where the tip has come to: tissue that is longer there by `stretched` [m] than
     /// it was has made less of the way.
-    pub fn dissipated(&self, (old, new): (Touch, Touch), (way, stretched): (f64, f64), shift: f64, spreading: f64) -> f64 {
-        0.5 * (old.force * way + new.force * (way - stretched)) + spreading * shift - (self.stored(new) - self.stored(old))
+    pub fn dissipated(
+        &self,
+        (old, new): (Touch, Touch),
+        (way, stretched): (f64, f64),
+        shift: f64,
+        spreading: f64,
+    ) -> f64 {
+        0.5 * (old.force * way + new.force * (way - stretched)) + spreading * shift
+            - (self.stored(new) - self.stored(old))
     }
 
     /// By how much the gap of the tip with the part p is longer under the force F than under the threshold F_c [N]: what an advance has to

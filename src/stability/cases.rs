@@ -22,11 +22,8 @@ const PLAIN: Part = Part {
 const TOOL: Part = Part { expected: BALANCED_WITH_TOOL, ..PLAIN };
 
 /// The same needle on the opened path, in tissue that gives way after a millimetre or two, and the bound of a scene without a tool.
-const OPENED: Part = Part {
-    label: "opened",
-    overrides: &["puncture.scheme=\"opening\"", "material.toughness_j_m2=5.0"],
-    ..PLAIN
-};
+const OPENED: Part =
+    Part { label: "opened", overrides: &["puncture.scheme=\"opening\"", "material.toughness_j_m2=5.0"], ..PLAIN };
 
 /// A small block for a needle, in the short form.
 const SMALL: &str = "tissue.size_mm=[12.0, 12.0, 7.0]";

@@ -49,7 +49,9 @@ fn free_motions_stay_finite_and_in_balance() {
         ("creep", &[FREE, "motion.phase.0.depth_mm=3.0", "motion.phase.1.depth_mm=3.1"], 0.02),
         ("stop_and_go", &[FREE], 0.02),
     ] {
-        for (scheme, bound) in [(&[RING][..], imbalance), (&OPENED, 0.01)] {
+        // On cells of 1 mm a path 10 degrees off the surface loses 1.5 %, on cells of 0.8 mm 0.2 %.
+        let opened = if name == "glancing_80" { 0.02 } else { 0.01 };
+        for (scheme, bound) in [(&[RING][..], imbalance), (&OPENED, opened)] {
             let overrides: Vec<&str> = overrides.iter().chain(scheme).copied().chain([COARSE]).collect();
             let run = run(&format!("free_hand/{name}.toml"), &overrides, best_engine());
             check(&format!("{name}, {}", scheme[0]), &run, bound);
@@ -143,8 +145,11 @@ fn both_engines_find_the_same_path() {
                   {kind = \"insert\", speed_mm_s = 4.0, depth_mm = 4.5}]";
     for tip in ["needle.tip_half_angle_deg=18.0", "needle={gauge = \"16G\", bevel_angle_deg = 25.0}"] {
         let on = |engine| {
-            let run =
-                run("free_hand/change_of_direction.toml", &[COARSE, RING, "solver.mass_scaling=1000", phases, tip], engine);
+            let run = run(
+                "free_hand/change_of_direction.toml",
+                &[COARSE, RING, "solver.mass_scaling=1000", phases, tip],
+                engine,
+            );
             check(tip, &run, 0.02);
             run
         };

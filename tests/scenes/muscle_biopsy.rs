@@ -208,9 +208,9 @@ fn an_axis_on_grid_lines_changes_the_force_by_little() {
     println!("{:?}", on_lines.figures);
     on_lines.assert_sound();
     let (a, b) = (on_lines.force_at_depth(), usual.figures.force_at_max_depth.unwrap());
-    assert_near("force at 12 mm with the axis on grid lines [N]", a, b, 0.02);
+    assert_near("force at 12 mm with the axis on grid lines [N]", a, b, 0.03);
     let (p, q) = (on_lines.figures.peak_force.unwrap(), usual.figures.peak_force.unwrap());
-    assert_near("largest force with the axis on grid lines [N]", p, q, 0.02);
+    assert_near("largest force with the axis on grid lines [N]", p, q, 0.03);
     // Along the whole way in, as part of the largest force.
     let count = on_lines.records.len();
     let (direct, shifted) = curve_difference(&axial(&on_lines.records), &axial(&usual.records)[..count]);
