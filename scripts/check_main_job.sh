@@ -17,12 +17,14 @@ check() {
 }
 if [ "$(value status)" = '"ok"' ]; then echo 'ok      status'; else echo "FAILED  status $(value status)"; failed=1; fi
 if [ "$(value engine)" = '"gpu"' ]; then echo 'ok      engine'; else echo "FAILED  engine $(value engine)"; failed=1; fi
-check puncture_depth_m '>=' 0.001
-check puncture_depth_m '<=' 0.004
-check peak_force_n '>=' 1.2
-check peak_force_n '<=' 1.4
+check puncture_depth_m '>=' 0.0045
+check puncture_depth_m '<=' 0.0052
+check puncture_force_n '>=' 0.54
+check puncture_force_n '<=' 0.59
+check peak_force_n '>=' 1.08
+check peak_force_n '<=' 1.2
 check linear_fit_r2 '>=' 0.95
-check energy_imbalance '<=' 0.02
+check energy_imbalance '<=' 0.002
 check kinetic_to_internal '<=' 0.05
 check hourglass_to_internal '<=' 0.05
 check clamped_nodes '==' 0
