@@ -212,6 +212,8 @@ impl Model {
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the outermost anchor, and a path that is laid beside
         // the fine cells has larger ones.
         let outermost = if opening { DISC * needle.radius } else { needle.radius };
+        // The disc of an oblique path is as deep under the surface everywhere: its far side is that much farther along.
+        let ahead = anchors.iter().map(|anchor| anchor.axial_offset).fold(0.0, f64::max);
         let fine = self.scene.tissue.cell_size;
         let reach_at = |node: usize| {
             let edges = mesh.edges_around(node);
@@ -233,7 +235,7 @@ impl Model {
                 let stands = self.composition.held.get(node).is_some_and(|held| *held);
                 let pushed = !stands && (on_slit || s0 < deepest && if cohesive { on_face } else { in_ring });
                 let (aside, below) = reach_at(node);
-                let carries = r0 < outermost + aside && s0 < deepest + below;
+                let carries = r0 < outermost + aside && s0 < deepest + ahead + below;
                 let carrier = ContactNode::carrier(node, r0, s0, volumes[node]);
                 (pushed || carries).then_some(ContactNode { pushed, surface, ..carrier })
             })

@@ -49,9 +49,7 @@ fn free_motions_stay_finite_and_in_balance() {
         ("creep", &[FREE, "motion.phase.0.depth_mm=3.0", "motion.phase.1.depth_mm=3.1"], 0.02),
         ("stop_and_go", &[FREE], 0.02),
     ] {
-        // On cells of 1 mm a path 10 degrees off the surface loses 1.5 %, on cells of 0.8 mm 0.2 %.
-        let opened = if name == "glancing_80" { 0.02 } else { 0.01 };
-        for (scheme, bound) in [(&[RING][..], imbalance), (&OPENED, opened)] {
+        for (scheme, bound) in [(&[RING][..], imbalance), (&OPENED, 0.01)] {
             let overrides: Vec<&str> = overrides.iter().chain(scheme).copied().chain([COARSE]).collect();
             let run = run(&format!("free_hand/{name}.toml"), &overrides, best_engine());
             check(&format!("{name}, {}", scheme[0]), &run, bound);
