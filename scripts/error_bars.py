@@ -43,7 +43,7 @@ def run(stylet, scene, out, *more):
     rows, deepest = [], float("-inf")
     with open(out / "force.csv") as table:
         for row in csv.DictReader(table):
-            depth, force, error = float(row["depth_m"]), float(row["axial_force_n"]), row["force_error_n"]
+            depth, force, error = float(row["depth_m"]), float(row["axial_force_n"]), row.get("force_error_n")
             if depth > deepest:
                 rows.append((depth, force, float(error) if error else None))
                 deepest = depth

@@ -1480,7 +1480,7 @@ fn check_tells_what_toughness_and_law_say() {
         assert!(opening.contains(expected), "no `{expected}` in\n{opening}");
     }
     // Layers: one has no toughness.
-    let unknown = ["region.1.material={preset=\"muscle-relaxed\"}".to_string()];
+    let unknown = ["region.1.material={preset=\"muscle-relaxed\"}", "puncture.scheme=\"ring\""].map(String::from);
     let layers = told(&Scene::load(&repository().join("scenes/layers.toml"), &unknown).unwrap());
     for expected in ["toughness not known: no prediction", "through all layers: no prediction"] {
         assert!(layers.contains(expected), "no `{expected}` in\n{layers}");

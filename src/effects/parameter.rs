@@ -107,7 +107,7 @@ mod tests {
     use std::path::Path;
 
     fn scene(overrides: &[String]) -> Scene {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/muscle_biopsy.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/calibrated/muscle_biopsy.toml");
         Scene::load(&path, overrides).unwrap_or_else(|e| panic!("{e}"))
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::opening::{OpeningInput, OpeningPlan};
 use super::{ContactNode, ContactSurface, FreePlan, LaidPath, Model, tet_puncture};
@@ -212,15 +212,17 @@ impl Model {
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the outermost anchor, and a path that is laid beside
         // the fine cells has larger ones.
         let outermost = if opening { DISC * needle.radius } else { needle.radius };
-        // The disc of an oblique path is as deep under the surface everywhere: its far side is that much farther along.
-        let ahead = anchors.iter().map(|anchor| anchor.axial_offset).fold(0.0, f64::max);
+        // On an oblique path the corners of a cell are farther from one another along it than the cell is long.
         let fine = self.scene.tissue.cell_size;
+        let ahead = path.front_of(&anchors);
+        let is_oblique = path.direction.truncate() != DVec2::ZERO;
         let reach_at = |node: usize| {
             let edges = mesh.edges_around(node);
-            match edges.max_element() > 1.001 * fine {
+            let (aside, below) = match edges.max_element() > 1.001 * fine || is_oblique {
                 true => (edges.length().max(1.5 * fine), 2.0 * edges.z.max(fine)),
                 false => (1.5 * fine, 2.0 * fine),
-            }
+            };
+            (aside, ahead + below.max(path.length_of(edges)))
         };
         let cohesive = self.cohesion.is_some();
         let volumes = self.node_volumes();
@@ -235,7 +237,7 @@ impl Model {
                 let stands = self.composition.held.get(node).is_some_and(|held| *held);
                 let pushed = !stands && (on_slit || s0 < deepest && if cohesive { on_face } else { in_ring });
                 let (aside, below) = reach_at(node);
-                let carries = r0 < outermost + aside && s0 < deepest + ahead + below;
+                let carries = r0 < outermost + aside && s0 < deepest + below;
                 let carrier = ContactNode::carrier(node, r0, s0, volumes[node]);
                 (pushed || carries).then_some(ContactNode { pushed, surface, ..carrier })
             })
@@ -468,6 +470,18 @@ fn tip_anchors(path: &PlannedPath, needle: &NeedleShape, cohesive: bool, case: O
         None => tip_lines(path.direction, needle.radius, turn, !cohesive),
     };
     offsets.into_iter().map(|o| anchor_beside(path, o, case)).collect()
+}
+
+impl PlannedPath {
+    /// How far the lines of anchors begin from the front of the path at most, in its coordinate s0 [m]: skin is no plane.
+    pub(crate) fn front_of(&self, anchors: &[TipAnchor]) -> f64 {
+        anchors.iter().map(|anchor| self.material_coordinates(anchor.surface).1.abs()).fold(0.0, f64::max)
+    }
+
+    /// Largest difference of s0 between two corners of a cell with these edges [m].
+    pub(crate) fn length_of(&self, edges: DVec3) -> f64 {
+        edges.dot(self.normal.abs()) / self.direction.dot(self.normal).abs()
+    }
 }
 
 /// Places across the path of the lines on which the tip acts in the scheme `opening`: each stands for the same part of a disc of the radius

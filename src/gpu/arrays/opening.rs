@@ -345,8 +345,8 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
             _pad: 0.0,
         }));
         let end = tables.entries.len() as u32;
-        // A section begins to open half a spacing before it, and its neighbours feel that.
-        let open_from = (told.cut_from.get(&node).copied().unwrap_or(0.0) - 2.0 * opening.spacing) as f32;
+        // A section begins to open a spacing before it, and its neighbours feel that.
+        let open_from = (told.cut_from.get(&node).copied().unwrap_or(0.0) - 3.0 * opening.spacing) as f32;
         tables.nodes.push(OpeningNode {
             numbers: [owned, first, corners_end, sections_first],
             more: [end, open_from.to_bits(), 0, 0],

@@ -152,15 +152,13 @@ fn puncture_params(model: &Model) -> PunctureParams {
         }
         let mut anchor_reach = match &model.mesh {
             Mesh::Block(block) => {
-                let tallest = block.lines[2].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-                1.001 * tallest / plan.path.direction.z.abs()
+                // An anchor acts on the corners of its cell.
+                let edges = |a: usize| block.lines[a].windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+                let largest = plan.path.length_of(DVec3::new(edges(0), edges(1), edges(2)));
+                1.001 * (largest + plan.path.front_of(&plan.anchors))
             }
             Mesh::Tets(mesh) => 1.001 * plan.anchor_reach(mesh),
         };
-        if let Some((_, mesh)) = model.laid.as_ref().zip(model.mesh.as_block()) {
-            // An anchor acts on the corners of its cell, whichever way the front is turned.
-            anchor_reach = 1.001 * (0..mesh.cell_count()).map(|cell| mesh.cell_size(cell).length()).fold(0.0, f64::max);
-        }
         let (mut free_low, mut free_count, mut path_cell_count) = ([0; 4], [0; 4], plan.cells.len());
         if let Some(free) = &plan.free {
             let mesh = model.mesh.block();

@@ -64,7 +64,9 @@ pub(super) fn unreadable(path: &Path, error: &std::io::Error) -> String {
     });
     let near = near.or_else(|| {
         let near = closest(&meant, own_scenes(OWN).map(stem))?;
-        own_scenes(OWN).find(|scene| stem(scene) == near).map(|scene| format!("{scene} (built in)"))
+        // Of those with the same name the one in the uppermost folder.
+        let named_so = own_scenes(OWN).filter(|scene| stem(scene) == near);
+        named_so.min_by_key(|scene| scene.matches('/').count()).map(|scene| format!("{scene} (built in)"))
     });
     let listed = named.unwrap_or(Path::new(OWN));
     let scenes = toml_files(listed);
