@@ -91,18 +91,24 @@ fn a_needle_that_turns_cuts_on_along_itself_and_loses_no_energy() {
     // The tissue holds what it is turned against, and the tip has gone on to the end.
     assert!(last.force.lateral.x > 0.05, "{:?}", last.force.lateral);
     close("cut", last.tip_coordinate, 9e-3, 0.05);
+    // What the shaft holds by friction after the turn hangs on when the crack ran: a toughness of 164.01 instead of 164 J/m2 gives 2 % less
+    // spreading, in f64 as on the GPU. Without friction nothing is remembered.
+    let slippery = "effects=[\"puncture\", \"mass_scaling\"]";
+    let without = frames(scene(TURN, &[slippery]), EngineChoice::Cpu64);
     let mut engines = vec![EngineChoice::Cpu];
     engines.extend(gpu().map(|_| EngineChoice::Gpu));
     for engine in engines {
-        let found = frames(scene(TURN, &[]), engine);
-        let peak = exact.iter().map(|f| f.force.axial).fold(0.0, f64::max);
-        // While the crack runs it is one step earlier or later.
-        let runs = |f: &FrameRecord| f.phase == 0 && f.depth > 4.5e-3 || f.phase == 2 && f.depth < 7e-3;
-        let pairs = exact.iter().zip(&found).filter(|(f, _)| !runs(f));
-        let apart = pairs.map(|(a, b)| (a.force.axial - b.force.axial).abs()).fold(0.0, f64::max) / peak;
-        println!("{engine:?}: {apart:.1e} of the peak {peak:.3} N apart, imbalance {:.2e}", largest_imbalance(&found));
-        at_most("apart", apart, 0.01);
-        at_most("imbalance", largest_imbalance(&found), 0.01);
+        for (exact, overrides, bound) in [(&exact, &[][..], 0.03), (&without, &[slippery], 1e-3)] {
+            let found = frames(scene(TURN, overrides), engine);
+            let peak = exact.iter().map(|f| f.force.axial).fold(0.0, f64::max);
+            // While the crack runs it is one step earlier or later.
+            let runs = |f: &FrameRecord| f.phase == 0 && f.depth > 4.5e-3 || f.phase == 2 && f.depth < 7e-3;
+            let pairs = exact.iter().zip(&found).filter(|(f, _)| !runs(f));
+            let apart = pairs.map(|(a, b)| (a.force.axial - b.force.axial).abs()).fold(0.0, f64::max) / peak;
+            println!("{engine:?}: {apart:.1e} of the peak {peak:.3} N, imbalance {:.2e}", largest_imbalance(&found));
+            at_most("apart", apart, bound);
+            at_most("imbalance", largest_imbalance(&found), 0.01);
+        }
     }
 }
 
