@@ -18,7 +18,7 @@ const OVERRIDES: [&str; 3] =
     ["tissue.cell_size_mm=1.2", "tissue.size_mm=[14.0, 14.0, 10.0]", "motion.phase.0.depth_mm=6.0"];
 
 fn scene() -> Scene {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/muscle_biopsy.toml");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/calibrated/muscle_biopsy.toml");
     Scene::load(&file, &OVERRIDES.map(String::from)).unwrap()
 }
 
