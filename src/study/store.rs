@@ -91,10 +91,10 @@ impl RunRecord {
         self.simulated_s / self.wall_s.max(1e-9)
     }
 
-    /// Processor time per cell and step [ns].
+    /// Processor time per cell and step [ns]; `None` where it is not known, or less than a tick of 10 ms, by which it is counted.
     pub fn cpu_ns_per_cell_step(&self) -> Option<f64> {
         let cell_steps = self.cells as f64 * self.steps as f64;
-        self.cpu_s.filter(|_| cell_steps > 0.0).map(|cpu| cpu * 1e9 / cell_steps)
+        self.cpu_s.filter(|cpu| cell_steps > 0.0 && *cpu > 0.0).map(|cpu| cpu * 1e9 / cell_steps)
     }
 }
 
