@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The main job in the scheme ring, which knows all effects, with every effect alone, every pair and all together: force, energy and health of each run as a
-# table. Fails where a run fails or misses 2 % of the energy. Takes 10 to 25 minutes on two cores.
+# The main job in the scheme ring, which knows all effects, with every effect alone, every pair and all together: force,
+# energy and health of each run as a table. Fails where a run fails or misses 2 % of the energy. Takes 10 to 25 minutes on two cores.
 # effects_matrix.sh [alone|pairs|all]...   default: all three
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -22,7 +22,8 @@ insertion() {
     fi
     local keys status=ok
     keys=$(printf '"%s",' "${list[@]}")
-    "$program" run scenes/calibrated/muscle_biopsy.toml --force --out "$folder/run" --set "effects=[${keys%,}]" "${more[@]}" >"$folder/log" 2>&1 || status=FAILED
+    "$program" run scenes/calibrated/muscle_biopsy.toml --force --out "$folder/run" --set "effects=[${keys%,}]" \
+        "${more[@]}" >"$folder/log" 2>&1 || status=FAILED
     local imbalance
     imbalance=$(value energy_imbalance)
     awk -v i="$imbalance" 'BEGIN { exit !(i + 0 == i && i <= 0.02 && i >= -0.02) }' || status=FAILED

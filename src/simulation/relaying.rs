@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use glam::DVec2;
+
 use super::Simulation;
 use super::carried::{carried, on_the_same_path};
 use super::change::Change;
 use super::laying::{Found, Laying};
 use super::start::choose_step;
-use glam::DVec2;
-
 use crate::engine::State;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::error::Result;

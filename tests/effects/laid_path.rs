@@ -175,6 +175,21 @@ fn a_checkpoint_keeps_the_line() {
     assert!(apart.is_empty(), "{} frames, the first at {} s", apart.len(), apart[0].0.time);
 }
 
+/// To and fro by 0.4 mm, 40 times: the needle turns round within steps, and what friction takes then is what its way of that step was worth.
+#[test]
+fn a_needle_that_goes_to_and_fro_in_its_track_keeps_its_energy() {
+    let strokes: String = (0..20)
+        .map(|_| "{kind=\"insert\", speed_mm_s=6.4, depth_mm=8.2}, {kind=\"withdraw\", speed_mm_s=6.4, depth_mm=7.8}, ")
+        .collect();
+    let phases = format!("{{kind=\"insert\", speed_mm_s=5.0, depth_mm=8.0}}, {strokes}");
+    let all = frames(scene(&phases, &["puncture.path=\"free\""]), EngineChoice::Cpu);
+    let friction = || all.iter().filter(|f| f.phase > 0).map(|f| f.force.friction);
+    let (low, high) = (friction().fold(f64::INFINITY, f64::min), friction().fold(0.0, f64::max));
+    println!("imbalance {:.2e}, friction {low:.3} to {high:.3} N", largest_imbalance(&all));
+    assert!(high - low > 0.2, "{low} {high}");
+    at_most("imbalance", largest_imbalance(&all), 0.002);
+}
+
 /// A hand that presses fast, shakes and tilts lays its line anew in every frame before the puncture: no step of its work counts twice.
 #[test]
 fn a_hand_that_shakes_on_the_skin_creates_no_energy() {
