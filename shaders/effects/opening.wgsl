@@ -30,7 +30,7 @@ struct OpeningParams {
 // A section of the path. The first three are known before the run. Of a run of cells only the mean of the sections in them: first and end
 // in `lists`, `centre`, `centre_rate` and the part that is cut.
 struct OpeningStation {
-    // Material coordinate Z [m], and that from which it counts as cut; rc over the radius of the needle; w unused.
+    // Material coordinate Z [m], and that from which it counts as cut; rc over the radius of the needle; w: 1 + b of the growth.
     depth: vec4<f32>,
     // Entries of the means over nodes: first, end; entries of the slots that tell of it: first, end.
     lists: vec4<u32>,
@@ -53,7 +53,7 @@ struct OpeningStation {
     // Impulse of the needle on the tissue there in this frame [N s]; w unused.
     impulse: vec4<f32>,
     // On a path that is laid while the needle comes. Rest position from the entry [m] and direction t0 at rest, of a run the mean of the
-    // directions; w unused.
+    // directions; w: f and q of the growth [R^2].
     rest: vec4<f32>,
     rest_direction: vec4<f32>,
     // Middle of the section of the needle from the entry [m]; moment of the forces on nodes about the centre [N m]. w unused.
@@ -130,11 +130,23 @@ fn moment_of(gradient: mat3x3<f32>, offset: vec3<f32>, by_gradient: mat3x3<f32>,
 
 // The path at one place, across it in R.
 struct PathSection {
+    // 1 + b, f and q of the growth of the tissue there: Growth in src/needle/opening.rs.
+    growth: vec3<f32>,
     centre_rate: vec3<f32>,
     radius: f32,
     radius_rate: f32,
     // t0.
     rest_direction: vec3<f32>,
+}
+
+fn section_of(station: OpeningStation) -> PathSection {
+    return PathSection(
+        vec3<f32>(station.depth.w, station.rest.w, station.rest_direction.w),
+        station.centre_rate.xyz,
+        station.centre.w / opening.direction.w,
+        station.centre_rate.w,
+        rest_direction(station),
+    );
 }
 
 struct OpenedPlace {
@@ -181,7 +193,16 @@ fn fade(s: f32) -> vec3<f32> {
     return vec3<f32>(value, first, (0.25 * curvature - 0.5 * first) * inverse);
 }
 
-// v = w/(s + s0) and its derivatives.
+// w m and its derivatives, of w with these.
+fn grown(s: f32, w: vec3<f32>, growth: vec3<f32>) -> vec3<f32> {
+    let q = 1.0 / (s + growth.z);
+    let fall = growth.y * q;
+    let m = growth.x - fall;
+    let m1 = fall * q;
+    return vec3<f32>(w.x * m, w.y * m + w.x * m1, w.z * m + 2.0 * m1 * (w.y - w.x * q));
+}
+
+// v = w m/(s + s0) and its derivatives, of w m with these.
 fn fade_over_area(s: f32, w: vec3<f32>) -> vec3<f32> {
     let a = 1.0 / (s + opening.numbers.z);
     let v = w.x * a;
@@ -192,7 +213,7 @@ fn fade_over_area(s: f32, w: vec3<f32>) -> vec3<f32> {
 // The map at eta [R] with the gradient F_h of y.
 fn opened_place(section: PathSection, eta: vec3<f32>, gradient: mat3x3<f32>) -> OpenedPlace {
     let s = dot(eta, eta);
-    let v = fade_over_area(s, fade(s));
+    let v = fade_over_area(s, grown(s, fade(s), section.growth));
     let rc = section.radius;
     let g = sqrt(1.0 + rc * rc * v.x);
     var out: OpenedPlace;
@@ -214,11 +235,16 @@ fn opened_place(section: PathSection, eta: vec3<f32>, gradient: mat3x3<f32>) -> 
     return out;
 }
 
-// det grad x / det F_h, and its derivatives by s and rc.
-fn dilation(radius: f32, s: f32) -> vec3<f32> {
+// det grad x / det F_h by fading, and its derivatives by s and rc: what growing does to a volume is known before, cell by cell.
+fn dilation(section: PathSection, s: f32) -> vec3<f32> {
     // With s0 = 0: no volume on the path grows without bound.
     let w = fade(s);
-    return vec3<f32>(1.0 + radius * radius * w.y, radius * radius * w.z, 2.0 * radius * w.y);
+    let q = 1.0 / (s + section.growth.z);
+    let fall = section.growth.y * q;
+    let first = w.y * (section.growth.x - fall);
+    let second = w.z * (section.growth.x - fall) + w.y * fall * q;
+    let rc = section.radius;
+    return vec3<f32>(1.0 + rc * rc * first, rc * rc * second, 2.0 * rc * first);
 }
 
 // a b^T.

@@ -6,7 +6,7 @@ struct OpeningCell {
     cell: vec4<u32>,
     // Run of cells that it is of; the others unused.
     stations: vec4<u32>,
-    // Middle of the cell from the entry of the path [m]; one over its edges [1/m]. w unused.
+    // Middle of the cell from the entry of the path [m]; one over its edges [1/m]. w: mean and variance of the growth, over rc^2 [R].
     middle: vec4<f32>,
     inverse: vec4<f32>,
     // Middle of what points do not carry, from the middle of the cell in edges; w: part of the volume.

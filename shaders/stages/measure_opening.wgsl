@@ -30,12 +30,7 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
         for (var i = cluster.points.x; i < end; i++) {
             let point = path_points[i];
             let station = path_stations[point.numbers.x];
-            let section = PathSection(
-                station.centre_rate.xyz,
-                station.centre.w * scale,
-                station.centre_rate.w,
-                rest_direction(station),
-            );
+            let section = section_of(station);
             let p = point.place.xyz;
             let H = strain_at(modes, p, cluster.inverse.xyz);
             let y = cluster.middle.xyz - station.centre.xyz + p / cluster.inverse.xyz + displacement_at(modes, p);
@@ -47,12 +42,7 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
         let cell = near_cells[index];
         let mean = path_stations[opening.counts.x + cell.stations.x];
         for (var once = select(1u, 0u, mean.centre.w > 0.0); once == 0u; once++) {
-            let section = PathSection(
-                mean.centre_rate.xyz,
-                mean.centre.w * scale,
-                mean.centre_rate.w,
-                rest_direction(mean),
-            );
+            let section = section_of(mean);
             let modes = cell_modes(cell.cell.xyz);
             let H = strain_at(modes, vec3<f32>(0.0), cell.inverse.xyz);
             let gradient = deformation_gradient(H);
@@ -62,11 +52,14 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
             var dilated = 0.0;
             for (var i = 0u; i < 4u; i++) {
                 let eta = across(middle + gradient * (volume_place(i) * width)) * scale;
-                dilated += 0.25 * (dilation(section.radius, dot(eta, eta)).x - 1.0);
+                dilated += 0.25 * (dilation(section, dot(eta, eta)).x - 1.0);
             }
+            let area = section.radius * section.radius;
+            dilated += area * cell.middle.w;
             let dj = jacobian_minus_one(H);
             let open = dj + (1.0 + dj) * dilated;
-            energy += 0.5 * materials[cell.cell.w].bulk_modulus * volume * (open * open - dj * dj);
+            energy += 0.5 * materials[cell.cell.w].bulk_modulus * volume
+                * (open * open - dj * dj + (1.0 + dj) * (1.0 + dj) * area * area * cell.inverse.w);
             let eta = across(middle + gradient * (cell.place.xyz * width)) * scale;
             energy += cell.place.w * volume * opened_energy(cell.cell.w, opened_place(section, eta, gradient), H);
         }

@@ -16,16 +16,17 @@ fn opening_cells(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
     // Where nothing was ever cut nothing was ever written. A loop, since software adapters walk through an `if`.
     let run = opening.counts.x + near_cells[index].stations.x;
     for (var once = select(1u, 0u, path_stations[run].place.y > 0.0); once == 0u; once++) {
-        open_cell(index, path_stations[run].centre, path_stations[run].centre_rate, rest_direction(path_stations[run]));
+        open_cell(index, path_stations[run]);
     }
 }
 
-// `centre`, `rate`: the path there, see OpeningStation.
-fn open_cell(index: u32, centre: vec4<f32>, rate: vec4<f32>, along: vec3<f32>) {
+// `path`: the mean of the sections in it.
+fn open_cell(index: u32, path: OpeningStation) {
+    let centre = path.centre;
     let cell = near_cells[index];
     let inverse = cell.inverse.xyz;
     let scale = 1.0 / opening.direction.w;
-    let section = PathSection(rate.xyz, centre.w * scale, rate.w, along);
+    let section = section_of(path);
     let material = materials[cell.cell.w];
     var f: CellModes;
     var sum = OpeningSum();
@@ -50,20 +51,26 @@ fn open_cell(index: u32, centre: vec4<f32>, rate: vec4<f32>, along: vec3<f32>) {
     for (var i = 0u; i < 4u; i++) {
         let p = volume_place(i);
         let eta = middle + lateral * p;
-        let d = dilation(section.radius, dot(eta, eta));
+        let d = dilation(section, dot(eta, eta));
         let by_place = eta * (2.0 * d.y);
         dilated += 0.25 * (d.x - 1.0);
         rates += vec4<f32>(by_place, d.z);
         moments += outer(by_place, p);
     }
+    // What grows near the path, unevenly in the cell.
+    let area = section.radius * section.radius;
+    let uneven = area * area * cell.inverse.w;
+    dilated += area * cell.middle.w;
     let dj = jacobian_minus_one(H);
     let J = 1.0 + dj;
     let open = dj + J * dilated;
     let by_dilation = material.bulk_modulus * open * J * volume * 0.25 * scale;
-    var by_gradient = cof * (material.bulk_modulus * (open * (1.0 + dilated) - dj) * volume);
+    var by_gradient = cof * (material.bulk_modulus * (open * (1.0 + dilated) - dj + J * uneven) * volume);
     by_gradient += mat3x3<f32>(moments[0] * width.x, moments[1] * width.y, moments[2] * width.z) * by_dilation;
     var by_middle = rates.xyz * by_dilation;
     sum.by_centre = vec4<f32>(-rates.xyz, rates.w) * by_dilation;
+    sum.by_centre.w += 2.0 * material.bulk_modulus * J * section.radius * volume * scale
+        * (open * cell.middle.w + J * area * cell.inverse.w);
     // What keeps the shape, of what points do not carry.
     let closed = shape_stress(cell.cell.w, H);
     let p = cell.place.xyz;
@@ -88,7 +95,7 @@ fn open_cell(index: u32, centre: vec4<f32>, rate: vec4<f32>, along: vec3<f32>) {
     let b = dot(inverse, inverse) * 0.0625;
     let cof_b = squared_norm_bound(cof) * b;
     let most = max(1.0 + dilated, 1.0);
-    let with_opening = (material.bulk_modulus + tangent.y) * cof_b * most * most + tangent.x * grown * grown * b;
+    let with_opening = (material.bulk_modulus + tangent.y) * cof_b * (most * most + uneven) + tangent.x * grown * grown * b;
     let without = (material.bulk_modulus + closed.turned_tangent) * cof_b + closed.tangent * b;
     let bound = 8.0 * volume * max(with_opening - without, 0.0);
     f.mean = by_middle;

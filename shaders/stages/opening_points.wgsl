@@ -47,12 +47,7 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     for (var i = first; i < end; i++) {
         let point = path_points[i];
         let station = path_stations[point.numbers.x];
-        let section = PathSection(
-            station.centre_rate.xyz,
-            station.centre.w * scale,
-            station.centre_rate.w,
-            rest_direction(station),
-        );
+        let section = section_of(station);
         let volume = select(0.0, point.place.w, section.radius > 0.0);
         let p = point.place.xyz;
         let H = strain_at(modes, p, inverse);

@@ -103,8 +103,13 @@ impl CpuEngine {
             let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.shaft));
             let (full, slope) = (radius * opened, rate * opened);
             let (cut, cut_rate) = opening.cut(station, a);
-            let section =
-                Station { centre, radius: full * cut, rest_direction: station.direction, ..Station::default() };
+            let section = Station {
+                centre,
+                radius: full * cut,
+                rest_direction: station.direction,
+                growth: station.growth,
+                ..Station::default()
+            };
             Now { section, disc, behind, cut, cut_rate, full, slope, radius, rate }
         });
         for i in 0..now.len() {
@@ -512,7 +517,9 @@ fn near_cell_forces(
         .collect();
     let tangent = material.tangent_bound(h, &PointState::default());
     let (mut straight, mut turned) = (tangent.straight, tangent.turned);
-    let less = at_volume_places.iter().map(|(d, _)| d.less_one).sum::<f64>() / 4.0;
+    let [grows, varies] = near.growth;
+    let rc = section.radius;
+    let less = at_volume_places.iter().map(|(d, _)| d.less_one).sum::<f64>() / 4.0 + rc * rc * grows;
     // What keeps the shape, of what points do not carry.
     if near.share > 0.0 {
         let offset = near.place * width;
@@ -529,8 +536,10 @@ fn near_cell_forces(
     let (closed, cof) = (jacobian_minus_one(h), cofactor(gradient));
     let bulk = material.law.bulk_modulus;
     let open = closed + less + closed * less;
-    energy += shape.volume * 0.5 * bulk * (open - closed) * (open + closed);
-    let by_gradient = cof * (bulk * less * (1.0 + closed + open) * shape.volume);
+    let uneven = rc.powi(4) * varies;
+    energy += shape.volume * 0.5 * bulk * ((open - closed) * (open + closed) + (1.0 + closed).powi(2) * uneven);
+    let by_gradient = cof * (bulk * (less * (1.0 + closed + open) + (1.0 + closed) * uneven) * shape.volume);
+    sum.radius += 2.0 * bulk * shape.volume * rc * (1.0 + closed) * (open * grows + (1.0 + closed) * rc * rc * varies);
     sum.gradient = (DMat3::from_cols_array_2d(&sum.gradient) + by_gradient).to_cols_array_2d();
     for (dilation, offset) in &at_volume_places {
         let (place, radius) = dilation.pull_back(bulk * open * (1.0 + closed));
@@ -540,7 +549,7 @@ fn near_cell_forces(
     let b = 0.25 / width;
     let b = b.length_squared();
     let cof_b = squared_norm_bound(&cof.to_cols_array_2d()) * b;
-    let with = (bulk + turned) * cof_b * (1.0 + less).max(1.0).powi(2) + straight * grown * grown * b;
+    let with = (bulk + turned) * cof_b * ((1.0 + less).max(1.0).powi(2) + uneven) + straight * grown * grown * b;
     let without = (bulk + tangent.turned) * cof_b + tangent.straight * b;
     let mut forces = CellForces { bound: [8.0 * shape.volume * (with - without).max(0.0); 8], ..CellForces::default() };
     let (by_gradient, by_place) = (DMat3::from_cols_array_2d(&sum.gradient), DVec3::from(sum.place));

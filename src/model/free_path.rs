@@ -12,6 +12,7 @@ use crate::mesh::material_place::within_block;
 use crate::needle::free_path::{AS_BEFORE, FreeTip, NO_SKIN};
 use crate::needle::gap::Profile;
 use crate::needle::motion::Placement;
+use crate::needle::opening::Growth;
 use crate::needle::{NeedleShape, PlannedPath, lateral_axes};
 
 /// Room around the planned motion for the nodes and cells of a free path: tissue moves before the tip comes [m].
@@ -171,6 +172,7 @@ impl Model {
                 transition_length: params.transition_length,
                 membrane: false,
                 hole: 0.0,
+                growth: Growth::default(),
                 shear_wave_speed: 0.0,
             }],
             exit: f64::INFINITY,

@@ -9,7 +9,7 @@ use crate::effects::puncture::LEAST_TRAVELS;
 use crate::mesh::{BlockMesh, CORNERS, trilinear};
 use crate::needle::NeedleShape;
 use crate::needle::lateral_axes;
-use crate::needle::opening::OpeningMap;
+use crate::needle::opening::{Growth, OpeningMap};
 use crate::needle::path_line::PathLine;
 
 /// Distance between stations, in needle radii.
@@ -87,8 +87,9 @@ pub struct OpeningStation {
     pub centre: Mean,
     pub disc: Mean,
     pub points: Vec<PathPoint>,
-    /// Rest radius of the hole that the slit of the tip acts like [m].
+    /// Rest radius of the hole that the slit of the tip acts like [m], and how the tissue around it changes its volume.
     pub hole: f64,
+    pub growth: Growth,
 }
 
 impl OpeningStation {
@@ -113,6 +114,8 @@ pub struct NearCell {
     /// Part of its volume that points do not carry, and the middle of that part, from the middle of the cell in edges.
     pub share: f64,
     pub place: DVec3,
+    /// By how much its volume grows around an open path, over rc^2: mean [1/m^2] and variance [1/m^4] in the cell.
+    pub growth: [f64; 2],
     /// First station of those that lie in it, and their number.
     pub first: u16,
     pub count: u16,
@@ -220,8 +223,8 @@ pub struct OpeningInput<'a> {
     pub p_wave_modulus: f64,
     /// Largest way of a node in a step [m].
     pub node_way: f64,
-    /// Rest radius of the hole at a material coordinate [m].
-    pub hole: &'a dyn Fn(f64) -> f64,
+    /// Rest radius of the hole at a material coordinate [m], and how the tissue around it changes its volume.
+    pub hole: &'a dyn Fn(f64) -> (f64, Growth),
 }
 
 /// Collects the nodes of a station.
@@ -306,7 +309,8 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, ne
     let depth = (f64::from(number) + 0.5) * spacing;
     let direction = input.line.piece(depth).direction;
     let (e1, e2) = lateral_axes(direction);
-    let hole = (input.hole)(depth).min(0.9 * near);
+    let (hole, growth) = (input.hole)(depth);
+    let hole = hole.min(0.9 * near);
     let middle = input.line.point(depth);
     let at = |r: f64, part: f64| {
         let angle = std::f64::consts::TAU * part;
@@ -356,7 +360,7 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, ne
             });
         }
     }
-    OpeningStation { depth, middle, direction, nodes: nodes.list, centre, disc, points, hole }
+    OpeningStation { depth, middle, direction, nodes: nodes.list, centre, disc, points, hole, growth }
 }
 
 fn clusters_of(stations: &[OpeningStation]) -> Vec<Cluster> {
@@ -411,11 +415,43 @@ fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: 
             let (from, to) = (index(s - half), index(s + half));
             let nearest = (((s - first) / plan.spacing).max(0.0) as usize).min(last);
             let (from, to) = if to > from { (from, to) } else { (nearest, nearest + 1) };
-            Some(NearCell { cell: cell as u32, share, place, first: from as u16, count: (to - from) as u16 })
+            Some(NearCell {
+                cell: cell as u32,
+                share,
+                place,
+                growth: [0.0; 2],
+                first: from as u16,
+                count: (to - from) as u16,
+            })
         })
         .collect();
     cells.sort_by_key(|near| (near.first, near.count));
+    let grown = growth_in_cells(&plan.stations);
+    for near in &mut cells {
+        let station = &plan.stations[usize::from(near.first + near.count / 2)];
+        let (cell, size) = (near.cell as usize, mesh.cell_size(near.cell as usize));
+        let at = mesh.rest_position(mesh.cell_nodes(cell)[0]) + (near.place + 0.5) * size;
+        let rest = station.growth.rate(coordinates(at).0.powi(2));
+        let [first, second] = grown.get(&near.cell).copied().unwrap_or_default();
+        let volume = size.element_product();
+        let mean = first / volume + near.share * rest;
+        near.growth = [mean, (second / volume + near.share * rest * rest - mean * mean).max(0.0)];
+    }
     cells
+}
+
+/// What the points in every cell say of its growth: sums of rates dm/ds and of their squares times volumes.
+fn growth_in_cells(stations: &[OpeningStation]) -> BTreeMap<u32, [f64; 2]> {
+    let mut sums: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
+    for station in stations {
+        for point in &station.points {
+            let rate = station.growth.rate((point.place - station.middle).length_squared());
+            let [first, second] = sums.entry(point.cell).or_default();
+            *first += point.volume * rate;
+            *second += point.volume * rate * rate;
+        }
+    }
+    sums
 }
 
 /// Mean of `y = X + u` over nodes, from the rest positions and displacements of all.

@@ -12,6 +12,7 @@ use crate::effects::{TissueMaterial, puncture};
 use crate::mesh::{BlockMesh, Bore};
 use crate::mesh::{Mesh, TetLine};
 use crate::needle::gap::Profile;
+use crate::needle::opening::Growth;
 use crate::needle::path_line::PathLine;
 use crate::needle::slit::REFERENCE_EDGE;
 use crate::needle::tip_contact::{DISC, TipContact};
@@ -75,6 +76,8 @@ pub struct PathSegment {
     pub membrane: bool,
     /// Rest radius of the hole that the slit of the tip acts like, in the scheme `opening` [m].
     pub hole: f64,
+    /// How the tissue around it changes its volume.
+    pub growth: Growth,
     /// Speed of shear waves there, with the scaled mass [m/s].
     pub shear_wave_speed: f64,
 }
@@ -315,7 +318,10 @@ impl Model {
                 shear_modulus: self.scene.material.law.shear_modulus(),
                 p_wave_modulus: self.scene.material.law.p_wave_modulus(),
                 node_way: self.speed_limit(1.0),
-                hole: &|depth| plan.segment(depth.max(0.0)).hole,
+                hole: &|depth| {
+                    let segment = plan.segment(depth.max(0.0));
+                    (segment.hole, segment.growth)
+                },
             },
         );
         let below = line.point(SEGMENT_STEP);
@@ -425,6 +431,7 @@ impl Model {
             transition_length: params.transition_length,
             membrane: material.membrane_energy.is_some(),
             hole: UNKNOWN_HOLE * needle.radius,
+            growth: Growth::default(),
             shear_wave_speed: (material.law.shear_modulus() / (material.density * self.mass_scaling())).sqrt(),
         };
         let opening = params.scheme == SchemeWord::Opening;
@@ -436,6 +443,7 @@ impl Model {
                 segment.cutting.puncture_force = segment.cutting.cutting_force;
             }
             segment.hole = steady.hole_radius;
+            segment.growth = steady.growth(&material.law).unwrap_or_default();
             // The crack forms over its own length, which is not finer than the tip advances.
             segment.transition_length = steady.crack_half_length.max(puncture::LARGEST_ADVANCE);
         }

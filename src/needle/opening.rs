@@ -4,10 +4,12 @@
 //! path only:
 //! ```text
 //! eta = (y - c) - t t.(y - c),  s = |eta|^2
-//! x = y + (g - 1) eta,  g^2 = 1 + rc^2 v(s),  v = w(sqrt(s)) / (s + s0)
+//! x = y + (g - 1) eta,  g^2 = 1 + rc^2 v(s),  v = w(sqrt(s)) m(s) / (s + s0)
 //! w = 1 up to 2R, then a quintic to 0 at 4R
+//! m = 1 + b - f/(s + q)
 //! ```
-//! With `w = 1` the map keeps every volume: a hole of no width becomes one of the radius rc. The path at the material coordinate Z has its
+//! With `w m = 1` the map keeps every volume: a hole of no width becomes one of the radius rc. The growth m is what tissue that changes
+//! its volume does around such a hole ([`Growth`]), on a scale that no cell resolves; it is 1 where the hole begins. The path at the material coordinate Z has its
 //! centre in c(Z) and its radius in rc(Z), so with `H = P F_h - c_Z t0^T` (P takes out the part along t, F_h = grad y)
 //! ```text
 //! F = grad x = F_h + (g - 1) H + 2 g' eta (H^T eta)^T + g_rc rc_Z eta t0^T,   g' = dg/ds,  g_rc = dg/drc
@@ -27,6 +29,38 @@ pub const EXACT: f64 = 2.0;
 /// See [`EXACT`].
 pub const FADED: f64 = 4.0;
 
+/// How the tissue around the hole changes its volume: by `m = 1 + b - f/(s + q)` times `rc^2` more area lies within s than that of the hole and
+/// the tissue at rest. Around a narrow hole tissue is stretched so far that its volume grows: by 5 % of the hole at Poisson's ratio 0.47, most of it
+/// within a third of a radius.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Growth {
+    /// b: far from the path.
+    pub gain: f64,
+    /// f and q [m^2].
+    pub fall: f64,
+    pub reach: f64,
+}
+
+impl Default for Growth {
+    fn default() -> Self {
+        Growth { gain: 0.0, fall: 0.0, reach: 1.0 }
+    }
+}
+
+impl Growth {
+    /// Around a hole of the rest radius `hole` [m], half of the gain within the distance `half` [m].
+    pub fn new(gain: f64, hole: f64, half: f64) -> Self {
+        let root = hole * hole;
+        let reach = (half * half - 2.0 * root).max(0.1 * root);
+        Growth { gain, fall: gain * (root + reach), reach }
+    }
+
+    /// dm/ds at the square s of the distance [1/m^2].
+    pub fn rate(&self, s: f64) -> f64 {
+        self.fall / (s + self.reach).powi(2)
+    }
+}
+
 /// The path at one material coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Station {
@@ -38,12 +72,13 @@ pub struct Station {
     pub radius_rate: f64,
     /// Direction of the path at rest t0 (unit vector): gradient of the material coordinate.
     pub rest_direction: DVec3,
+    pub growth: Growth,
 }
 
 impl Station {
     /// The mean of some.
     pub fn mean(stations: &[Station]) -> Station {
-        let mut mean = Station::default();
+        let mut mean = Station { growth: Growth { gain: 0.0, fall: 0.0, reach: 0.0 }, ..Station::default() };
         let by = 1.0 / stations.len() as f64;
         for station in stations {
             mean.centre += station.centre * by;
@@ -51,6 +86,9 @@ impl Station {
             mean.radius += station.radius * by;
             mean.radius_rate += station.radius_rate * by;
             mean.rest_direction += station.rest_direction * by;
+            mean.growth.gain += station.growth.gain * by;
+            mean.growth.fall += station.growth.fall * by;
+            mean.growth.reach += station.growth.reach * by;
         }
         mean
     }
@@ -85,6 +123,45 @@ pub struct Beside<N> {
     pub radius: N,
     pub radius_rate: N,
     pub rest_direction: [N; 3],
+    pub growth: GrowthIn<N>,
+}
+
+/// [`Growth`] in the numbers that it is computed with.
+#[derive(Debug, Clone, Copy)]
+pub struct GrowthIn<N> {
+    pub most: N,
+    pub fall: N,
+    pub reach: N,
+}
+
+impl Growth {
+    /// In numbers of the kind of `n` and lengths of `unit` [m].
+    #[inline(always)]
+    pub fn in_lengths<N: Number>(&self, n: N, unit: f64) -> GrowthIn<N> {
+        let area = unit * unit;
+        GrowthIn { most: n.of(1.0 + self.gain), fall: n.of(self.fall / area), reach: n.of(self.reach / area) }
+    }
+}
+
+impl<N: Number> GrowthIn<N> {
+    /// w m with its derivatives by s, of w with these.
+    #[inline(always)]
+    fn times(&self, s: N, [w, w1, w2]: [N; 3]) -> [N; 3] {
+        let q = s.of(1.0).over(s + self.reach);
+        let fall = self.fall * q;
+        let (m, m1) = (self.most - fall, fall * q);
+        let two = s.of(2.0);
+        [w * m, w1.mul_add(m, w * m1), w2.mul_add(m, two * m1 * (w1 - w * q))]
+    }
+
+    /// w' m with its derivative by s, of w with its derivatives: what w m' does to a volume is known before.
+    #[inline(always)]
+    fn fading(&self, s: N, [_, w1, w2]: [N; 3]) -> [N; 2] {
+        let q = s.of(1.0).over(s + self.reach);
+        let fall = self.fall * q;
+        let m = self.most - fall;
+        [w1 * m, w2.mul_add(m, w1 * (fall * q))]
+    }
 }
 
 /// The map at one point: all that its gradient and the derivatives of an energy need.
@@ -108,7 +185,7 @@ pub struct Opening<N> {
     lateral: Tensor<N>,
 }
 
-/// What the map does to a volume at one point.
+/// What the map does to a volume at one point by fading: what it does by growing near the path is known before, cell by cell.
 #[derive(Debug, Clone, Copy)]
 pub struct Dilation<N> {
     eta: [N; 3],
@@ -227,20 +304,22 @@ impl OpeningMap {
             radius: station.radius,
             radius_rate: station.radius_rate,
             rest_direction: station.rest_direction.to_array(),
+            growth: station.growth.in_lengths(0.0, 1.0),
         };
         self.in_numbers(0.0).at(&beside, &h.to_cols_array_2d())
     }
 
     /// What the map does to a volume at the place y [m].
     pub fn dilation(&self, station: &Station, y: DVec3) -> Dilation<f64> {
-        self.in_numbers(0.0).dilation((y - station.centre).to_array(), station.radius)
+        let growth = station.growth.in_lengths(0.0, 1.0);
+        self.in_numbers(0.0).dilation((y - station.centre).to_array(), station.radius, &growth)
     }
 
     /// Where a place y [m] is seen, x [m].
     pub fn place(&self, station: &Station, y: DVec3) -> DVec3 {
         let eta = self.across(y - station.centre);
         let map = self.in_numbers(0.0);
-        let [v, ..] = map.fade_over_area(eta.length_squared());
+        let [v, ..] = map.fade_over_area(eta.length_squared(), &station.growth.in_lengths(0.0, 1.0));
         y + eta * ((1.0 + station.radius.powi(2) * v).sqrt() - 1.0)
     }
 }
@@ -266,8 +345,8 @@ impl<N: Number> MapIn<N> {
 
     /// v(s) with its first and second derivatives.
     #[inline(always)]
-    fn fade_over_area(&self, s: N) -> [N; 3] {
-        let [w, w1, w2] = self.fade(s);
+    fn fade_over_area(&self, s: N, growth: &GrowthIn<N>) -> [N; 3] {
+        let [w, w1, w2] = growth.times(s, self.fade(s));
         let a = s.of(1.0).over(s + self.least);
         let fall = w1 - w * a;
         [w * a, fall * a, (w2 - s.of(2.0) * fall * a) * a]
@@ -275,9 +354,10 @@ impl<N: Number> MapIn<N> {
 
     /// What the map does to a volume, at a place that lies `offset` [m] from the middle of the path of the radius `rc` [m].
     #[inline(always)]
-    pub fn dilation(&self, offset: [N; 3], rc: N) -> Dilation<N> {
+    pub fn dilation(&self, offset: [N; 3], rc: N, growth: &GrowthIn<N>) -> Dilation<N> {
         let eta = across(self.direction, offset);
-        let [_, w1, w2] = self.fade(dot(eta, eta));
+        let s = dot(eta, eta);
+        let [w1, w2] = growth.fading(s, self.fade(s));
         Dilation { eta, less_one: rc * rc * w1, by_area: rc * rc * w2, by_radius: rc.of(2.0) * rc * w1 }
     }
 
@@ -288,7 +368,7 @@ impl<N: Number> MapIn<N> {
         let one = rc.of(1.0);
         let eta = across(self.direction, beside.offset);
         let s = dot(eta, eta);
-        let [v, v1, v2] = self.fade_over_area(s);
+        let [v, v1, v2] = self.fade_over_area(s, &beside.growth);
         let area = rc * rc;
         let g = (one + area * v).root();
         let over_g = one.over(g);
@@ -452,6 +532,7 @@ mod tests {
             radius: 0.5e-3,
             radius_rate: -0.3,
             rest_direction: DVec3::new(0.25, -0.2, -1.0).normalize(),
+            growth: Growth::new(0.07, 0.1e-3, 0.3e-3),
         }
     }
 
@@ -583,6 +664,7 @@ mod tests {
     fn a_line_becomes_a_hole_and_volume_is_kept() {
         let map = OpeningMap { least: 0.0, ..map() };
         let straight = Station { radius: 0.8e-3, rest_direction: map.direction, ..Station::default() };
+        let grown = Station { growth: Growth::new(0.07, 0.1e-3, 0.3e-3), ..straight };
         let side = map.across(DVec3::X).normalize();
         let x = map.place(&straight, side * 1e-7);
         assert!((x.dot(side) - 0.8e-3).abs() < 1e-9);
@@ -596,5 +678,15 @@ mod tests {
         let det = full(opening.gradient(&less(DMat3::IDENTITY))).determinant();
         let dilation = 1.0 + map.dilation(&straight, side * 3e-3).less_one;
         assert!((dilation - det).abs() < 1e-9, "{dilation} {det}");
+        // Where the hole begins a growth changes nothing, and half of it lies where it says.
+        let area = |rho: f64| (map.place(&grown, side * rho).length_squared() - rho * rho) / 0.8e-3f64.powi(2);
+        assert!((area(0.1e-3) - 1.0).abs() < 1e-9 && (area(0.3e-3) - 1.035).abs() < 1e-9);
+        for rho in [1e-4, 3e-4, 1.5e-3, 3e-3] {
+            let det = full(map.at(&grown, side * rho, DMat3::ZERO).gradient(&less(DMat3::IDENTITY))).determinant();
+            let [w, ..] = map.in_numbers(0.0).fade(rho * rho);
+            let growing = 0.8e-3f64.powi(2) * w * grown.growth.rate(rho * rho);
+            let dilation = 1.0 + map.dilation(&grown, side * rho).less_one + growing;
+            assert!((dilation - det).abs() < 1e-9, "{rho}: {dilation} {det}");
+        }
     }
 }

@@ -9,10 +9,14 @@ use glam::DMat3;
 use std::f64::consts::PI;
 
 use crate::material::ElasticLaw;
+use crate::needle::opening::Growth;
 
 /// Elements, and the outer end over R.
 const ELEMENTS: usize = 300;
 const OUTER: f64 = 100.0;
+
+/// Where the growth of the tissue around the hole is taken as a whole, over R.
+const FAR: f64 = 4.0;
 
 /// Newton steps at most, and the residual that ends them, over (K + 4/3 mu) R: stresses are rounded with their largest part.
 const STEPS: usize = 60;
@@ -25,6 +29,8 @@ pub struct OpenedHole {
     pub energy: f64,
     /// Normal force on the shaft per length N [N/m].
     pub normal_force: f64,
+    /// By how much the tissue around it grows.
+    pub growth: Growth,
 }
 
 /// Principal stresses (first Piola-Kirchhoff, radial and around) at the stretches `l` [Pa].
@@ -73,6 +79,15 @@ impl Radii {
             })
             .sum();
         within + 2.0 * PI * law.shear_modulus() * (r[ELEMENTS] - self.0[ELEMENTS]).powi(2)
+    }
+
+    /// How the area within each node changes: its gain is that at four radii of the shaft, half of which lies within `half`.
+    fn growth(&self, now: &[f64]) -> Growth {
+        let (a, r) = (self.0[0], now[0]);
+        let gain = |i: usize| (now[i].powi(2) - self.0[i].powi(2)) / (r * r - a * a) - 1.0;
+        let far = self.0.partition_point(|x| *x < FAR * r).min(ELEMENTS);
+        let half = (0..far).find(|i| gain(*i) / gain(far) >= 0.5).unwrap_or(far);
+        Growth::new(gain(far), a, self.0[half])
     }
 
     /// Derivatives of the energy by the radii.
@@ -134,7 +149,7 @@ pub fn opened_hole(law: &ElasticLaw, a: f64, r: f64) -> Option<OpenedHole> {
         let forces = rest.forces(law, &now);
         let residual = forces[1..].iter().fold(0.0f64, |m, f| m.max(f.abs()));
         if residual < TOLERANCE * law.p_wave_modulus() * r {
-            return Some(OpenedHole { energy, normal_force: forces[0] });
+            return Some(OpenedHole { energy, normal_force: forces[0], growth: rest.growth(&now) });
         }
         let change = rest.step(law, &now, &forces)?;
         let descent: f64 = change.iter().zip(&forces).skip(1).map(|(c, f)| c * f).sum();

@@ -23,6 +23,7 @@ use super::neo_hooke_curve;
 use super::wedge_curve::{CurveEnd, OutOfCurve, WedgeCurve, WedgeOptions, WedgePoint};
 use crate::material::{ElasticLaw, Isochoric};
 use crate::needle::TipShape;
+use crate::needle::opening::Growth;
 use crate::units::four_digits;
 
 /// Curves that are kept at most.
@@ -198,6 +199,11 @@ impl Steady {
     pub fn with_change_of_volume(&self, law: &ElasticLaw) -> Option<(f64, f64)> {
         let hole = compressible::opened_hole(law, self.hole_radius, self.radius)?;
         Some((self.cutting_force + hole.energy, hole.normal_force))
+    }
+
+    /// How tissue of this law grows around the hole a_eq. `None` where the law has no equilibrium.
+    pub fn growth(&self, law: &ElasticLaw) -> Option<Growth> {
+        compressible::opened_hole(law, self.hole_radius, self.radius).map(|hole| hole.growth)
     }
 
     /// Stretch of the wall of the hole, R/a_eq.

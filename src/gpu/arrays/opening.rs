@@ -15,6 +15,7 @@ use crate::gpu::layout::Layout;
 use crate::mesh::{BlockMesh, CORNERS};
 use crate::model::Model;
 use crate::model::opening::{Cluster, NearCell, OpeningPlan};
+use crate::needle::opening::{Growth, GrowthIn, Station};
 
 pub(super) const ARRAYS: &[Array] = &[
     Array::constant("opening", |s| bytes_of(&[params(s)])),
@@ -208,14 +209,29 @@ pub(super) fn tables_of(model: &Model, layout: &Layout, grain: Grain) -> Tables 
     tables.stations.extend(runs.iter().map(|(first, _)| {
         let NearCell { first, count, .. } = opening.cells[*first];
         let within = &opening.stations[usize::from(first)..][..usize::from(count)];
-        let direction = within.iter().map(|s| s.direction).sum::<DVec3>() / within.len() as f64;
-        OpeningStation {
-            lists: [first.into(), (first + count).into(), 0, 0],
-            rest_direction: vec4(direction),
-            ..OpeningStation::zeroed()
-        }
+        let mean: Vec<Station> = within
+            .iter()
+            .map(|s| Station { rest_direction: s.direction, growth: s.growth, ..Station::default() })
+            .collect();
+        let Station { rest_direction, growth, .. } = Station::mean(&mean);
+        with_growth(
+            OpeningStation {
+                lists: [first.into(), (first + count).into(), 0, 0],
+                rest_direction: vec4(rest_direction),
+                ..OpeningStation::zeroed()
+            },
+            &growth,
+            opening.shaft,
+        )
     }));
     tables
+}
+
+/// A section with the growth of the tissue beside it, lengths in radii of the needle.
+fn with_growth(mut section: OpeningStation, growth: &Growth, shaft: f64) -> OpeningStation {
+    let GrowthIn { most, fall, reach } = growth.in_lengths(0.0, shaft);
+    [section.depth[3], section.rest[3], section.rest_direction[3]] = [most, fall, reach].map(|x| x as f32);
+    section
 }
 
 /// Sums of a run, of which points have `before`: the first, and their number.
@@ -270,11 +286,13 @@ fn slots(
     let run_of = |cell: usize| runs.partition_point(|run| run.1 <= cell) as u32;
     for (index, near) in opening.cells.iter().enumerate() {
         let (place, middle, inverse) = cell_of(model, mesh, entry, near.cell as usize);
+        let area = opening.shaft * opening.shaft;
+        let [mean, variance] = near.growth;
         tables.cells.push(OpeningCell {
             cell: place,
             stations: [run_of(index), 0, 0, 0],
-            middle,
-            inverse,
+            middle: [middle[0], middle[1], middle[2], (mean * area) as f32],
+            inverse: [inverse[0], inverse[1], inverse[2], (variance * area * area) as f32],
             place: [near.place.x as f32, near.place.y as f32, near.place.z as f32, near.share as f32],
         });
         let stations = &opening.stations[usize::from(near.first)..][..usize::from(near.count)];
@@ -322,13 +340,14 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
         }));
         let end = tables.entries.len() as u32;
         let cut_from = opening.opens_at(station);
-        tables.stations.push(OpeningStation {
+        let own = OpeningStation {
             depth: [station.depth as f32, cut_from as f32, station.opened(opening.shaft) as f32, 0.0],
             lists: [first, middle, middle, end],
             rest: vec4(station.middle - entry),
             rest_direction: vec4(station.direction),
             ..OpeningStation::zeroed()
-        });
+        };
+        tables.stations.push(with_growth(own, &station.growth, opening.shaft));
     }
     for node in opening.nodes.iter().copied() {
         let grid = mesh.node_coordinates(node as usize);

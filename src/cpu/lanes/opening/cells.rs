@@ -151,7 +151,7 @@ fn cell_lanes<S: Simd>(
             found += 1;
         }
     }
-    let mut dilations = [map.dilation(middle.offset, zero); 4];
+    let mut dilations = [map.dilation(middle.offset, zero, &middle.growth); 4];
     let mut less = zero;
     for i in 0..4 {
         let o = offsets[i];
@@ -159,17 +159,20 @@ fn cell_lanes<S: Simd>(
         for a in 0..3 {
             seen[a] = o[a] + h[2][a].mul_add(o[2], h[1][a].mul_add(o[1], h[0][a].mul_add(o[0], seen[a])));
         }
-        dilations[i] = map.dilation(seen, middle.radius);
+        dilations[i] = map.dilation(seen, middle.radius, &middle.growth);
         less = less + dilations[i].less_one;
     }
     let quarter = Lanes::splat(simd, 0.25);
-    less = less * quarter;
+    let (rc, grows, varies) = (middle.radius, row(15), row(16));
+    let uneven = rc * rc * rc * rc * varies;
+    less = less.mul_add(quarter, rc * rc * grows);
     let dj = closed.dj;
     let j = one + dj;
     let open = dj + less.mul_add(dj, less);
-    energy = (volume * quarter * (bulk + bulk)).mul_add((open - dj) * (open + dj), energy);
+    energy = (volume * quarter * (bulk + bulk)).mul_add((j * j).mul_add(uneven, (open - dj) * (open + dj)), energy);
     let cofactor = closed.cofactor();
-    let by_cofactor = bulk * less * (j + open) * volume;
+    let by_cofactor = bulk * less.mul_add(j + open, j * uneven) * volume;
+    sum.radius = (bulk + bulk).mul_add(volume * rc * j * open.mul_add(grows, j * rc * rc * varies), sum.radius);
     for a in 0..3 {
         for b in 0..3 {
             sum.gradient[a][b] = cofactor[a][b].mul_add(by_cofactor, sum.gradient[a][b]);
@@ -183,7 +186,7 @@ fn cell_lanes<S: Simd>(
     }
     let cof_b = squared_norm_bound(&cofactor) * b_squared;
     let widened = (one + less).larger(one);
-    let with = (bulk + turned) * cof_b * widened * widened + straight * grown * grown * b_squared;
+    let with = (bulk + turned) * cof_b * widened.mul_add(widened, uneven) + straight * grown * grown * b_squared;
     let without = (bulk + closed_turned) * cof_b + closed_straight * b_squared;
     let bound = Lanes::splat(simd, 8.0) * volume * (with - without).larger(zero);
     for a in 0..3 {

@@ -8,7 +8,7 @@ use pulp::Simd;
 
 use super::super::WIDEST;
 use super::super::number::Lanes;
-use crate::needle::opening::{Beside, Station};
+use crate::needle::opening::{Beside, GrowthIn, Station};
 
 /// The path beside the lanes of a vector, entry by entry.
 pub struct Gathered {
@@ -17,6 +17,8 @@ pub struct Gathered {
     pub radius: [f32; WIDEST],
     pub radius_rate: [f32; WIDEST],
     pub rest_direction: [[f32; WIDEST]; 3],
+    /// [`GrowthIn`].
+    pub growth: [[f32; WIDEST]; 3],
     /// 1 where the path is open.
     pub open: [f32; WIDEST],
     pub is_any_open: bool,
@@ -31,6 +33,7 @@ impl Gathered {
             radius: none,
             radius_rate: none,
             rest_direction: [none; 3],
+            growth: [none, none, [1.0; WIDEST]],
             open: none,
             is_any_open: false,
         }
@@ -49,6 +52,10 @@ impl Gathered {
             self.rate[axis][lane] = station.centre_rate[axis] as f32;
             self.rest_direction[axis][lane] = station.rest_direction[axis] as f32;
         }
+        let area = over_shaft * over_shaft;
+        self.growth[0][lane] = (1.0 + station.growth.gain) as f32;
+        self.growth[1][lane] = (station.growth.fall * area) as f32;
+        self.growth[2][lane] = (station.growth.reach * area) as f32;
         self.radius[lane] = (station.radius * over_shaft) as f32;
         self.radius_rate[lane] = station.radius_rate as f32;
         self.open[lane] = 1.0;
@@ -75,6 +82,11 @@ impl Gathered {
             radius: Lanes::load(simd, &self.radius, at),
             radius_rate: Lanes::load(simd, &self.radius_rate, at),
             rest_direction: vector(&self.rest_direction),
+            growth: GrowthIn {
+                most: Lanes::load(simd, &self.growth[0], at),
+                fall: Lanes::load(simd, &self.growth[1], at),
+                reach: Lanes::load(simd, &self.growth[2], at),
+            },
         }
     }
 }

@@ -45,8 +45,8 @@ const ROOM: usize = 2 * WIDEST;
 /// Distances of lanes that are added up, one after the other, for sums of runs of up to [`WIDEST`].
 const STRIDES: [usize; 4] = [1, 2, 4, 8];
 /// Rows of a vector of cells: edges and place of what points do not carry [radii], volume [m^3], share of that, edge of the bound [radii],
-/// `|b|^2` [1/m^2], then the law: c1, c2, c3, c01 and bulk modulus.
-const CELL: usize = 10 + LAW;
+/// `|b|^2` [1/m^2], then the law: c1, c2, c3, c01 and bulk modulus; mean and variance of the growth [radii].
+const CELL: usize = 10 + LAW + 2;
 /// Rows of what a vector of cells gives: by the gradient, by the place, by rate, radius and its rate, energy, moment, bound.
 const CELL_SUMS: usize = 9 + 3 + 3 + 1 + 1 + 1 + 3 + 1;
 
@@ -309,7 +309,9 @@ impl LaneOpening {
                     quarter.length_squared(),
                 ];
                 let rows = &mut constants[number / WIDEST * CELL * WIDEST..];
-                for (row, value) in values.into_iter().chain(law_of(cell)).enumerate() {
+                let area = shaft * shaft;
+                let growth = [near.growth[0] * area, near.growth[1] * area * area];
+                for (row, value) in values.into_iter().chain(law_of(cell)).chain(growth).enumerate() {
                     rows[row * WIDEST + number % WIDEST] = value as f32;
                 }
                 Cell {
