@@ -279,8 +279,9 @@ parameters! {
     /// The free path may lead anywhere in the block: a hand holds the needle.
     field anywhere: bool = false;
 
-    /// "ring" (default): nodes around a softened path are pushed aside; "opening": the tissue beside the path is carried exactly, and forces
-    /// follow from toughness and elastic constants.
+    /// "opening": the tissue beside the path is carried exactly, and forces follow from toughness and elastic constants; "ring": nodes around
+    /// a softened path are pushed aside, with calibrated numbers. Default: "opening", unless the scene writes forces or numbers of the ring,
+    /// lacks a toughness, or asks for what "opening" does not carry yet.
     key scheme: Option<SchemeWord>;
     /// How the tissue beside the path is carried.
     field scheme: SchemeWord = SchemeWord::Ring;

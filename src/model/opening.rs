@@ -22,7 +22,7 @@ const NEAR: [f64; 2] = [1.2, 2.4];
 const CLUSTER: usize = 16;
 
 /// Most that the tip advances in a step, in distances of stations.
-const ADVANCE: f64 = 0.5;
+const ADVANCE: f64 = 1.0;
 
 /// Largest speed of a crack, in speeds of shear waves with the scaled mass: none overtakes surface waves (0.95 of them). With 0.3 of the waves
 /// in the tissue around the path the force had not fallen 15 mm behind the puncture of soft organs of scaled mass; with 0.9 the skin snaps

@@ -197,6 +197,18 @@ mod tests {
     }
 
     #[test]
+    fn tissue_around_a_narrow_hole_grows() {
+        // Area gained from the hole to four radii, over the hole, and its part within 0.3 R: neo-Hooke, from a program of its own.
+        for (nu, gain, near) in [(0.45, 0.076, 0.51), (0.473, 0.048, 0.56), (0.493, 0.016, 0.62)] {
+            let hole = opened_hole(&law(27.3e3, nu), 0.05, 1.0).unwrap();
+            let Growth { gain: found, fall, reach } = hole.growth;
+            assert!((found / gain - 1.0).abs() < 0.04, "{nu}: {found} for {gain}");
+            let within = 1.0 - fall / (0.09 + reach) / found;
+            assert!((within - near).abs() < 0.03, "{nu}: {within} for {near}");
+        }
+    }
+
+    #[test]
     fn tissue_that_gives_way_presses_less() {
         // A hole of a twentieth of the needle; the answers are those of a collocation of the same equations in another language.
         for (nu, less) in [(0.45, 0.2050), (0.473, 0.1678), (0.493, 0.0949)] {

@@ -69,6 +69,11 @@ fn predicted(scene: &Scene) -> Steady {
     Steady::new(&material.law.isochoric, resistance, radius, Indenter::Pointed).unwrap()
 }
 
+/// The same slit in tissue that changes its volume as that of the scene: force of the tip [N], normal force per length of shaft [N/m].
+fn with_change_of_volume(scene: &Scene) -> (f64, f64) {
+    predicted(scene).with_change_of_volume(&scene.material.law).unwrap()
+}
+
 /// Mean over the depths from `from` to `to` [m] of the first phase.
 fn mean(frames: &[FrameRecord], from: f64, to: f64, of: impl Fn(&FrameRecord) -> f64) -> f64 {
     let within = || frames.iter().filter(|f| f.phase == 0 && f.depth > from && f.depth <= to);
@@ -94,8 +99,7 @@ fn ripple(frames: &[FrameRecord], from: f64, to: f64) -> f64 {
 #[test]
 fn a_tip_without_friction_meets_the_force_of_the_theory_wherever_the_axis_lies() {
     // The theory of tissue that changes its volume, as this one does (nu 0.473): 4.3 % less than that of tissue that keeps it.
-    let law = scene(&[]).material.law;
-    let expected = predicted(&scene(&[])).with_change_of_volume(&law).unwrap().0;
+    let expected = with_change_of_volume(&scene(&[])).0;
     let mut forces = Vec::new();
     // Cell edge, place of the axis in a cell.
     for (cell, axis) in [("1.0", "[0.0,0.0]"), ("1.0", "[0.5,0.5]"), ("0.8", "[0.25,0.25]")] {
@@ -104,13 +108,13 @@ fn a_tip_without_friction_meets_the_force_of_the_theory_wherever_the_axis_lies()
         let force = mean(&frames, 7e-3, 8.9e-3, |f| f.force.axial);
         let imbalance = frames.iter().map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max);
         println!("cells {cell} mm, axis {axis}: {force:.4} N, theory {expected:.4} N, imbalance {imbalance:.2e}");
-        close("steady force", force, expected, 0.03);
+        close("steady force", force, expected, 0.02);
         at_most("imbalance", imbalance, 0.01);
         at_most("ripple", ripple(&frames, 7e-3, 8.9e-3) / force, 0.05);
         forces.push(force);
     }
     let (least, most) = forces.iter().fold((f64::MAX, 0.0f64), |(a, b), f| (a.min(*f), b.max(*f)));
-    at_most("spread over meshes", most / least - 1.0, 0.03);
+    at_most("spread over meshes", most / least - 1.0, 0.02);
 }
 
 /// Tissue that keeps its volume, as the theory of the wedged crack has it.
@@ -141,16 +145,34 @@ fn an_axis_through_the_places_where_volumes_are_taken_is_as_any_other() {
 fn friction_grows_with_the_normal_force_of_the_theory_and_turns_round_on_the_way_out() {
     let withdrawal = "motion.phase=[{kind=\"insert\", speed_mm_s=2.0, depth_mm=11.0}, {kind=\"withdraw\", speed_mm_s=2.0, depth_mm=6.0}]";
     let scene = scene(&[FRICTION, withdrawal]);
-    let expected = 0.3 * predicted(&scene).normal_force;
+    let expected = 0.3 * with_change_of_volume(&scene).1;
     let frames = frames(scene, engines_here().pop().unwrap());
     let found = slope(&frames, 8e-3, 10.9e-3, |f| f.force.friction);
-    // Drag stretches the tissue along the shaft, which plane strain does not have.
+    // Drag stretches the tissue along the shaft, which plane strain does not have: without it the next test has 2 %.
     close("slope of the friction", found, expected, 0.06);
     let out = frames.iter().map(|f| f.force.friction).fold(0.0, f64::min);
     let all_in = frames.iter().map(|f| f.force.friction).fold(0.0, f64::max);
     println!("slope {found:.1} N/m, theory {expected:.1} N/m; friction {all_in:.3} N in, {out:.3} N out");
     // Nothing holds the cone; over the reversal a few millimetres of the way back go.
     assert!(out < -0.5 * all_in, "{out} N on the way out, {all_in} N on the way in");
+}
+
+#[test]
+fn the_normal_force_on_the_shaft_is_that_of_the_theory_on_every_mesh() {
+    // Too little friction to drag the tissue along.
+    let mut found = Vec::new();
+    for (cell, toughness) in [("1.0", "164"), ("0.8", "164"), ("1.0", "400")] {
+        let (cell, toughness) = (format!("tissue.cell_size_mm={cell}"), format!("material.toughness_j_m2={toughness}"));
+        let overrides = [FRICTION, "friction.coefficient=0.001", &cell, &toughness, "motion.phase.0.depth_mm=10.5"];
+        let scene = scene(&overrides);
+        let expected = with_change_of_volume(&scene).1;
+        let frames = frames(scene, EngineChoice::Cpu);
+        let normal = slope(&frames, 8e-3, 10.4e-3, |f| f.force.shaft_normal);
+        println!("{cell}, {toughness}: {normal:.1} N/m, theory {expected:.1} N/m");
+        close("normal force per length", normal, expected, 0.03);
+        found.push(normal);
+    }
+    close("normal force on another mesh", found[1], found[0], 0.03);
 }
 
 #[test]
@@ -251,7 +273,7 @@ fn an_oblique_needle_meets_the_same_force() {
         "motion.direction=[0.7071,0.0,-0.7071]",
         "motion.phase.0.depth_mm=10.0",
     ]);
-    let expected = predicted(&oblique).tip_force;
+    let expected = with_change_of_volume(&oblique).0;
     let frames = frames(oblique, engines_here().pop().unwrap());
     let force = mean(&frames, 7.5e-3, 9.9e-3, |f| f.force.axial);
     println!("45 degrees: {force:.4} N, theory {expected:.4} N");
@@ -288,17 +310,17 @@ fn an_inner_layer_is_cut_by_the_crack_that_is_there() {
     assert!(largest < 1.05 * above.max(below), "{largest} N at the border");
 }
 
-/// Around a narrow slit tissue changes its volume: the force is below that of the theory without, and meets the one that knows it. The map
-/// itself keeps the volume, so that the narrower the slit the finer the cells must be: 3.1 % are left here, 1.3 % on cells of 0.6 mm.
+/// Around a narrow slit tissue changes its volume: the force is below that of the theory without, by 15 % at 400 J/m^2, and meets the one
+/// that knows it. With a map that kept the volume near the path cells of 1 mm were 9 % off there.
 #[test]
 fn tissue_that_gives_way_meets_the_theory_of_its_volume() {
     let material = "material={c10_kpa=8.0, c01_kpa=2.35, poisson_ratio=0.45, toughness_j_m2=";
-    for (toughness, cell, bound) in [("76", "1.0", 0.02), ("164", "0.8", 0.04)] {
+    for (toughness, cell) in [("76", "1.0"), ("164", "0.8"), ("400", "1.0")] {
         let cell = format!("tissue.cell_size_mm={cell}");
         let size = "tissue.size_mm=[24.0, 24.0, 16.0]";
         let scene = scene(&[&format!("{material}{toughness}}}"), &cell, size, "motion.phase.0.depth_mm=10.5"]);
         let theory = predicted(&scene);
-        let expected = theory.with_change_of_volume(&scene.material.law).unwrap().0;
+        let expected = with_change_of_volume(&scene).0;
         assert!(expected < 0.975 * theory.tip_force, "{expected} of {}", theory.tip_force);
         let frames = frames(scene, engines_here().pop().unwrap());
         let force = mean(&frames, 8e-3, 10.4e-3, |f| f.force.axial);
@@ -306,7 +328,7 @@ fn tissue_that_gives_way_meets_the_theory_of_its_volume() {
             "{toughness} J/m^2: {force:.4} N, theory {expected:.4} N, without change of volume {:.4} N",
             theory.tip_force
         );
-        close("steady force", force, expected, bound);
+        close("steady force", force, expected, 0.025);
     }
 }
 
@@ -315,7 +337,7 @@ fn a_law_that_stiffens_meets_the_force_of_its_own_curve() {
     let material =
         "material={law=\"yeoh\", c10_kpa=10.0, c20_kpa=4.0, c30_kpa=0.0, poisson_ratio=0.47, toughness_j_m2=164}";
     let scene = scene(&[material, "motion.phase.0.depth_mm=11.0"]);
-    let expected = predicted(&scene).tip_force;
+    let expected = with_change_of_volume(&scene).0;
     let frames = frames(scene, engines_here().pop().unwrap());
     let force = mean(&frames, 9e-3, 10.9e-3, |f| f.force.axial);
     println!("Yeoh: {force:.4} N, theory {expected:.4} N");

@@ -2,7 +2,7 @@
 //! tissue.
 
 use super::super::file::*;
-use super::parameters::all_materials;
+use super::parameters::{all_materials, written_cutting};
 use super::{Check, MM, Region, Within};
 use crate::effects::cohesive::AXES;
 use crate::effects::parameters::Table;
@@ -62,7 +62,8 @@ impl Check<'_> {
     pub(super) fn puncture(&mut self, t: &PunctureTable) -> effects::puncture::Params {
         let mut params = self.table("puncture", t);
         params.always_free = t.path == Some(PathWord::Free);
-        params.scheme = t.scheme.unwrap_or(SchemeWord::Ring);
+        // Where none is named: `scheme_of_the_scene`.
+        params.scheme = t.scheme.unwrap_or(SchemeWord::Opening);
         params.puncture_stated = t.puncture_force_n.is_some();
         params.cutting_stated = t.cutting_force_n.is_some();
         if params.softened_radius >= params.ring_radius {
@@ -87,31 +88,55 @@ impl Check<'_> {
         params
     }
 
+    /// The scheme of a scene that names none: `opening`, where nothing is calibrated, unless the scene writes numbers of the other one, asks
+    /// for what that alone carries, or leaves out what `opening` needs.
+    pub(super) fn scheme_of_the_scene(
+        &mut self,
+        file: &SceneFile,
+        effects: &mut EffectSet,
+        tool: Option<&Tool>,
+        own: &TissueMaterial,
+        regions: &[Region],
+    ) {
+        let is_named = file.puncture.as_ref().is_some_and(|t| t.scheme.is_some());
+        let (Some(Tool::Needle(needle)), false) = (tool, is_named) else { return };
+        let without = not_opened(effects, tool, file.tissue.mesh.is_some());
+        let unknown = || {
+            all_materials(own, regions)
+                .filter(|(_, material)| !material.rigid)
+                .find(|(_, material)| !matches!(material.steady(needle), Some(Ok(_))))
+        };
+        let reason = match (without.first(), unknown()) {
+            _ if writes_ring(file) => None,
+            (Some(what), _) => Some(format!("the scheme opening does not carry {what} yet")),
+            (None, Some((None, _))) => {
+                Some("the tissue has no toughness_j_m2 that the scheme opening could take".into())
+            }
+            (None, Some((Some(i), _))) => {
+                Some(format!("region `{}` has no toughness_j_m2 that the scheme opening could take", regions[i].name))
+            }
+            (None, None) => return,
+        };
+        let Some(puncture) = &mut effects.puncture else { return };
+        puncture.scheme = SchemeWord::Ring;
+        if let Some(reason) = reason {
+            self.notices
+                .push(format!("Forces of the tip are calibrated (puncture.scheme = \"ring\"), since {reason}."));
+        }
+    }
+
     /// What the scheme `opening` does not carry yet.
     pub(super) fn opening_limits(&mut self, effects: &EffectSet, tool: Option<&Tool>, tets: bool) {
         if effects.puncture.is_none_or(|p| p.scheme != SchemeWord::Opening) {
             return;
         }
-        let needle = match tool {
-            Some(Tool::Needle(needle)) => Some(needle),
-            _ => None,
-        };
-        let without = [
-            (tets, "a mesh of tetrahedra"),
-            (effects.cohesive.is_some(), "the effect cohesive"),
-            (effects.plasticity.is_some(), "the effect plasticity"),
-            (effects.viscoelastic.is_some(), "the effect viscoelastic"),
-            (effects.damage.is_some(), "the effect damage"),
-            (!effects.own.is_empty(), "effects of the program's own"),
-            (needle.is_some_and(|n| n.bore.is_some()), "a hollow needle"),
-        ];
-        let found: Vec<&str> = without.iter().filter(|(there, _)| *there).map(|(_, what)| *what).collect();
+        let found = not_opened(effects, tool, tets);
         if !found.is_empty() {
             self.problems.report(
                 "puncture.scheme",
                 format!("the scheme opening does not carry {} yet", found.join(", ")),
                 "a solid needle in elastic tissue",
-                "leave the key out for the scheme ring",
+                "write puncture.scheme = \"ring\"",
             );
         }
     }
@@ -171,8 +196,8 @@ impl Check<'_> {
                     format!("the scheme opening takes its forces from the toughness, and {whose} has none"),
                     "no toughness_j_m2",
                     format!(
-                        "write {at}.toughness_j_m2, e.g. 164 (bovine liver under needles), or leave puncture.scheme out for the \
-                         scheme ring"
+                        "write {at}.toughness_j_m2, e.g. 164 (bovine liver under needles), or puncture.scheme = \"ring\" for \
+                         calibrated forces"
                     ),
                 ),
                 Some(Err(error)) => {
@@ -181,7 +206,7 @@ impl Check<'_> {
                         &format!("{at}{key}"),
                         format!("the toughness of {whose} gives the scheme opening no forces: {error}"),
                         "no answer",
-                        "write a toughness_j_m2 in the range that is named, or leave puncture.scheme out for the scheme ring",
+                        "write a toughness_j_m2 in the range that is named, or puncture.scheme = \"ring\" for calibrated forces",
                     );
                 }
             }
@@ -206,7 +231,7 @@ impl Check<'_> {
                 ),
                 format!("an exponent k2 e^2 of at most {most}"),
                 format!(
-                    "write {key} of at most {:.1e}, a tear_stretch of the material, or leave puncture.scheme out for the scheme ring",
+                    "write {key} of at most {:.1e}, a tear_stretch of the material, or puncture.scheme = \"ring\"",
                     most / (strain * strain)
                 ),
             );
@@ -356,4 +381,51 @@ impl Check<'_> {
         }
         params
     }
+}
+
+/// What of a scene the scheme `opening` does not carry yet.
+fn not_opened(effects: &EffectSet, tool: Option<&Tool>, tets: bool) -> Vec<&'static str> {
+    let is_hollow = matches!(tool, Some(Tool::Needle(needle)) if needle.bore.is_some());
+    let without = [
+        (tets, "a mesh of tetrahedra"),
+        (effects.cohesive.is_some(), "the effect cohesive"),
+        (effects.plasticity.is_some(), "the effect plasticity"),
+        (effects.viscoelastic.is_some(), "the effect viscoelastic"),
+        (effects.damage.is_some(), "the effect damage"),
+        (!effects.own.is_empty(), "effects of the program's own"),
+        (is_hollow, "a hollow needle"),
+    ];
+    without.into_iter().filter(|(there, _)| *there).map(|(_, what)| what).collect()
+}
+
+/// True where a scene writes forces of the tip, or numbers of the scheme `ring`.
+fn writes_ring(file: &SceneFile) -> bool {
+    let in_puncture = file.puncture.as_ref().is_some_and(|t| {
+        let PunctureTable {
+            puncture_force_n,
+            cutting_force_n,
+            softened_radius_mm,
+            residual_stiffness,
+            ring_radius_mm,
+            contact_stiffness_factor,
+            ..
+        } = t;
+        [
+            puncture_force_n,
+            cutting_force_n,
+            softened_radius_mm,
+            residual_stiffness,
+            ring_radius_mm,
+            contact_stiffness_factor,
+        ]
+        .iter()
+        .any(|key| key.is_some())
+    });
+    let beside = |table: &RegionTable| {
+        table.puncture_force_n.is_some() || table.cutting_force_n.is_some() || table.cutting_energy_j_m2.is_some()
+    };
+    let tables = file.region.iter().map(|region| &region.material).chain([&file.material]);
+    in_puncture
+        || file.region.iter().any(beside)
+        || tables.into_iter().any(|t| written_cutting(t) != CuttingTable::default())
 }

@@ -180,6 +180,7 @@ impl Check<'_> {
             let layers = [energy, parameters::of_preset(preset.as_ref()), table.own_tables()];
             parameters::settle(&mut region.material, &layers, &effects, &effects);
         }
+        self.scheme_of_the_scene(file, &mut effects, tool.as_ref(), &material, &regions);
         self.cuttings(file, &tool, &effects, (&mut material, preset), (&mut regions, region_presets));
         let solver = self.solver(&file.solver, tool.is_some(), effects.puncture.is_some(), tissue.cell_size);
         self.opening_limits(&effects, tool.as_ref(), mesh.is_some());
