@@ -1,4 +1,4 @@
-//! A scene around a planned line: regions from labels by their names, tip forces where the library has none.
+//! A scene around a planned line: regions from labels by their names, a toughness where the library has none.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::needle::NeedleShape;
 use crate::reading;
 use crate::scene::needles;
-use crate::scene::tissue_preset::TissuePreset;
+use crate::units;
 use crate::whole_file;
 
 /// Width of the block, and its depth over that of the path, as scenes have them by default [m].
@@ -27,10 +27,18 @@ const ABOVE: f64 = 20e-3;
 const STEP: f64 = 1e-3;
 /// Most regions: the shaders hold 16 materials, and one is the tissue's own.
 const MOST_REGIONS: usize = 15;
-/// Tip forces of muscle with the needle that they were made for [N], the Young's modulus [Pa] and the diameter [m] there.
-const MUSCLE: (f64, f64, f64, f64) = (0.6, 0.3, 80e3, 1.651e-3);
-/// Bounds of puncture forces that are made up here [N].
-const FORCES: (f64, f64) = (0.0005, 5.0);
+/// Diameter of a needle that the table of gauges does not have [m].
+const UNKNOWN_DIAMETER: f64 = 1.651e-3;
+/// Toughness where the library has none [J/m^2]: of bovine liver under needles [Gokgol2012], and of what gives way at once.
+const TOUGHNESS: f64 = 164.0;
+const TOUGHNESS_OF_LIQUIDS: f64 = 1.0;
+/// Largest J_c/(mu R): with their measured toughness the softest tissues, whose laws know small strain only, are dented by a centimetre and
+/// more before they give way. Muscle under a 16G needle has 7.3.
+const MOST_RELATIVE: f64 = 8.0;
+/// Presets that stand for liquids.
+const LIQUIDS: [&str; 2] = ["csf", "blood"];
+/// Edge of the cells over the diameter of the needle, up to which forces are those of fine cells (`stylet check`).
+const EDGE_OVER_DIAMETER: f64 = 0.9;
 /// Speed of the needle [mm/s].
 const SPEED: f64 = 5.0;
 
@@ -105,24 +113,24 @@ fn relative(file: &Path, scene: &Path) -> PathBuf {
 
 /// Text of the scene; `map`: the file and the line that places it, `by_number`: it does not have the names of its labels.
 fn scene((map, transform): (&str, &str), file: &Path, course: &Course, gauge: &str, by_number: bool) -> String {
-    let needle = needles::needle(gauge).map_or(MUSCLE.3, |needle| needle.outer_diameter);
+    let needle = needles::needle(gauge).map_or(UNKNOWN_DIAMETER, |needle| needle.outer_diameter);
     let path = course.length;
     let title = format!("needle to a target in {}", stem(file));
-    // Twenty cells to the target, 0.5 to 1 mm.
-    let cell = ((path / 20.0).clamp(0.5e-3, 1e-3) * 1e4).round() / 10.0;
+    // Twenty cells to the target, 0.5 to 1 mm, and no coarser than the needle asks for.
+    let cell = (path / 20.0).min(EDGE_OVER_DIAMETER * needle).clamp(0.5e-3, 1e-3);
+    let cell = (cell * 1e4).round() / 10.0;
     let mut all = format!(
         "# Made by `stylet import`; every line may be changed. Materials are those of assets/materials.toml, taken by the names of\n\
-         # labels. Tip forces marked `estimate` are no measurement: those of muscle, by Young's modulus over 80 kPa (above that by\n\
-         # its root) and the diameter of the needle over 1.65 mm. Scenes are for research and training, not for treatment.\n\
+         # labels. Forces follow from elastic constants, toughness and needle; no force is written. A toughness marked `choice` is no\n\
+         # measurement of that tissue: 164 J/m^2 is that of bovine liver under needles, liquids have 1, and the softest tissues no more\n\
+         # than 8 times shear modulus times radius of the needle. Scenes are for research and training, not for treatment.\n\
          title = {}\n\
          effects = [\"puncture\", \"friction\", \"mass_scaling\"]\n\n\
          [tissue]\n\
          labels = {}\n{transform}\
-         # Forces are better with half the diameter of the needle, {:.1}, and take much longer.\n\
          cell_size_mm = {cell}\n",
         quoted(&title),
-        quoted(map),
-        0.5 * needle * 1e3
+        quoted(map)
     );
     // Air is no tissue; where the line runs through it something has to stand for it.
     let (air, groups): (Vec<Group>, Vec<Group>) =
@@ -134,10 +142,11 @@ fn scene((map, transform): (&str, &str), file: &Path, course: &Course, gauge: &s
     }
     all += "\n";
     let (own, regions) = split(groups);
-    all += &own_material(&own, course, needle);
+    all += &own_material(&own, course, 0.5 * needle);
     for group in &regions {
-        all += &region(group, course, needle, by_number);
+        all += &region(group, course, 0.5 * needle, by_number);
     }
+    all += "[puncture]\nscheme = \"opening\"\n\n";
     all += &format!(
         "[needle]\ngauge = {}\ntip_length_mm = {:.1}\n\n",
         quoted(gauge),
@@ -167,7 +176,7 @@ fn scene((map, transform): (&str, &str), file: &Path, course: &Course, gauge: &s
 }
 
 /// The material of the tissue where no region is, and which labels have it.
-fn own_material(own: &Own, course: &Course, needle: f64) -> String {
+fn own_material(own: &Own, course: &Course, radius: f64) -> String {
     let mut all = String::new();
     if own.known.is_empty() && own.unknown.is_empty() {
         all += "# No label in the block has this material.\n";
@@ -183,9 +192,22 @@ fn own_material(own: &Own, course: &Course, needle: f64) -> String {
             all += &format!("{}\n", text::wrapped(&sentence, 0).replace('\n', "\n# "));
         }
     }
-    let [puncture, cutting] = [MUSCLE.0, MUSCLE.1].map(|force| rounded(force * needle / MUSCLE.3));
-    all += &format!("[material]\npreset = \"{FALLBACK}\"\n\n# Tip forces of muscle, for this diameter.\n");
-    all + &format!("[puncture]\npuncture_force_n = {puncture}\ncutting_force_n = {cutting}\n\n")
+    let muscle = materials::of_label(None);
+    let toughness = toughness(&muscle, radius).map_or(String::new(), |j| format!("toughness_j_m2 = {j} # choice\n"));
+    all + &format!("[material]\npreset = {}\n{toughness}\n", quoted(&muscle.preset.name))
+}
+
+/// What a scene has to say of the toughness of a material [J/m^2]; `None`: the library knows it.
+fn toughness(matched: &Matched, radius: f64) -> Option<f64> {
+    let preset = matched.preset;
+    if matched.kind == Kind::Air || LIQUIDS.contains(&preset.name.as_str()) {
+        return Some(TOUGHNESS_OF_LIQUIDS);
+    }
+    let most = units::significant(MOST_RELATIVE * preset.law.shear_modulus() * radius, 2);
+    match preset.toughness {
+        Some(known) if known <= most => None,
+        known => Some(known.unwrap_or(TOUGHNESS).min(most)),
+    }
 }
 
 /// Labels that have the scene's own material.
@@ -248,7 +270,7 @@ fn groups(course: &Course) -> Vec<Group> {
 }
 
 /// A table of a region.
-fn region(group: &Group, course: &Course, needle: f64, by_number: bool) -> String {
+fn region(group: &Group, course: &Course, radius: f64, by_number: bool) -> String {
     let preset = group.matched.preset;
     let entries: Vec<String> = group.labels.iter().map(|label| entry(*label, course, by_number)).collect();
     let labels = match entries.as_slice() {
@@ -269,12 +291,11 @@ fn region(group: &Group, course: &Course, needle: f64, by_number: bool) -> Strin
     if group.matched.kind == Kind::Air {
         table += "# The line runs through air: a material that gives way at once stands for it.\n";
     }
-    table += &format!("material = {{ preset = {} }}\n", quoted(&preset.name));
-    if preset.cutting.is_none() {
-        let (puncture, cutting) = forces(preset, needle);
-        table += &format!("puncture_force_n = {puncture} # estimate\ncutting_force_n = {cutting} # estimate\n");
+    let preset = quoted(&preset.name);
+    match toughness(&group.matched, radius) {
+        None => table + &format!("material = {{ preset = {preset} }}\n\n"),
+        Some(j) => table + &format!("material = {{ preset = {preset}, toughness_j_m2 = {j} }} # choice\n\n"),
     }
-    table + "\n"
 }
 
 /// How a scene names a label: by its name where that is its own and plain, else by its number.
@@ -288,20 +309,6 @@ fn entry(label: u16, course: &Course, by_number: bool) -> String {
         same == 1 && !name.trim().is_empty() && name.len() < 80 && !name.chars().any(char::is_control)
     });
     own.map_or(label.to_string(), |name| quoted(name))
-}
-
-/// Tip forces by the stiffness [N]. What is softer than muscle is pressed in as far as muscle before it gives way: the force goes with
-/// Young's modulus. Where it is stiffer it goes with its root, as the force at which a crack grows does at one toughness.
-fn forces(preset: &TissuePreset, needle: f64) -> (f64, f64) {
-    let stiffness = preset.law.youngs_modulus() / MUSCLE.2;
-    let force = MUSCLE.0 * stiffness.min(stiffness.sqrt()) * needle / MUSCLE.3;
-    let puncture = force.clamp(FORCES.0, FORCES.1);
-    (rounded(puncture), rounded(puncture * MUSCLE.1 / MUSCLE.0))
-}
-
-/// Two digits.
-fn rounded(value: f64) -> f64 {
-    crate::units::significant(value, 2)
 }
 
 /// What the line crosses, as comments.
