@@ -25,6 +25,8 @@ tip_half_angle_deg = 18.0
 kind = "insert"
 speed_mm_s = 2.0
 depth_mm = 3.0
+[puncture]
+scheme = "ring"
 [solver]
 mass_scaling = 10000
 [outputs]

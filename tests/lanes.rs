@@ -247,7 +247,17 @@ const SCENES: [(&str, &[&str]); 19] = [
     ("effects/fibres.toml", &[]),
     ("calibrated/muscle_biopsy.toml", &["tissue.cell_size_mm=1.6", UNDER_GRAVITY, "motion.phase.0.depth_mm=5.0", FAST]),
     // Points that f64 carries, for the fibres.
-    ("opening.toml", &["tissue.cell_size_mm=1.6", WITH_FIBRES, "fibres.k2=0.001", "motion.phase.0.depth_mm=5.0", FAST]),
+    (
+        "opening.toml",
+        &[
+            "tissue.cell_size_mm=1.6",
+            WITH_FIBRES,
+            "fibres.k2=0.0001",
+            "fibres.k1_kpa=2",
+            "motion.phase.0.depth_mm=5.0",
+            FAST,
+        ],
+    ),
     (
         "calibrated/muscle_biopsy.toml",
         &["tissue.cell_size_mm=1.6", WITH_ALL, SLOW_FAILURE, "motion.phase.0.depth_mm=5.0", FAST],

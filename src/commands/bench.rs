@@ -30,6 +30,7 @@ use crate::needle::{NeedleShape, Phase, Tool};
 use crate::process;
 use crate::scene::Scene;
 use crate::simulation::{EngineChoice, Simulation};
+use crate::units::digits;
 
 #[derive(Debug, Clone, Args)]
 pub struct BenchArgs {
@@ -452,10 +453,10 @@ fn bytes_per_cell_step(strip_layers: f64) -> f64 {
 /// A row that is there, on standard error: the table or the JSON comes when all is measured.
 fn tell(row: &Row) {
     eprintln!(
-        "  {} cells{}: {:.0} ns of wall time per cell-step, real-time factor {:.2}",
+        "  {} cells{}: {} ns of wall time per cell-step, real-time factor {:.2}",
         row.cells,
         if row.needle { " with the needle" } else { "" },
-        row.wall_ns_per_cell_step,
+        digits(row.wall_ns_per_cell_step, 2),
         row.real_time_factor
     );
 }

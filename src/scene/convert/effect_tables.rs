@@ -1,9 +1,12 @@
 //! Tables of effects that are more than plain numbers: relations between their keys, and keys that need the tool, the motion or the
 //! tissue.
 
+use glam::{DMat3, DVec3};
+
 use super::super::file::*;
 use super::parameters::{all_materials, written_cutting};
 use super::{Check, MM, Region, Within};
+
 use crate::effects::cohesive::AXES;
 use crate::effects::parameters::Table;
 use crate::effects::puncture::{PathWord, SchemeWord};
@@ -13,6 +16,37 @@ use crate::needle::beam::Section;
 use crate::needle::free_path::MOST_REGIONS;
 use crate::needle::{Motion, Tool};
 use crate::units::four_digits;
+
+/// What fibres at the wall of an opened path may store, over what the matrix does there: 19 times lose nothing, at 28 times a tenth of the work of
+/// the needle is missing as it comes out, and nodes beside the path have twenty times their mass.
+const MOST_FIBRES: f64 = 24.0;
+
+/// Fibres at the wall of an opened path, which is stretched so many times.
+struct WallFibres {
+    fibres: effects::fibres::Params,
+    /// e = stretch^2 - 1, and k2 e^2.
+    strain: f64,
+    exponent: f64,
+    /// What they store, over what the matrix does.
+    over_matrix: f64,
+}
+
+impl WallFibres {
+    /// `None` where there are none.
+    fn of(effects: &EffectSet, material: &TissueMaterial, stretch: f64) -> Option<Self> {
+        let fibres = effects.fibres.map(|common| material.fibres.unwrap_or(common)).filter(|f| f.k1 > 0.0)?;
+        let strain = stretch * stretch - 1.0;
+        let exponent = fibres.k2 * strain * strain;
+        let grown = if exponent > 1e-9 { exponent.exp_m1() / exponent } else { 1.0 };
+        let wall = DMat3::from_diagonal(DVec3::new(stretch - 1.0, 1.0 / stretch - 1.0, 0.0));
+        let over_matrix = 0.5 * fibres.k1 * strain * strain * grown / material.law.energy_density(wall);
+        Some(WallFibres { fibres, strain, exponent, over_matrix })
+    }
+
+    fn are_carried(&self) -> bool {
+        self.exponent <= LARGEST_EXPONENT && self.over_matrix <= MOST_FIBRES
+    }
+}
 
 impl Check<'_> {
     pub(super) fn flexible_needle(
@@ -106,6 +140,12 @@ impl Check<'_> {
                 .filter(|(_, material)| !material.rigid)
                 .find(|(_, material)| !matches!(material.steady(needle), Some(Ok(_))))
         };
+        let stretched = || {
+            all_materials(own, regions).filter(|(_, material)| !material.rigid).any(|(_, material)| {
+                let Some(Ok(steady)) = material.steady(needle) else { return false };
+                WallFibres::of(effects, material, steady.wall_stretch()).is_some_and(|fibres| !fibres.are_carried())
+            })
+        };
         let reason = match (without.first(), unknown()) {
             _ if writes_ring(file) => None,
             (Some(what), _) => Some(format!("the scheme opening does not carry {what} yet")),
@@ -114,6 +154,9 @@ impl Check<'_> {
             }
             (None, Some((Some(i), _))) => {
                 Some(format!("region `{}` has no toughness_j_m2 that the scheme opening could take", regions[i].name))
+            }
+            (None, None) if stretched() => {
+                Some("the scheme opening would stretch the fibres beside the path too far".into())
             }
             (None, None) => return,
         };
@@ -216,11 +259,11 @@ impl Check<'_> {
     /// Fibres at the wall of an opened path, which is stretched so many times, must not be beyond the exponential of their law: what continues
     /// it there would store more than the whole needle gives.
     fn opened_fibres(&mut self, effects: &EffectSet, material: &TissueMaterial, at: &str, stretch: f64) {
-        let Some(fibres) = effects.fibres.map(|common| material.fibres.unwrap_or(common)).filter(|f| f.k1 > 0.0) else {
+        let Some(WallFibres { fibres, strain, exponent, over_matrix }) = WallFibres::of(effects, material, stretch)
+        else {
             return;
         };
-        let strain = stretch * stretch - 1.0;
-        let (exponent, most) = (fibres.k2 * strain * strain, LARGEST_EXPONENT);
+        let most = LARGEST_EXPONENT;
         if exponent > most {
             let key = if material.fibres.is_some() { format!("{at}.fibres.k2") } else { "fibres.k2".into() };
             self.problems.report(
@@ -233,6 +276,22 @@ impl Check<'_> {
                 format!(
                     "write {key} of at most {:.1e}, a tear_stretch of the material, or puncture.scheme = \"ring\"",
                     most / (strain * strain)
+                ),
+            );
+            return;
+        }
+        if over_matrix > MOST_FIBRES {
+            let key = if material.fibres.is_some() { format!("{at}.fibres.k1_kpa") } else { "fibres.k1_kpa".into() };
+            self.problems.report(
+                &key,
+                format!(
+                    "the scheme opening would stretch these fibres {stretch:.1} times beside the path, where they store {over_matrix:.0} times \
+                     what the matrix does"
+                ),
+                format!("fibres that store at most {MOST_FIBRES:.0} times as much"),
+                format!(
+                    "write {key} of at most {:.1e}, a tear_stretch of the material, or puncture.scheme = \"ring\"",
+                    fibres.k1 / 1e3 * MOST_FIBRES / over_matrix
                 ),
             );
         }
