@@ -1393,12 +1393,7 @@ fn fibres_beside_an_opened_path_stay_within_their_exponential() {
     for part in ["stretch these fibres 9.3 times", "is 363", "fibres.k2 of at most 1.4e-3", "tear_stretch"] {
         assert!(refused.contains(part), "{part}: {refused}");
     }
-    // Within it they may still be so stiff that nodes beside the path get twenty times their mass, and energy is lost.
-    let stiff = load(&["fibres.k2=0.0001"]).unwrap_err();
-    for part in ["where they store 41 times what the matrix does", "fibres.k1_kpa of at most 5.2e0", "tear_stretch"] {
-        assert!(stiff.contains(part), "{part}: {stiff}");
-    }
-    assert!(load(&["fibres.k2=0.0001", "fibres.k1_kpa=4"]).is_ok());
+    assert!(load(&["fibres.k2=0.001"]).is_ok());
     assert!(load(&["fibres.k1_kpa=0"]).is_ok());
     // Tissue that tears has a wider slit.
     assert!(load(&["material.tear_stretch=3.0"]).is_ok());
