@@ -441,25 +441,9 @@ fn not_opened(effects: &EffectSet, tool: Option<&Tool>, tets: bool) -> Vec<&'sta
 /// True where a scene writes forces of the tip, or numbers of the scheme `ring`.
 fn writes_ring(file: &SceneFile) -> bool {
     let in_puncture = file.puncture.as_ref().is_some_and(|t| {
-        let PunctureTable {
-            puncture_force_n,
-            cutting_force_n,
-            softened_radius_mm,
-            residual_stiffness,
-            ring_radius_mm,
-            contact_stiffness_factor,
-            ..
-        } = t;
-        [
-            puncture_force_n,
-            cutting_force_n,
-            softened_radius_mm,
-            residual_stiffness,
-            ring_radius_mm,
-            contact_stiffness_factor,
-        ]
-        .iter()
-        .any(|key| key.is_some())
+        let forces = t.puncture_force_n.or(t.cutting_force_n);
+        let radii = t.softened_radius_mm.or(t.ring_radius_mm);
+        forces.or(radii).or(t.residual_stiffness).or(t.contact_stiffness_factor).is_some()
     });
     let beside = |table: &RegionTable| {
         table.puncture_force_n.is_some() || table.cutting_force_n.is_some() || table.cutting_energy_j_m2.is_some()
