@@ -7,17 +7,20 @@ use super::slit_contact::SlitContact;
 use super::{ContactSums, CpuEngine};
 use crate::effects::friction::stick_or_slide;
 use crate::engine::{ContactState, State};
-use crate::model::{ANCHOR_COUNT, ContactSurface, Model, PuncturePlan};
+use crate::model::{ANCHOR_COUNT, ContactNode, ContactSurface, Model, PuncturePlan};
 use crate::needle::gap::Profile;
 use crate::needle::{ToolPose, swing};
 
 /// In [`NearNodes::of_node`]: no contact node.
 const NO_CONTACT: u32 = u32::MAX;
 
-/// Which contact nodes of a free path are looked at in a step. Most are far away from the needle, and nothing of theirs changes.
+/// Which contact nodes are looked at in a step, where that is not all of them. Most nodes beside a free path are far away from the needle, and
+/// nothing of theirs changes; those beside an opened path only carry the tip where it is.
 pub(super) struct NearNodes {
     /// Contact node of every node.
     of_node: Vec<u32>,
+    /// No node is kept out of the needle: what does not carry the tip has nothing to do with it.
+    only_carry: bool,
     /// Numbers of those that the needle touches or has passed.
     busy: Vec<u32>,
     /// The state is one that somebody has written.
@@ -25,14 +28,25 @@ pub(super) struct NearNodes {
 }
 
 impl NearNodes {
-    /// For a model with a free path, whose contact nodes are all nodes beside it.
+    /// For a model with a free path, whose contact nodes are all nodes beside it, or with an opened one, where they are all that may carry the
+    /// tip.
     pub fn of(model: &Model) -> Option<Self> {
-        model.puncture.as_ref()?.free.as_ref()?;
+        let is_free = model.puncture.as_ref()?.free.is_some();
+        let carries = |c: &ContactNode| !c.pushed && c.surface == ContactSurface::OpenedPath;
+        let only_carry = !is_free && model.contact_nodes.iter().all(carries);
+        if !is_free && !only_carry {
+            return None;
+        }
         let mut of_node = vec![NO_CONTACT; model.mesh.node_count()];
         for (index, contact) in model.contact_nodes.iter().enumerate() {
             of_node[contact.node as usize] = index as u32;
         }
-        Some(NearNodes { of_node, busy: Vec::new(), is_stale: true })
+        Some(NearNodes { of_node, only_carry, busy: Vec::new(), is_stale: true })
+    }
+
+    /// Contact nodes that carry the tip.
+    fn carriers(&self, tip_loads: &NodeLoads) -> impl Iterator<Item = u32> {
+        tip_loads.nodes().map(|node| self.of_node[node]).filter(|index| *index != NO_CONTACT)
     }
 
     /// Keeps those of `looked_at` that must be looked at again wherever they are.
@@ -217,11 +231,16 @@ impl CpuEngine {
         Some(NodeAtNeedle { index, memory, sums, bound, bend_power })
     }
 
-    /// Numbers of the contact nodes that the needle may have to do with, in their order: all of them on a planned path; on a free one, where
-    /// every node is a contact node, what is not far from it, what it has touched or passed, and what carries the tip.
+    /// Numbers of the contact nodes that the needle may have to do with, in their order: all of them on a planned path; on an opened one what
+    /// carries the tip; on a free one, where every node is a contact node, what is not far from the needle and what it has touched or passed, too.
     fn nodes_at_needle(&mut self, needle: &Needle, tip_loads: &NodeLoads) -> Vec<u32> {
         let count = needle.model.contact_nodes.len();
         let all = || (0..count as u32).collect::<Vec<u32>>();
+        if let Some(near) = self.near.as_ref().filter(|near| near.only_carry) {
+            let mut carriers: Vec<u32> = near.carriers(tip_loads).collect();
+            carriers.sort_unstable();
+            return carriers;
+        }
         // A needle that bends is near to nothing along a straight line.
         if needle.line.is_some() {
             self.look_at_all();
@@ -241,7 +260,7 @@ impl CpuEngine {
             self.in_ranges(count, |range| range.filter(is_near).map(|index| index as u32).collect::<Vec<u32>>());
         let mut all: Vec<u32> = found.into_iter().flatten().collect();
         all.extend(&near.busy);
-        all.extend(tip_loads.nodes().map(|node| near.of_node[node]).filter(|index| *index != NO_CONTACT));
+        all.extend(near.carriers(tip_loads));
         all.sort_unstable();
         all.dedup();
         self.near = Some(near);

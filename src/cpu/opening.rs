@@ -9,7 +9,7 @@ use crate::material::kinematics::{cofactor, jacobian_minus_one};
 use crate::material_point::{Material, PointState, Volumetric};
 use crate::mesh::CORNERS;
 use crate::model::opening::{
-    NearCell, OpeningPlan, OpeningStation, PathPoint, VOLUME_PLACE, is_volume_place, mean_place,
+    NearCell, OpeningPlan, OpeningStation, PathPoint, VOLUME_PLACE, is_volume_place, mean_of, mean_place,
 };
 use crate::model::{Model, PuncturePlan};
 use crate::needle::centre_line::Bend;
@@ -62,8 +62,9 @@ impl From<&PointSums> for StationSums {
 #[derive(Debug, Clone, Copy, Default)]
 struct Now {
     section: Station,
-    /// Middle of the section of the needle [m].
+    /// Middle of the section of the needle [m], and velocity of the tissue there, where it may rub [m/s].
     disc: DVec3,
+    velocity: DVec3,
     /// Distance behind the tip [m].
     behind: f64,
     cut: f64,
@@ -92,6 +93,7 @@ impl CpuEngine {
         let (rest, u, a) = (&self.rest, &self.state.displacement, self.state.tip_coordinate);
         let t = pose.direction;
         let shift = plan.contact.as_ref().map_or(0.0, |c| c.part(a)) * self.state.touch.dimple;
+        let (velocities, rubs) = (&self.state.velocity, self.model.effects.friction.is_some());
         let mut now = self.each(opening.stations.len(), |i| {
             let station = &opening.stations[i];
             if opening.is_ahead(station, a) {
@@ -110,7 +112,8 @@ impl CpuEngine {
                 growth: station.growth,
                 ..Station::default()
             };
-            Now { section, disc, behind, cut, cut_rate, full, slope, radius, rate }
+            let velocity = if rubs { mean_of(&station.disc, &station.nodes, velocities) } else { DVec3::ZERO };
+            Now { section, disc, velocity, behind, cut, cut_rate, full, slope, radius, rate }
         });
         for i in 0..now.len() {
             let (before, behind, by) = neighbours(i, now.len(), opening.spacing);
@@ -210,10 +213,7 @@ impl CpuEngine {
                 lanes.set_point(number, lane, &found);
             }
         }
-        lanes.at_corners(|node, force, bound| {
-            added.add(node, -force, bound);
-        });
-        let (points, cells_of_spans) = lanes.gather(team, sections, (numbers, stride));
+        let (points, cells_of_spans) = lanes.gather(team, sections, (numbers, stride), added);
         let mut sums: Vec<StationSums> = points.iter().map(StationSums::from).collect();
         let mut elastic: f64 = sums.iter().map(|s| s.energy).sum();
         for ((first, count), found) in cells_of_spans {
@@ -269,10 +269,13 @@ impl CpuEngine {
         self.sums.energy.tip += 0.5 * (self.state.opening_spreading - old[1]) * shift
             - 0.5 * (self.state.opening_resistance - old[0]) * advance;
         let normal = averaged_normal(opening, now, sums);
-        let velocity = &self.state.velocity;
         let mut stored = 0.0;
         let (mut booked, mut bend_work) = (ContactSums::default(), 0.0);
         let friction = model.effects.friction.unwrap_or_default();
+        let rubs = model.effects.friction.is_some();
+        let kt = friction.stiffness_ratio * opening.stick;
+        // Everywhere along the path: a mass that was raised where friction sets in would swing with another energy.
+        let stick_bound = if rubs { 2.0 * kt } else { 0.0 };
         for (i, station) in opening.stations.iter().enumerate() {
             let n = &now[i];
             let Guide { force: guide, held, .. } = guides[i];
@@ -285,25 +288,17 @@ impl CpuEngine {
             let squeeze = normal[i].max(0.0) * on_shaft;
             self.sums.shaft_normal_impulse += squeeze * self.dt;
             let limit = friction.coefficient * squeeze;
-            if model.effects.friction.is_some() && (limit > 0.0 || *memory != 0.0) {
-                let velocity_of = |(place, w): &(u16, f64)| velocity[station.nodes[usize::from(*place)] as usize] * *w;
-                let mean_velocity: DVec3 = station.disc.iter().map(velocity_of).sum();
-                let kt = friction.stiffness_ratio * opening.stick;
-                let motion = (mean_velocity - pose.velocity_behind()).dot(t) * self.dt;
+            if rubs && (limit > 0.0 || *memory != 0.0) {
+                let motion = (n.velocity - pose.velocity_behind()).dot(t) * self.dt;
                 let (old, trial) = (*memory, *memory + motion);
                 *memory = if limit > 0.0 { trial.clamp(-limit / kt, limit / kt) } else { 0.0 };
                 rubbing = -kt * *memory;
                 booked.friction_work += 0.5 * kt * (old + *memory) * (trial - *memory);
                 stored += 0.5 * kt * *memory * *memory;
             }
-            // Everywhere along the path: a mass that was raised where friction sets in would swing with another energy.
-            for (place, w) in station.disc.iter().filter(|_| model.effects.friction.is_some()) {
-                let kt = friction.stiffness_ratio * opening.stick;
-                self.added.add(station.nodes[usize::from(*place)] as usize, DVec3::ZERO, 2.0 * kt * w);
-            }
             let along = t * (spread + rubbing);
-            for (place, w) in station.disc.iter().filter(|_| along != DVec3::ZERO) {
-                self.added.add(station.nodes[usize::from(*place)] as usize, along * *w, 0.0);
+            for (place, w) in station.disc.iter().filter(|_| rubs || along != DVec3::ZERO) {
+                self.added.add(station.nodes[usize::from(*place)] as usize, along * *w, stick_bound * w);
             }
             let across = guide - sums[i].centre - rates[i];
             for (place, w) in station.centre.iter().filter(|_| across != DVec3::ZERO || held > 0.0) {

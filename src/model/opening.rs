@@ -464,6 +464,11 @@ pub fn mean_place(mean: &Mean, nodes: &[u32], rest: &[DVec3], u: &[DVec3]) -> DV
     sum
 }
 
+/// Mean of a vector of every node.
+pub fn mean_of(mean: &Mean, nodes: &[u32], values: &[DVec3]) -> DVec3 {
+    mean.iter().map(|(place, w)| values[nodes[usize::from(*place)] as usize] * *w).sum()
+}
+
 impl PathPoint {
     /// y and the gradient of the displacement there, from the displacements of the nodes of its station.
     pub fn place_and_gradient(&self, u: &[DVec3]) -> (DVec3, DMat3) {

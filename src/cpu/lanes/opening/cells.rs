@@ -6,7 +6,7 @@
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
-use super::{CELL, CELL_SUMS, Found, Gathered, Lanes, Step, law_in_lanes, moment_of, opened};
+use super::{CELL, CELL_SUMS, CORNER_FORCES, Cell, Found, Gathered, Lanes, Step, law_in_lanes, moment_of, opened};
 use crate::cpu::lanes::WIDEST;
 use crate::cpu::lanes::corners::SIGNS;
 use crate::mesh::CORNERS;
@@ -72,14 +72,51 @@ fn cell_vector<S: Simd>(simd: S, step: &Step, map: &MapIn<Lanes<S>>, number: usi
         return Found::Unknown;
     }
     let constants = &all.constants[number * CELL * WIDEST..(number + 1) * CELL * WIDEST];
+    let mut by_gradient = [[0.0f32; WIDEST]; 9];
     let mut at = 0;
     while at < cells.len() {
-        if !cell_lanes(simd, step, map, (constants, &path, &gradients), at, out) {
+        if !cell_lanes(simd, step, map, (constants, &path, &gradients), at, (&mut by_gradient, out)) {
             return Found::Unknown;
         }
         at += Lanes::<S>::COUNT;
     }
+    on_corners(cells, over_shaft, &by_gradient, out);
     Found::Known
+}
+
+/// Forces on the corners, from those by gradient and place: the gradient of y is that of the middle of the cell.
+#[inline(always)]
+fn on_corners(cells: &[Cell], over_shaft: f64, by_gradient: &[[f32; WIDEST]; 9], out: &mut [f32]) {
+    let mut quarters = [[0.0f64; WIDEST]; 3];
+    for (lane, cell) in cells.iter().enumerate() {
+        for axis in 0..3 {
+            quarters[axis][lane] = cell.quarter[axis];
+        }
+    }
+    let (forces, by_place) = out.split_at_mut(CORNER_FORCES * WIDEST);
+    for axis in 0..3 {
+        let (mut middle, mut by_axis) = ([0.0f64; WIDEST], [[0.0f64; WIDEST]; 3]);
+        for lane in 0..WIDEST {
+            middle[lane] = f64::from(by_place[axis * WIDEST + lane]) * over_shaft * 0.125;
+        }
+        for a in 0..3 {
+            for lane in 0..WIDEST {
+                by_axis[a][lane] = f64::from(by_gradient[3 * a + axis][lane]) * quarters[a][lane];
+            }
+        }
+        for bits in 0..SIGNS {
+            let row = &mut forces[(3 * bits + axis) * WIDEST..][..WIDEST];
+            let sign = |a: usize| if bits >> a & 1 == 1 { 1.0 } else { -1.0 };
+            let signs = [sign(0), sign(1), sign(2)];
+            for lane in 0..WIDEST {
+                let mut force = middle[lane];
+                for a in 0..3 {
+                    force += signs[a] * by_axis[a][lane];
+                }
+                row[lane] = force as f32;
+            }
+        }
+    }
 }
 
 /// Adds what acts at the place `offset` from the middle of a cell.
@@ -102,7 +139,7 @@ fn cell_lanes<S: Simd>(
     map: &MapIn<Lanes<S>>,
     (constants, path, gradients): (&[f32], &Gathered, &[[[f32; WIDEST]; 3]; 3]),
     at: usize,
-    out: &mut [f32],
+    (by_gradient, out): (&mut [[f32; WIDEST]; 9], &mut [f32]),
 ) -> bool {
     let all = step.all;
     let row = |row: usize| Lanes::load(simd, constants, row * WIDEST + at);
@@ -191,18 +228,21 @@ fn cell_lanes<S: Simd>(
     let bound = Lanes::splat(simd, 8.0) * volume * (with - without).larger(zero);
     for a in 0..3 {
         for b in 0..3 {
-            sum.gradient[a][b].store(out, (3 * a + b) * WIDEST + at);
+            sum.gradient[a][b].store(&mut by_gradient[3 * a + b], at);
         }
-        sum.place[a].store(out, (9 + a) * WIDEST + at);
-        sum.centre_rate[a].store(out, (12 + a) * WIDEST + at);
     }
-    sum.radius.store(out, 15 * WIDEST + at);
-    sum.radius_rate.store(out, 16 * WIDEST + at);
-    energy.store(out, 17 * WIDEST + at);
+    let mut put = |value: Lanes<S>, row: usize| value.store(out, (CORNER_FORCES + row) * WIDEST + at);
+    for a in 0..3 {
+        put(sum.place[a], a);
+        put(sum.centre_rate[a], 3 + a);
+    }
+    put(sum.radius, 6);
+    put(sum.radius_rate, 7);
+    put(energy, 8);
     if all.turns {
         let moment = moment_of(&h, middle.offset, &sum.gradient, sum.place);
         for a in 0..3 {
-            moment[a].store(out, (18 + a) * WIDEST + at);
+            put(moment[a], 9 + a);
         }
     }
     bound.store(out, (CELL_SUMS - 1) * WIDEST + at);

@@ -23,6 +23,7 @@ use self::points::SomePoints;
 use super::corners::SIGNS;
 use super::number::Lanes;
 use super::{LaneMaterial, WIDEST};
+use crate::cpu::added::Added;
 use crate::cpu::team::Team;
 use crate::material::regular::{Constants, Regular};
 use crate::mesh::{BlockMesh, CORNERS, trilinear};
@@ -47,8 +48,11 @@ const STRIDES: [usize; 4] = [1, 2, 4, 8];
 /// Rows of a vector of cells: edges and place of what points do not carry [radii], volume [m^3], share of that, edge of the bound [radii],
 /// `|b|^2` [1/m^2], then the law: c1, c2, c3, c01 and bulk modulus; mean and variance of the growth [radii].
 const CELL: usize = 10 + LAW + 2;
-/// Rows of what a vector of cells gives: by the gradient, by the place, by rate, radius and its rate, energy, moment, bound.
-const CELL_SUMS: usize = 9 + 3 + 3 + 1 + 1 + 1 + 3 + 1;
+/// Rows of what a vector of cells gives: forces (as f_int) [N] on its corners, corner by corner, by the place [N], rate, radius [N] and its
+/// rate, energy, moment, bound.
+const CELL_SUMS: usize = CORNER_FORCES + 3 + 3 + 1 + 1 + 1 + 3 + 1;
+/// Rows of the forces on corners.
+const CORNER_FORCES: usize = 3 * SIGNS;
 
 /// Points side by side, at most [`WIDEST`].
 struct Vector {
@@ -441,8 +445,8 @@ impl LaneOpening {
         PointSums::of(sums)
     }
 
-    /// Calls `add` with nodes, forces (as f_int) [N] and bounds [N/m] of the points.
-    pub fn at_corners(&self, mut add: impl FnMut(usize, DVec3, f64)) {
+    /// Adds forces and bounds of the points.
+    fn points_at_nodes(&self, added: &mut Added) {
         for (number, vector) in self.vectors.iter().enumerate() {
             if self.out.vectors[number] != Found::Known {
                 continue;
@@ -450,14 +454,14 @@ impl LaneOpening {
             let end = self.vectors.get(number + 1).map_or(self.runs.len(), |v| v.first_run);
             for run in vector.first_run..end {
                 for (node, (force, bound)) in self.runs[run].nodes.iter().zip(&self.out.runs[run]) {
-                    add(*node as usize, *force, *bound);
+                    added.add(*node as usize, -*force, *bound);
                 }
             }
         }
     }
 
     /// Sums of the points of every station that is open, with energies, then of the cells per pair of stations; the cells are added to the
-    /// numbers of the nodes. What the caller has to compute is left out of these.
+    /// numbers of the nodes, the points to what is added there. What the caller has to compute is left out of these.
     ///
     /// Layers of cells that share no node side by side, first the even ones: no bit hangs on the number of threads.
     pub fn gather(
@@ -465,7 +469,9 @@ impl LaneOpening {
         team: &Team,
         stations: &[Station],
         (numbers, stride): (&mut [f32], usize),
+        added: &mut Added,
     ) -> (Vec<PointSums>, Vec<OfSpan>) {
+        let mut added = Some(added);
         let mut sums = vec![PointSums::default(); stations.len()];
         let mut spans: Vec<_> = self.spans.iter().map(|span| (*span, PointSums::default())).collect();
         for parity in 0..2 {
@@ -478,7 +484,13 @@ impl LaneOpening {
             let part = team.part(stations.len());
             let of_points = sums.chunks_mut(part).enumerate().filter(|_| parity == 0);
             let of_points = of_points.map(|(i, sums)| Gather::Stations { first: i * part, sums });
-            let found = team.map(layers.chain(of_points), |_, part| match part {
+            // The longest part first.
+            let points = added.take().map(Gather::Points).into_iter();
+            let found = team.map(points.chain(layers).chain(of_points), |_, part| match part {
+                Gather::Points(added) => {
+                    self.points_at_nodes(added);
+                    Vec::new()
+                }
                 Gather::Layer { cells, numbers, first } => self.layer_at_nodes(cells, numbers, (first, stride)),
                 Gather::Stations { first, sums } => {
                     for (i, sums) in (first..).zip(sums).filter(|(i, _)| stations[*i].radius > 0.0) {
@@ -502,7 +514,6 @@ impl LaneOpening {
         (first, stride): (usize, usize),
     ) -> Vec<(u16, PointSums)> {
         let mut spans: Vec<(u16, PointSums)> = Vec::new();
-        let over_shaft = 1.0 / self.shaft;
         for number in cells {
             let (vector, lane) = (*number as usize / WIDEST, *number as usize % WIDEST);
             if self.out.cell_vectors[vector] != Found::Known {
@@ -510,38 +521,34 @@ impl LaneOpening {
             }
             let cell = &self.cells[*number as usize];
             let rows = &self.out.cells[vector * CELL_SUMS * WIDEST..][..CELL_SUMS * WIDEST];
-            let row = |row: usize| f64::from(rows[row * WIDEST + lane]);
+            let value = |row: usize| rows[row * WIDEST + lane];
+            let row = |row: usize| f64::from(value(CORNER_FORCES + row));
             let vector = |first: usize| DVec3::new(row(first), row(first + 1), row(first + 2));
-            let bound = rows[(CELL_SUMS - 1) * WIDEST + lane];
-            if bound == 0.0 && row(15) == 0.0 {
+            let bound = value(CELL_SUMS - 1);
+            if bound == 0.0 && row(6) == 0.0 {
                 continue;
             }
             if spans.last().is_none_or(|(span, _)| *span != cell.span) {
                 spans.push((cell.span, PointSums::default()));
             }
-            let place = vector(9) * over_shaft;
+            let over_shaft = 1.0 / self.shaft;
             if let Some((_, sums)) = spans.last_mut() {
                 sums.add(&PointSums {
-                    place,
-                    centre_rate: vector(12),
-                    radius: row(15) * over_shaft,
-                    radius_rate: row(16),
-                    energy: row(17),
-                    moment: vector(18),
+                    place: vector(0) * over_shaft,
+                    centre_rate: vector(3),
+                    radius: row(6) * over_shaft,
+                    radius_rate: row(7),
+                    energy: row(8),
+                    moment: vector(9),
                 });
             }
-            let by_axis = [vector(0) * cell.quarter.x, vector(3) * cell.quarter.y, vector(6) * cell.quarter.z];
-            let middle = place * 0.125;
             for bits in 0..SIGNS {
-                let mut force = middle;
-                for axis in 0..3 {
-                    force += if bits >> axis & 1 == 1 { by_axis[axis] } else { -by_axis[axis] };
-                }
                 let at = cell.numbers[bits] as usize - first;
+                let own = &mut numbers[at..=at + 3 * stride];
                 for axis in 0..3 {
-                    numbers[at + axis * stride] -= force[axis] as f32;
+                    own[axis * stride] -= value(3 * bits + axis);
                 }
-                numbers[at + 3 * stride] += bound;
+                own[3 * stride] += bound;
             }
         }
         spans
@@ -559,6 +566,7 @@ pub(in crate::cpu) struct OpeningInLanes<'a> {
 
 /// Part of what is added up.
 enum Gather<'a> {
+    Points(&'a mut Added),
     Layer {
         cells: &'a [u32],
         numbers: &'a mut [f32],
