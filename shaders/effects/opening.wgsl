@@ -59,6 +59,13 @@ struct OpeningStation {
     // Middle of the section of the needle from the entry [m]; moment of the forces on nodes about the centre [N m]. w unused.
     disc: vec4<f32>,
     by_moment: vec4<f32>,
+    // Where the tissue relaxes. Part of the stress that is left; steps of this frame so far; energy of the shape without relaxation, and
+    // what of it was dissipated since t = 0 [J].
+    relaxation: vec4<f32>,
+    // r_i [m], g_i and 1/tau_i [1/s] of SectionRelaxation in src/effects/viscoelastic.rs.
+    opened: array<vec4<f32>, 2>,
+    shares: array<vec4<f32>, 2>,
+    rates: array<vec4<f32>, 2>,
 }
 
 // Place in a list, and two weights.
@@ -73,7 +80,7 @@ struct OpeningEntry {
 struct OpeningSum {
     by_centre: vec4<f32>,
     by_rate: vec4<f32>,
-    // Moment of the forces on nodes about the centre [N m], where the needle may turn.
+    // Moment of the forces on nodes about the centre [N m], where the needle may turn; w: energy of the shape without relaxation [J].
     by_moment: vec4<f32>,
 }
 
@@ -87,8 +94,16 @@ struct OpeningRecord {
     parts: vec4<f32>,
     // Force that opening takes per advance of the tip [N], energy in guide and stick springs [J], force that spreads the path [N]; w unused.
     now: vec4<f32>,
-    // What the tip dissipated beyond what it was told before it advanced [J]; the others unused.
+    // What the tip dissipated beyond what it was told before it advanced [J]; what relaxation dissipated since t = 0 and in this frame [J];
+    // w unused.
     late: vec4<f32>,
+}
+
+// What a frame tells.
+struct OpeningTotals {
+    record: OpeningRecord,
+    // Elastic energy [J].
+    elastic: array<array<vec4<f32>, 32>, 8>,
 }
 
 @group(0) @binding(16) var<uniform> opening: OpeningParams;
@@ -137,6 +152,8 @@ struct PathSection {
     radius_rate: f32,
     // t0.
     rest_direction: vec3<f32>,
+    // Part of the stress that is left.
+    left: f32,
 }
 
 fn section_of(station: OpeningStation) -> PathSection {
@@ -146,6 +163,11 @@ fn section_of(station: OpeningStation) -> PathSection {
         station.centre.w / opening.direction.w,
         station.centre_rate.w,
         rest_direction(station),
+#ifdef VISCOELASTIC
+        station.relaxation.x,
+#else
+        1.0,
+#endif
     );
 }
 

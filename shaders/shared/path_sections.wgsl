@@ -66,6 +66,9 @@ fn place_sections(lane: u32, coordinate: f32, shift: f32) {
         path_stations[i].centre = vec4<f32>(middle, full * cut);
         path_stations[i].place = vec4<f32>(behind, cut, rate, slope);
         path_stations[i].rubbing.x = full;
+#ifdef VISCOELASTIC
+        path_stations[i].relaxation.y += 1.0;
+#endif
     }
     storageBarrier();
     for (var i = lane; i < count; i += LANES) {

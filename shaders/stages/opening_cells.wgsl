@@ -74,7 +74,7 @@ fn open_cell(index: u32, path: OpeningStation) {
     // What keeps the shape, of what points do not carry.
     let closed = shape_stress(cell.cell.w, H);
     let p = cell.place.xyz;
-    let part = cell.place.w * volume;
+    let part = cell.place.w * volume * section.left;
     let place = opened_place(section, middle + lateral * p, gradient);
     let now = opened_stress(cell.cell.w, place, H, closed.P);
     let by_place = now.derivatives.place * part;

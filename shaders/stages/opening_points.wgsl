@@ -48,7 +48,8 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let point = path_points[i];
         let station = path_stations[point.numbers.x];
         let section = section_of(station);
-        let volume = select(0.0, point.place.w, section.radius > 0.0);
+        let intact = select(0.0, point.place.w, section.radius > 0.0);
+        let volume = intact * section.left;
         let p = point.place.xyz;
         let H = strain_at(modes, p, inverse);
         let y = cluster.middle.xyz - station.centre.xyz + p / inverse + displacement_at(modes, p);
@@ -69,7 +70,7 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         // Bound of the stiffness: rows of the point's own.
         let growth = amplification(place);
         let grown = growth.x + growth.y * length(place.eta) * opening.direction.w;
-        let stiffness = volume * (now.tangent * grown * grown
+        let stiffness = intact * (now.tangent * grown * grown
             + now.turned_tangent * squared_norm_bound(cofactor(deformation_gradient(H))));
         let nx = vec4<f32>(0.5 - p.x, 0.5 + p.x, 0.5 - p.x, 0.5 + p.x);
         let ny = vec4<f32>(0.5 - p.y, 0.5 - p.y, 0.5 + p.y, 0.5 + p.y);

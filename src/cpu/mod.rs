@@ -23,6 +23,7 @@ use needle_contact::{NearNodes, NodeLoads};
 use rayon::prelude::*;
 
 use crate::effects::adhesion::Bond;
+use crate::effects::viscoelastic::SectionRelaxation;
 use crate::engine::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
 use crate::engine::{
     ContactState, Engine, EngineImage, EngineInfo, FrameEnergies, FramePlan, FrameSums, LARGEST_DISPLACEMENT, State,
@@ -112,6 +113,7 @@ impl CpuEngine {
             bond: Bond::default(),
             contact: vec![ContactState::default(); model.contact_nodes.len()],
             stations: vec![0.0; model.opening().map_or(0, |o| o.stations.len())],
+            relaxation: vec![SectionRelaxation::default(); model.relaxing_stations()],
             opening_resistance: 0.0,
             opening_spreading: 0.0,
             touch: Touch::default(),
@@ -399,7 +401,8 @@ impl CpuEngine {
         }
         // Beside what cells hold of a path of no width.
         sums.energy.elastic = energies[0] + self.opening_elastic;
-        (sums.energy.hourglass, sums.energy.viscous) = (energies[1], energies[2]);
+        let beside_path: f64 = state.relaxation.iter().map(|r| r.dissipated).sum();
+        (sums.energy.hourglass, sums.energy.viscous) = (energies[1], energies[2] + beside_path);
         sums.energy += dissipated - self.booked;
         self.booked = dissipated;
         self.take_own_supply();

@@ -29,6 +29,8 @@ pub(super) struct StationSums {
     /// Moment of the forces on nodes (with the sign of f_int) about the centre [N m]: what a needle that turns feels.
     moment: DVec3,
     energy: f64,
+    /// Energy of the shape without relaxation, its part in cells around the path with it [J].
+    shape: f64,
 }
 
 impl StationSums {
@@ -48,13 +50,14 @@ impl StationSums {
         self.radius += other.radius;
         self.radius_rate += other.radius_rate;
         self.moment += other.moment;
+        self.shape += other.shape;
     }
 }
 
 impl From<&PointSums> for StationSums {
     fn from(p: &PointSums) -> Self {
-        let PointSums { place, centre_rate, radius, radius_rate, moment, energy } = *p;
-        StationSums { centre: -place, centre_rate, radius, radius_rate, moment, energy }
+        let PointSums { place, centre_rate, radius, radius_rate, moment, energy, shape } = *p;
+        StationSums { centre: -place, centre_rate, radius, radius_rate, moment, energy, shape }
     }
 }
 
@@ -110,6 +113,7 @@ impl CpuEngine {
                 radius: full * cut,
                 rest_direction: station.direction,
                 growth: station.growth,
+                relaxed: self.state.relaxation.get(i).map_or(0.0, |r| 1.0 - r.left),
                 ..Station::default()
             };
             let velocity = if rubs { mean_of(&station.disc, &station.nodes, velocities) } else { DVec3::ZERO };
@@ -139,6 +143,22 @@ impl CpuEngine {
             self.opening_elastic = elastic;
         }
         self.station_reactions(opening, plan, (pose, step), &now, &sums);
+        if self.measures {
+            self.relax(&model, opening, &now, &sums);
+        }
+    }
+
+    /// The stress beside every station relaxes, at the end of a frame whose energies are known.
+    fn relax(&mut self, model: &Model, opening: &OpeningPlan, now: &[Now], sums: &[StationSums]) {
+        let time = f64::from(self.sums.steps) * self.dt;
+        for (((relaxation, station), now), sums) in
+            self.state.relaxation.iter_mut().zip(&opening.stations).zip(now).zip(sums)
+        {
+            let before = relaxation.dissipated;
+            relaxation.advance(model.terms_at(station), now.section.radius, sums.shape, time);
+            // What is measured is what the next frame begins with.
+            self.opening_elastic -= relaxation.dissipated - before;
+        }
     }
 
     /// Forces of points and near cells on nodes; what is derived of the stations, and the energy that opening adds.
@@ -176,10 +196,11 @@ impl CpuEngine {
 
     /// Adds a near cell to its nodes and stations; returns its energy.
     fn add_near_cell(&mut self, near: &NearCell, found: &NearCellForces, sums: &mut [StationSums]) -> f64 {
-        let (forces, (derivatives, moment), energy) = found;
+        let (forces, (derivatives, moment), [energy, shape]) = found;
         self.add_to_cell(near.cell as usize, forces);
         for sums in &mut sums[usize::from(near.first)..][..usize::from(near.count)] {
             sums.add(derivatives, *moment, 1.0 / f64::from(near.count));
+            sums.shape += shape / f64::from(near.count);
         }
         *energy
     }
@@ -208,7 +229,7 @@ impl CpuEngine {
                         point_force(shape(point.cell), map, point, section, &u, |place, force, bound| {
                             added.add(station.nodes[place] as usize, -force, bound);
                         });
-                    found = PointSums::new(&d, moment, energy, point.volume);
+                    found = PointSums::new(&d, moment, energy, point.volume * section.left());
                 }
                 lanes.set_point(number, lane, &found);
             }
@@ -429,13 +450,16 @@ fn point_forces<'a>(
             local[place].0 += force;
             local[place].1 += bound;
         });
-        sums.energy += point.volume * energy;
-        sums.add(&d, moment, point.volume);
+        let left = point.volume * section.left();
+        sums.shape += point.volume * energy;
+        sums.energy += left * energy;
+        sums.add(&d, moment, left);
     }
     (sums, local)
 }
 
-/// What opening adds at a point: derivatives, moment about the centre and energy per volume; `add` gets places of its corners in the station, forces and bounds.
+/// What opening adds at a point: derivatives, moment about the centre and energy per volume, without relaxation; `add` gets places of its
+/// corners in the station, forces and bounds.
 fn point_force(
     shape: Shape,
     map: &OpeningMap,
@@ -456,7 +480,8 @@ fn point_force(
     let sizes = point.gradients.map(|g| g.length());
     let bound = point.volume * stiffness * sizes.iter().sum::<f64>();
     for (c, place) in point.corners.iter().enumerate() {
-        let force = (by_gradient * point.gradients[c] + by_place * point.weights[c]) * point.volume;
+        let left = point.volume * section.left();
+        let force = (by_gradient * point.gradients[c] + by_place * point.weights[c]) * left;
         add(usize::from(*place), force, bound * sizes[c]);
     }
     (d, moment_of(DMat3::IDENTITY + h, y - section.centre, by_gradient, by_place), energy)
@@ -468,8 +493,9 @@ fn moment_of(gradient: DMat3, offset: DVec3, by_gradient: DMat3, by_place: DVec3
     offset.cross(by_place) + of_columns[0] + of_columns[1] + of_columns[2]
 }
 
-/// Forces and bounds of a near cell, derivatives of its energy with their moment about the path, and that energy [J].
-type NearCellForces = (CellForces, (Derivatives<f64>, DVec3), f64);
+/// Forces and bounds of a near cell, derivatives of its energy with their moment about the path, that energy, and what the shape of its part
+/// would hold without relaxation [J].
+type NearCellForces = (CellForces, (Derivatives<f64>, DVec3), [f64; 2]);
 
 /// What opening adds to a cell: forces, derivatives of its energy by the path, and that energy. The gradient of y is that of its centre,
 /// as elsewhere; the volume is taken at four places, the shape at one.
@@ -492,7 +518,7 @@ fn near_cell_forces(
     let h = shape.displacement_gradient(&u);
     let gradient = DMat3::IDENTITY + h;
     let material = shape_of.material;
-    let (mut sum, mut energy) = (Derivatives::none(0.0), 0.0);
+    let (mut sum, mut energy, mut intact) = (Derivatives::none(0.0), 0.0, 0.0);
     let mut grown = 1.0f64;
     // y is linear in the cell, as its gradient is one: a force at a place is one on the middle and one on the gradient.
     let middle = y.iter().copied().sum::<DVec3>() / 8.0;
@@ -521,8 +547,10 @@ fn near_cell_forces(
         let map = map.at(section, middle + gradient * offset, h);
         let volume = near.share * shape.volume;
         let (d, w, tangent) = shape_of.opened(&map, h);
-        energy += volume * w;
-        add(&mut sum, &d, offset, volume);
+        let left = volume * section.left();
+        intact = volume * w;
+        energy += left * w;
+        add(&mut sum, &d, offset, left);
         let (by_gradient, by_place) = map.amplification();
         grown = grown.max(by_gradient + by_place * shape.edge());
         (straight, turned) = (straight.max(tangent.straight), turned.max(tangent.turned));
@@ -552,5 +580,5 @@ fn near_cell_forces(
         forces.force[i] = by_gradient * *b + by_place / 8.0;
     }
     let moment = moment_of(gradient, middle - section.centre, by_gradient, by_place);
-    Some((forces, (sum, moment), energy))
+    Some((forces, (sum, moment), [energy, intact]))
 }

@@ -18,7 +18,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::parameter::{Parameter, Value};
 use super::{Effect, Kind, Numbers};
@@ -130,6 +130,46 @@ impl Term {
     pub fn is_due(&self, step: u64, dt: f64) -> bool {
         let n = u64::from(self.interval(dt));
         step % n == n / 2
+    }
+}
+
+/// How far the stress beside one section of an opened path has relaxed.
+///
+/// What strains the tissue there is how far the path is open: its instantaneous stress keeps its directions and grows with the radius rc of the
+/// hole, since the energy is of second degree in lengths. For such a stress the series is one of numbers,
+/// ```text
+/// P = k P_elastic,   k = 1 - sum g_i r_i/rc,   tau_i dr_i/dt = rc - r_i
+/// r_i(t + h/2) = r_i(t - h/2) + (1 - e^(-h/tau_i)) (rc(t) - r_i(t - h/2))
+/// ```
+/// k changes at the ends of frames, of the length h, so that the work `W dk` is known and dissipated. `r_i <= rc`: tissue that closes holds on to
+/// nothing, and a path that has closed begins anew, where the series would remember it for some `tau_i`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SectionRelaxation {
+    /// `r_i` [m].
+    pub opened: [f64; LARGEST_TERM_COUNT],
+    /// k.
+    pub left: f64,
+    /// Dissipated since t = 0 [J].
+    pub dissipated: f64,
+}
+
+impl Default for SectionRelaxation {
+    fn default() -> Self {
+        SectionRelaxation { opened: [0.0; LARGEST_TERM_COUNT], left: 1.0, dissipated: 0.0 }
+    }
+}
+
+impl SectionRelaxation {
+    /// At the end of a frame of `time` [s]: the hole has the radius `radius` [m], and the tissue would hold `energy` [J] without relaxation.
+    pub fn advance(&mut self, terms: &[Term], radius: f64, energy: f64, time: f64) {
+        let mut relaxed = 0.0;
+        for (opened, term) in self.opened.iter_mut().zip(terms) {
+            *opened = (*opened - (-time / term.time).exp_m1() * (radius - *opened)).min(radius);
+            relaxed += term.ratio * *opened;
+        }
+        let left = if radius > 0.0 { 1.0 - relaxed / radius } else { 1.0 };
+        self.dissipated += energy * (self.left - left);
+        self.left = left;
     }
 }
 

@@ -45,6 +45,8 @@ pub enum Stage {
     MeasureNodes,
     /// Energy that opening adds, and its sums (once per frame).
     MeasureOpening,
+    /// The stress beside the opened path relaxes (once per frame).
+    RelaxPath,
     /// Sums over the contact nodes (once per frame).
     MeasureContact,
     /// Reactions of the six faces (once per frame).
@@ -59,7 +61,7 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 26] = [
+    pub const ALL: [Stage; 27] = [
         Stage::PathMeans,
         Stage::AdvanceTip,
         Stage::SoftenPath,
@@ -83,6 +85,7 @@ impl Stage {
         Stage::MeasureContact,
         // Adds to the loads of a flexible needle that the one above has summed.
         Stage::MeasureOpening,
+        Stage::RelaxPath,
         Stage::MeasureFaces,
         Stage::MeasureSeparation,
         Stage::CellFields,
@@ -113,6 +116,7 @@ impl Stage {
             Stage::MeasureCells => "measure_cells",
             Stage::MeasureNodes => "measure_nodes",
             Stage::MeasureOpening => "measure_opening",
+            Stage::RelaxPath => "relax_path",
             Stage::MeasureContact => "measure_contact",
             Stage::MeasureFaces => "measure_faces",
             Stage::MeasureSeparation => "measure_separation",
@@ -144,6 +148,7 @@ impl Stage {
             Stage::MeasureCells
                 | Stage::MeasureNodes
                 | Stage::MeasureOpening
+                | Stage::RelaxPath
                 | Stage::MeasureContact
                 | Stage::MeasureFaces
                 | Stage::MeasureSeparation

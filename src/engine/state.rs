@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::effects::adhesion::Bond;
+use crate::effects::viscoelastic::SectionRelaxation;
 use crate::material_point::PointState;
 use crate::needle::free_path::FreeTip;
 use crate::needle::tip_contact::Touch;
@@ -30,6 +31,8 @@ pub struct State {
     pub contact: Vec<ContactState>,
     /// Stretch of the stick spring of every station of the path along the needle [m]; empty without the scheme `opening`.
     pub stations: Vec<f64>,
+    /// What every station has relaxed; empty without the scheme `opening` or without `viscoelastic`.
+    pub relaxation: Vec<SectionRelaxation>,
     /// Force that opening took per advance of the tip in the last step, in the scheme `opening` [N].
     pub opening_resistance: f64,
     /// Force along the needle with which the tip spread the opened path in the last step, in the scheme `opening` [N].
@@ -53,6 +56,7 @@ impl State {
                 s.cut_samples.len(),
                 s.contact.len(),
                 s.stations.len(),
+                s.relaxation.len(),
                 s.pairs.len(),
                 s.points.len(),
             ]

@@ -133,6 +133,7 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
         | Stage::OpeningNodes
         | Stage::MeasureOpening => puncture && opening,
         Stage::PathMeans | Stage::PathSums => puncture && opening && features.wide,
+        Stage::RelaxPath => puncture && opening && effects.viscoelastic.is_some(),
         Stage::IndenterContact => indentation,
         Stage::MeasureContact => puncture || indentation,
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
@@ -151,7 +152,7 @@ pub const OPENING_PARTS: u32 = 1024;
 pub fn threads(stage: Stage, model: &Model, layout: &Layout, grain: Grain) -> u32 {
     match stage {
         // One workgroup.
-        Stage::AdvanceTip | Stage::AdvanceFreeTip | Stage::OpeningReactions => 1,
+        Stage::AdvanceTip | Stage::AdvanceFreeTip | Stage::OpeningReactions | Stage::RelaxPath => 1,
         Stage::SoftenFreePath => free_cell_count(model),
         Stage::SoftenPath => model.puncture.as_ref().map_or(1, |p| p.cells.len() as u32),
         Stage::CellFields => model.mesh.cell_count() as u32,

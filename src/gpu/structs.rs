@@ -255,6 +255,10 @@ shared_structs! {
         rest_direction: [f32; 4],
         disc: [f32; 4],
         by_moment: [f32; 4],
+        relaxation: [f32; 4],
+        opened: [[f32; 4]; 2],
+        shares: [[f32; 4]; 2],
+        rates: [[f32; 4]; 2],
     }
     /// shaders/effects/opening.wgsl
     struct OpeningEntry {
@@ -297,7 +301,7 @@ shared_structs! {
         inverse: [f32; 4],
         place: [f32; 4],
     }
-    /// shaders/stages/measure_opening.wgsl
+    /// shaders/effects/opening.wgsl
     struct OpeningTotals {
         record: OpeningRecord,
         elastic: [[[f32; 4]; 32]; 8],

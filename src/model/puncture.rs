@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::opening::{OpeningInput, OpeningPlan};
+use super::opening::{OpeningInput, OpeningPlan, OpeningStation};
+use crate::effects::viscoelastic::Term;
 use super::{ContactNode, ContactSurface, FreePlan, LaidPath, Model, tet_puncture};
 use crate::anatomy::Case;
 use crate::effects::puncture::{Cutting, SchemeWord, left_before_exit};
@@ -355,6 +356,19 @@ impl Model {
     /// The scheme `opening`, where the scene has it.
     pub fn opening(&self) -> Option<&OpeningPlan> {
         self.puncture.as_ref().and_then(|plan| plan.opening.as_ref())
+    }
+
+    /// Sections of an opened path that relax: all of them, or none.
+    pub fn relaxing_stations(&self) -> usize {
+        self.opening().filter(|_| self.effects.viscoelastic.is_some()).map_or(0, |opening| opening.stations.len())
+    }
+
+    /// Prony terms of the tissue in which a station lies.
+    pub fn terms_at(&self, station: &OpeningStation) -> &[Term] {
+        let Mesh::Block(block) = &self.mesh else { return &[] };
+        let ([i, j, k], _) = block.locate(station.middle);
+        let material = self.material(block.cell_index(i, j, k));
+        material.viscoelastic.as_ref().map_or(&[], |series| series.terms.as_slice())
     }
 
     /// Largest part of the tip springs that one node can carry: where the anchors are in the first cells of the path.

@@ -73,9 +73,16 @@ pub struct Station {
     /// Direction of the path at rest t0 (unit vector): gradient of the material coordinate.
     pub rest_direction: DVec3,
     pub growth: Growth,
+    /// Part of the stress beside it that has relaxed.
+    pub relaxed: f64,
 }
 
 impl Station {
+    /// Part of the stress beside it that is left.
+    pub fn left(&self) -> f64 {
+        1.0 - self.relaxed
+    }
+
     /// The mean of some.
     pub fn mean(stations: &[Station]) -> Station {
         let mut mean = Station { growth: Growth { gain: 0.0, fall: 0.0, reach: 0.0 }, ..Station::default() };
@@ -89,6 +96,7 @@ impl Station {
             mean.growth.gain += station.growth.gain * by;
             mean.growth.fall += station.growth.fall * by;
             mean.growth.reach += station.growth.reach * by;
+            mean.relaxed += station.relaxed * by;
         }
         mean
     }

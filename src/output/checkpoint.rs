@@ -1,6 +1,6 @@
 //! The file that a run goes on from: `checkpoint.stylet`, replaced whole as the run goes, gone when it has ended well.
 //!
-//! Format: the line `stylet checkpoint 3`, then zlib of a postcard message. The checksum of zlib finds a damaged file.
+//! Format: the line `stylet checkpoint 4`, then zlib of a postcard message. The checksum of zlib finds a damaged file.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{BufReader, Read, Write};
@@ -19,7 +19,7 @@ use crate::simulation::checkpoint::Checkpoint;
 use crate::whole_file;
 use crate::{Error, Result};
 
-const MAGIC: &[u8] = b"stylet checkpoint 3\n";
+const MAGIC: &[u8] = b"stylet checkpoint 4\n";
 
 /// Bytes of a message that are unpacked to see whose it is.
 const FIRST: u64 = 4096;

@@ -48,6 +48,9 @@ pub(super) fn on_the_same_path(state: &State, next: &mut State) {
     for (new, old) in next.stations.iter_mut().zip(&state.stations) {
         *new = *old;
     }
+    for (new, old) in next.relaxation.iter_mut().zip(&state.relaxation) {
+        *new = *old;
+    }
     (next.opening_resistance, next.opening_spreading) = (state.opening_resistance, state.opening_spreading);
     next.touch = state.touch;
 }

@@ -10,6 +10,7 @@ use super::super::structs::{
     OpeningSum, OpeningTotals,
 };
 use super::{Array, Source, Sums, bytes_of, read_all, to_bytes, vec4, vector, zeros};
+use crate::effects::viscoelastic::SectionRelaxation;
 use crate::gpu::grain::Grain;
 use crate::gpu::layout::Layout;
 use crate::mesh::{BlockMesh, CORNERS};
@@ -29,11 +30,22 @@ pub(super) const ARRAYS: &[Array] = &[
         |bytes, model, state| {
             let count = model.opening().map_or(0, |o| o.stations.len());
             state.stations = read_all::<OpeningStation>(bytes).take(count).map(|s| s.rubbing[2].into()).collect();
+            let relaxing = read_all::<OpeningStation>(bytes).take(model.relaxing_stations());
+            state.relaxation = relaxing.map(|s| relaxation_of(&s)).collect();
         },
         |s, state| {
             let mut stations = s.opening().stations.clone();
             for (station, stretch) in stations.iter_mut().zip(&state.stations) {
                 station.rubbing[2] = *stretch as f32;
+            }
+            for (station, relaxation) in stations.iter_mut().zip(&state.relaxation) {
+                relax(station, relaxation);
+            }
+            let count = s.model.opening().map_or(0, |o| o.stations.len());
+            let (own, runs) = stations.split_at_mut(count);
+            for run in runs {
+                let within = &own[run.lists[0] as usize..run.lists[1] as usize];
+                run.relaxation[0] = within.iter().map(|s| s.relaxation[0]).sum::<f32>() / within.len() as f32;
             }
             to_bytes(&not_empty(&stations))
         },
@@ -69,8 +81,31 @@ fn add_totals(bytes: &[u8], out: &mut Sums) {
         sums.shaft_normal_impulse += f64::from(s.record.angular_impulse[3]);
         sums.tool_work += work;
         sums.energy.friction += rubbed;
-        sums.energy.tip += f64::from(s.record.late[0]);
+        let [tip, relaxed, lately, _] = s.record.late.map(f64::from);
+        sums.energy.tip += tip;
+        sums.energy.viscous += relaxed;
+        // What is measured is what the next frame begins with.
+        sums.energy.elastic -= lately;
         sums.energy.contact_stored += f64::from(s.record.now[1]);
+    }
+}
+
+fn relaxation_of(station: &OpeningStation) -> SectionRelaxation {
+    let mut relaxation = SectionRelaxation {
+        left: station.relaxation[0].into(),
+        dissipated: station.relaxation[3].into(),
+        ..SectionRelaxation::default()
+    };
+    for (opened, value) in relaxation.opened.iter_mut().zip(station.opened.as_flattened()) {
+        *opened = f64::from(*value);
+    }
+    relaxation
+}
+
+fn relax(station: &mut OpeningStation, relaxation: &SectionRelaxation) {
+    station.relaxation = [relaxation.left as f32, 0.0, 0.0, relaxation.dissipated as f32];
+    for (value, opened) in station.opened.as_flattened_mut().iter_mut().zip(relaxation.opened) {
+        *value = opened as f32;
     }
 }
 
@@ -204,7 +239,7 @@ pub(super) fn tables_of(model: &Model, layout: &Layout, grain: Grain) -> Tables 
     // First, so that a run has the place of its number.
     tables.entries = runs.iter().map(|run| run_entry(point_sums(opening, grain), *run)).collect();
     let told = slots(&mut tables, model, opening, mesh, (plan.path.entry, &runs), grain);
-    lists(&mut tables, opening, mesh, layout, (plan.path.entry, &told));
+    lists(&mut tables, model, opening, mesh, layout, (plan.path.entry, &told));
     // Behind the stations, the means of those in a run of cells.
     tables.stations.extend(runs.iter().map(|(first, _)| {
         let NearCell { first, count, .. } = opening.cells[*first];
@@ -218,6 +253,7 @@ pub(super) fn tables_of(model: &Model, layout: &Layout, grain: Grain) -> Tables 
             OpeningStation {
                 lists: [first.into(), (first + count).into(), 0, 0],
                 rest_direction: vec4(rest_direction),
+                relaxation: [1.0, 0.0, 0.0, 0.0],
                 ..OpeningStation::zeroed()
             },
             &growth,
@@ -316,7 +352,14 @@ fn slots(
 }
 
 /// Stations and nodes, with the lists of what they are made of.
-fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &Layout, (entry, told): (DVec3, &Told)) {
+fn lists(
+    tables: &mut Tables,
+    model: &Model,
+    opening: &OpeningPlan,
+    mesh: &BlockMesh,
+    layout: &Layout,
+    (entry, told): (DVec3, &Told),
+) {
     let mut sections: BTreeMap<u32, Vec<(u32, f32, f32)>> = BTreeMap::new();
     for (index, station) in opening.stations.iter().enumerate() {
         let mut weights: BTreeMap<u32, (f32, f32)> = BTreeMap::new();
@@ -340,13 +383,18 @@ fn lists(tables: &mut Tables, opening: &OpeningPlan, mesh: &BlockMesh, layout: &
         }));
         let end = tables.entries.len() as u32;
         let cut_from = opening.opens_at(station);
-        let own = OpeningStation {
+        let mut own = OpeningStation {
             depth: [station.depth as f32, cut_from as f32, station.opened(opening.shaft) as f32, 0.0],
             lists: [first, middle, middle, end],
             rest: vec4(station.middle - entry),
             rest_direction: vec4(station.direction),
             ..OpeningStation::zeroed()
         };
+        relax(&mut own, &SectionRelaxation::default());
+        let (shares, rates) = (own.shares.as_flattened_mut(), own.rates.as_flattened_mut());
+        for ((share, rate), term) in shares.iter_mut().zip(rates).zip(model.terms_at(station)) {
+            (*share, *rate) = (term.ratio as f32, (1.0 / term.time) as f32);
+        }
         tables.stations.push(with_growth(own, &station.growth, opening.shaft));
     }
     for node in opening.nodes.iter().copied() {

@@ -430,7 +430,6 @@ fn not_opened(effects: &EffectSet, tool: Option<&Tool>, tets: bool) -> Vec<&'sta
         (tets, "a mesh of tetrahedra"),
         (effects.cohesive.is_some(), "the effect cohesive"),
         (effects.plasticity.is_some(), "the effect plasticity"),
-        (effects.viscoelastic.is_some(), "the effect viscoelastic"),
         (effects.damage.is_some(), "the effect damage"),
         (!effects.own.is_empty(), "effects of the program's own"),
         (is_hollow, "a hollow needle"),

@@ -166,11 +166,11 @@ fn cell_lanes<S: Simd>(
     let Some(shape) = opened(map, &Beside { offset, ..middle }, &h, &law, bulk, step.measures) else { return false };
     let closed = &shape.closed;
     let [closed_straight, closed_turned] = closed.tangent_bound(&law, bulk);
-    let shared = volume * share;
+    let shared = volume * share * Lanes::load(simd, &path.left, at);
     sum.add(&Derivatives { place: [zero; 3], ..shape.d }, shared);
     let by_place = [shape.d.place[0] * shared, shape.d.place[1] * shared, shape.d.place[2] * shared];
     add_at(&mut sum, by_place, place);
-    let mut energy = shape.energy * shared;
+    let (mut energy, intact) = (shape.energy * shared, shape.energy * (volume * share));
     // Where points carry all of the shape nothing grows.
     let little = Lanes::splat(simd, 1e-9);
     let grown = share.choose(little, one, edge.mul_add(shape.by_place, shape.by_gradient).larger(one));
@@ -239,6 +239,7 @@ fn cell_lanes<S: Simd>(
     put(sum.radius, 6);
     put(sum.radius_rate, 7);
     put(energy, 8);
+    put(intact, 12);
     if all.turns {
         let moment = moment_of(&h, middle.offset, &sum.gradient, sum.place);
         for a in 0..3 {

@@ -19,6 +19,8 @@ pub struct Gathered {
     pub rest_direction: [[f32; WIDEST]; 3],
     /// [`GrowthIn`].
     pub growth: [[f32; WIDEST]; 3],
+    /// Part of the stress that is left, 0 where the path is closed.
+    pub left: [f32; WIDEST],
     /// 1 where the path is open.
     pub open: [f32; WIDEST],
     pub is_any_open: bool,
@@ -34,6 +36,7 @@ impl Gathered {
             radius_rate: none,
             rest_direction: [none; 3],
             growth: [none, none, [1.0; WIDEST]],
+            left: none,
             open: none,
             is_any_open: false,
         }
@@ -58,6 +61,7 @@ impl Gathered {
         self.growth[2][lane] = (station.growth.reach * area) as f32;
         self.radius[lane] = (station.radius * over_shaft) as f32;
         self.radius_rate[lane] = station.radius_rate as f32;
+        self.left[lane] = station.left() as f32;
         self.open[lane] = 1.0;
         self.is_any_open = true;
     }
@@ -68,7 +72,8 @@ impl Gathered {
         for axis in 0..3 {
             (self.offset[axis][lane], self.rate[axis][lane]) = (0.0, 0.0);
         }
-        (self.radius[lane], self.radius_rate[lane], self.open[lane]) = (0.0, 0.0, 0.0);
+        (self.radius[lane], self.radius_rate[lane]) = (0.0, 0.0);
+        (self.left[lane], self.open[lane]) = (0.0, 0.0);
     }
 
     #[inline(always)]

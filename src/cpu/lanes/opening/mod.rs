@@ -49,8 +49,8 @@ const STRIDES: [usize; 4] = [1, 2, 4, 8];
 /// `|b|^2` [1/m^2], then the law: c1, c2, c3, c01 and bulk modulus; mean and variance of the growth [radii].
 const CELL: usize = 10 + LAW + 2;
 /// Rows of what a vector of cells gives: forces (as f_int) [N] on its corners, corner by corner, by the place [N], rate, radius [N] and its
-/// rate, energy, moment, bound.
-const CELL_SUMS: usize = CORNER_FORCES + 3 + 3 + 1 + 1 + 1 + 3 + 1;
+/// rate, energy, moment, energy of the shape without relaxation, bound.
+const CELL_SUMS: usize = CORNER_FORCES + 3 + 3 + 1 + 1 + 1 + 3 + 1 + 1;
 /// Rows of the forces on corners.
 const CORNER_FORCES: usize = 3 * SIGNS;
 
@@ -153,6 +153,8 @@ pub(in crate::cpu) struct PointSums {
     /// Moment of the forces on nodes about the path.
     pub moment: DVec3,
     pub energy: f64,
+    /// Energy of the shape without relaxation [J].
+    pub shape: f64,
 }
 
 /// First station and number of stations in a cell, and what is derived of their mean.
@@ -162,7 +164,8 @@ impl PointSums {
     /// Of derivatives and an energy per volume.
     pub fn new(d: &Derivatives<f64>, moment: DVec3, energy: f64, volume: f64) -> Self {
         let (place, centre_rate) = (DVec3::from(d.place), DVec3::from(d.centre_rate));
-        PointSums { place, centre_rate, radius: d.radius, radius_rate: d.radius_rate, moment, energy }.times(volume)
+        let (radius, radius_rate) = (d.radius, d.radius_rate);
+        PointSums { place, centre_rate, radius, radius_rate, moment, energy, shape: 0.0 }.times(volume)
     }
 
     fn add(&mut self, other: &Self) {
@@ -172,11 +175,12 @@ impl PointSums {
         self.radius_rate += other.radius_rate;
         self.moment += other.moment;
         self.energy += other.energy;
+        self.shape += other.shape;
     }
 
     /// All of it `by` times.
     pub fn times(&self, by: f64) -> Self {
-        PointSums::of(self.rows().map(|value| value * by))
+        PointSums { shape: self.shape * by, ..PointSums::of(self.rows().map(|value| value * by)) }
     }
 
     fn rows(&self) -> [f64; POINT_SUMS] {
@@ -193,6 +197,7 @@ impl PointSums {
             radius_rate,
             moment: DVec3::new(mx, my, mz),
             energy,
+            shape: 0.0,
         }
     }
 }
@@ -495,6 +500,7 @@ impl LaneOpening {
                 Gather::Stations { first, sums } => {
                     for (i, sums) in (first..).zip(sums).filter(|(i, _)| stations[*i].radius > 0.0) {
                         *sums = self.of_station(i);
+                        sums.shape = sums.energy / stations[i].left();
                     }
                     Vec::new()
                 }
@@ -540,6 +546,7 @@ impl LaneOpening {
                     radius_rate: row(7),
                     energy: row(8),
                     moment: vector(9),
+                    shape: row(12),
                 });
             }
             for bits in 0..SIGNS {

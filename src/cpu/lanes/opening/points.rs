@@ -168,7 +168,7 @@ fn point_lanes<S: Simd>(
     let row = |row: usize| Lanes::load(simd, points, row * WIDEST + at);
     let [x, y, z] = [row(0), row(1), row(2)];
     let open = Lanes::load(simd, &path.open, at);
-    let volume = row(3) * open;
+    let volume = row(3) * Lanes::load(simd, &path.left, at);
     let edges = [row(4), row(5), row(6)];
     let one = Lanes::splat(simd, 1.0);
     let over_edges = [one.over(edges[0]), one.over(edges[1]), one.over(edges[2])];
