@@ -65,6 +65,8 @@ fn needle_scenes_go_on_bit_for_bit() {
         // 2 mm/s and 60 frames a second: the tip is in from frame 80 on, and on the opened path from 145 on.
         assert_goes_on("calibrated/muscle_biopsy.toml", &[COARSE], engine, 90, 100);
         assert_goes_on("muscle_biopsy.toml", &[COARSE], engine, 150, 156);
+        let relaxing = r#"effects=["puncture", "friction", "viscoelastic", "mass_scaling"]"#;
+        assert_goes_on("muscle_biopsy.toml", &[COARSE, relaxing], engine, 150, 154);
         // The image of the CPU engine is its whole state; that of the GPU engine is a list of buffers.
         if engine == EngineChoice::Cpu {
             continue;
@@ -156,7 +158,7 @@ fn a_killed_run_goes_on_to_the_same_tables() {
     let again = stylet(folder.path()).args(["run", "--resume", "killed"]).output().unwrap();
     assert_eq!(again.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&again.stderr).contains("has finished: nothing is left to go on with"));
-    std::fs::write(&checkpoint, b"stylet checkpoint 3\nrubbish").unwrap();
+    std::fs::write(&checkpoint, b"stylet checkpoint 4\nrubbish").unwrap();
     let damaged = stylet(folder.path()).args(["run", "--resume", "killed"]).output().unwrap();
     assert_eq!(damaged.status.code(), Some(2));
     let told = String::from_utf8_lossy(&damaged.stderr);

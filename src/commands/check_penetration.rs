@@ -33,7 +33,15 @@ pub fn describe(scene: &Scene) -> Vec<String> {
     let depth = scene.motion.deepest();
     for (place, material) in materials {
         lines.push(format!("  {} ({place})", material.name));
-        let of_material = describe_one(material, needle, &params, friction, depth);
+        let mut of_material = describe_one(material, needle, &params, friction, depth);
+        let series = scene.effects.viscoelastic.as_ref().map(|common| material.viscoelastic.as_ref().unwrap_or(common));
+        if let Some(series) = series.filter(|_| params.scheme == SchemeWord::Opening && material.toughness.is_some()) {
+            let lasting = 1.0 - series.terms.iter().map(|term| term.ratio).sum::<f64>();
+            of_material.push(format!(
+                "all this is tissue without time to relax; beside a needle that is held for long {} of what keeps the shape is left",
+                four_digits(lasting)
+            ));
+        }
         lines.extend(of_material.into_iter().map(|text| format!("    {text}")));
     }
     if !scene.regions.is_empty() {

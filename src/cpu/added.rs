@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 /// Nodes that are cleared and looked at together.
-const BLOCK: usize = 64;
+const BLOCK: usize = 16;
 
 /// What is added at every node in a step. Blocks of nodes remember whether anything was: clearing all of them took an eighth of a step of
 /// 20,000 cells, on one thread.

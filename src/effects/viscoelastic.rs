@@ -224,3 +224,61 @@ pub fn take_out<N: Number>(q: &Symmetric<N>, h: &Tensor<N>, p: &mut Tensor<N>) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TERMS: [Term; 2] = [Term { ratio: 0.3, time: 0.2 }, Term { ratio: 0.2, time: 3.0 }];
+
+    /// Part that is left `time` after a step.
+    fn series(time: f64) -> f64 {
+        1.0 - TERMS.iter().map(|t| t.ratio * (1.0 - (-time / t.time).exp())).sum::<f64>()
+    }
+
+    #[test]
+    fn a_section_that_opens_at_once_relaxes_as_the_series_whatever_the_frames() {
+        for frame in [0.001, 0.01, 0.1] {
+            let mut section = SectionRelaxation::default();
+            let (radius, energy) = (0.8e-3, 2e-4);
+            let frames = (1.0_f64 / frame).round() as u32;
+            for _ in 0..frames {
+                section.advance(&TERMS, radius, energy, frame);
+            }
+            // Of a hole that opened half of a frame before the first one ended.
+            let expected = series(1.0);
+            assert!((section.left - expected).abs() < 1e-12, "{} instead of {expected}", section.left);
+            assert!((section.dissipated - energy * (1.0 - expected)).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_section_that_opens_slowly_follows_the_ramp_to_second_order() {
+        let (rate, time) = (0.5e-3, 1.2);
+        // r = v (t - tau (1 - e^(-t/tau))) at the middle of the next frame.
+        let exact = |t: f64, term: &Term| rate * (t + term.time * (-t / term.time).exp_m1());
+        let mut errors = Vec::new();
+        for frame in [0.02, 0.01] {
+            let mut section = SectionRelaxation::default();
+            for i in 1..=(time / frame as f64).round() as u32 {
+                section.advance(&TERMS, rate * frame * f64::from(i), 0.0, frame);
+            }
+            let expected = exact(time + 0.5 * frame, &TERMS[0]);
+            errors.push((section.opened[0] / expected - 1.0).abs());
+        }
+        assert!(errors[0] < 2e-3 && errors[1] < 0.3 * errors[0], "{errors:?}");
+    }
+
+    #[test]
+    fn a_section_that_closes_holds_on_to_nothing_and_begins_anew() {
+        let mut section = SectionRelaxation::default();
+        for _ in 0..100 {
+            section.advance(&TERMS, 0.8e-3, 1e-4, 0.1);
+        }
+        assert!(section.left < 0.56);
+        section.advance(&TERMS, 0.1e-3, 1e-6, 0.1);
+        assert!((section.left - 0.5).abs() < 1e-12, "all of the share has relaxed: {}", section.left);
+        section.advance(&TERMS, 0.0, 0.0, 0.1);
+        assert_eq!((section.left, section.opened), (1.0, [0.0; LARGEST_TERM_COUNT]));
+    }
+}

@@ -541,6 +541,7 @@ mod tests {
             radius_rate: -0.3,
             rest_direction: DVec3::new(0.25, -0.2, -1.0).normalize(),
             growth: Growth::new(0.07, 0.1e-3, 0.3e-3),
+            relaxed: 0.0,
         }
     }
 

@@ -452,3 +452,84 @@ fn the_force_falls_behind_the_puncture_of_soft_tissue() {
         at_most("imbalance", pressed.map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max), 0.01);
     }
 }
+
+/// Elastic constants of the preset of [`INSERTION`] by `factor`, the bulk modulus as it is.
+fn shear_times(factor: f64) -> String {
+    let (c10, c01, toughness) = (9.52 * factor, 4.14 * factor, 164.0 * factor);
+    format!(
+        "material={{c10_kpa={c10}, c01_kpa={c01}, d_per_mpa=4.0, density_kg_m3=1060.0, toughness_j_m2={toughness}}}"
+    )
+}
+
+const RELAXING: &str = "effects=[\"puncture\", \"friction\", \"viscoelastic\", \"mass_scaling\"]";
+/// So little that no tissue is dragged along.
+const SMOOTH: &str = "friction.coefficient=0.001";
+
+fn then_hold(seconds: f64) -> String {
+    format!(
+        "motion.phase=[{{kind=\"insert\", speed_mm_s=10.0, depth_mm=7.0}}, {{kind=\"hold\", duration_s={seconds}}}, \
+         {{kind=\"withdraw\", speed_mm_s=10.0, depth_mm=0.0}}]"
+    )
+}
+
+/// Whatever the way there: with half of its modulus left, and the same slit, tissue presses on the shaft as one of half the modulus does.
+#[test]
+fn relaxed_tissue_holds_the_needle_as_tissue_of_the_lasting_modulus() {
+    let hold = then_hold(0.5);
+    let held = |frames: &[FrameRecord]| frames.iter().rev().find(|f| f.phase == 1).unwrap().force.shaft_normal;
+    let quick = ["viscoelastic.g=[0.3, 0.2]", "viscoelastic.tau_s=[0.02, 0.05]"];
+    let relaxing = scene(&[RELAXING, quick[0], quick[1], SMOOTH, &hold, &shear_times(1.0)]);
+    let soft = scene(&[FRICTION, SMOOTH, &hold, &shear_times(0.5)]);
+    let relaxing = frames(relaxing, engines_here().pop().unwrap());
+    let soft = frames(soft, EngineChoice::Cpu);
+    println!("{:.4} N, {:.4} N with half of the modulus", held(&relaxing), held(&soft));
+    close("normal force on the shaft", held(&relaxing), held(&soft), 0.025);
+    let imbalance = relaxing.iter().map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max);
+    at_most("imbalance", imbalance, 2e-3);
+}
+
+/// While a needle is held nothing but time acts on the shape; the part of the force that comes from the volume does not change.
+#[test]
+fn the_force_on_a_held_shaft_falls_with_the_time_of_the_series() {
+    let tau = 0.4;
+    let [g, times] = ["viscoelastic.g=[0.4]".to_string(), format!("viscoelastic.tau_s=[{tau}]")];
+    let scene = scene(&[RELAXING, &g, &times, &then_hold(2.0 * tau + 0.1)]);
+    let all = frames(scene, EngineChoice::Cpu);
+    let begin = all.iter().find(|f| f.phase == 1).unwrap().time + 0.05;
+    let at = |time: f64| all.iter().find(|f| f.time >= time).unwrap();
+    let [first, second, third] = [0.0, tau, 2.0 * tau].map(|t| at(begin + t));
+    let normal = |f: &FrameRecord| f.force.shaft_normal;
+    let fallen = (normal(first) - normal(second)) / (normal(second) - normal(third));
+    println!("{:.4}, {:.4}, {:.4} N: {fallen:.4}", normal(first), normal(second), normal(third));
+    close("ratio of what is lost in two times tau", fallen, std::f64::consts::E, 0.03);
+    assert!(normal(third) < 0.8 * normal(first));
+    // Friction follows, and what has relaxed is dissipated for good.
+    close("friction", third.force.friction, 0.3 * normal(third), 0.01);
+    let held = all.iter().filter(|f| f.phase == 1).map(|f| f.energy.viscous);
+    assert!(held.clone().zip(held.skip(1)).all(|(a, b)| b >= a));
+    assert!(third.energy.viscous > 1e-4);
+    at_most("imbalance", all.iter().map(|f| f.energy.imbalance().abs()).fold(0.0, f64::max), 2e-3);
+}
+
+/// Two layers with terms of their own, in and out again.
+#[test]
+fn all_engines_relax_alike() {
+    let deep = "region=[{name=\"deep\", layer_mm=[5.5, 9.0], material={preset=\"across-fibre\"}, viscoelastic={g=[0.1], tau_s=[0.3]}}]";
+    let small = ["tissue.size_mm=[14.0,14.0,9.0]", "viscoelastic.g=[0.25, 0.15]", "viscoelastic.tau_s=[0.05, 1.0]"];
+    let hold = then_hold(0.2);
+    let run = |engine| frames(scene(&[RELAXING, small[0], small[1], small[2], deep, &hold]), engine);
+    let oracle = run(EngineChoice::Cpu64);
+    let largest = oracle.iter().map(|f| f.force.axial).fold(0.0, f64::max);
+    let held = |frames: &[FrameRecord]| frames.iter().rev().find(|f| f.phase == 1).unwrap().clone();
+    for engine in engines_here() {
+        let found = run(engine);
+        // Where no crack runs: see both_engines_give_the_same_force.
+        let behind = oracle.iter().zip(&found).filter(|(a, _)| a.phase > 0);
+        let apart = behind.map(|(a, b)| (a.force.axial - b.force.axial).abs() / largest).fold(0.0, f64::max);
+        println!("{engine:?}: {apart:.1e} of the peak of {largest:.3} N");
+        at_most("apart from f64", apart, 5e-4);
+        let [a, b] = [&oracle, &found].map(|frames| held(frames).energy);
+        close("dissipated by the terms", b.viscous, a.viscous, 2e-3);
+        close("elastic energy", b.elastic, a.elastic, 1e-3);
+    }
+}
