@@ -260,7 +260,7 @@ mod tests {
         let mut errors = Vec::new();
         for frame in [0.02, 0.01] {
             let mut section = SectionRelaxation::default();
-            for i in 1..=(time / frame as f64).round() as u32 {
+            for i in 1..=(time / frame).round() as u32 {
                 section.advance(&TERMS, rate * frame * f64::from(i), 0.0, frame);
             }
             let expected = exact(time + 0.5 * frame, &TERMS[0]);

@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3};
 
 use super::opening::{OpeningInput, OpeningPlan, OpeningStation};
-use crate::effects::viscoelastic::Term;
 use super::{ContactNode, ContactSurface, FreePlan, LaidPath, Model, tet_puncture};
 use crate::anatomy::Case;
 use crate::effects::puncture::{Cutting, SchemeWord, left_before_exit};
+use crate::effects::viscoelastic::Term;
 use crate::effects::{TissueMaterial, puncture};
 use crate::mesh::{BlockMesh, Bore};
 use crate::mesh::{Mesh, TetLine};
