@@ -254,7 +254,7 @@ mod tests {
 
     #[test]
     fn a_section_that_opens_slowly_follows_the_ramp_to_second_order() {
-        let (rate, time) = (0.5e-3, 1.2);
+        let (rate, time): (f64, f64) = (0.5e-3, 1.2);
         // r = v (t - tau (1 - e^(-t/tau))) at the middle of the next frame.
         let exact = |t: f64, term: &Term| rate * (t + term.time * (-t / term.time).exp_m1());
         let mut errors = Vec::new();
