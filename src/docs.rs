@@ -291,6 +291,9 @@ fn stage_text(stage: Stage) -> [&'static str; 2] {
         Stage::OpeningReactions => ["normal force, friction, reaction on needle and tip", "`puncture`, scheme opening"],
         Stage::OpeningNodes => ["all of it on the nodes", "`puncture`, scheme opening"],
         Stage::MeasureOpening => ["energy of opening and its sums", "`puncture`, scheme opening"],
+        Stage::MeasureRelaxation => {
+            ["energy beside the path where nothing has relaxed", "`puncture`, scheme opening; `viscoelastic`"]
+        }
         Stage::RelaxPath => ["stress beside the path relaxes", "`puncture`, scheme opening; `viscoelastic`"],
         Stage::IndenterContact => ["surface against a sphere or punch", "`indentation`"],
         Stage::IntegrateNodes => ["gather, loads, damping, central difference, prescribed motion", "always"],

@@ -1,5 +1,5 @@
 // Stage measure_opening: energy that opening adds to the tissue, in PARTS parts, and what the frame has summed.
-#import shared/opening_cell
+#import shared/opened_energy
 
 // As OPENING_PARTS in src/gpu/plan.rs.
 const PARTS: u32 = 1024u;
@@ -9,9 +9,6 @@ const PARTS: u32 = 1024u;
 #import effects/flexible_needle
 @group(3) @binding(16) var<storage, read_write> needle_loads: array<vec4<f32>, 64>;
 #endif
-#ifdef VISCOELASTIC
-@group(3) @binding(22) var<storage, read_write> opening_sums: array<OpeningSum>;
-#endif
 @group(3) @binding(23) var<storage, read_write> opening_record: OpeningRecord;
 @group(3) @binding(24) var<storage, read_write> opening_totals: OpeningTotals;
 
@@ -20,39 +17,18 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
     let thread = id.x;
     let scale = 1.0 / opening.direction.w;
     var energy = 0.0;
-#ifdef VISCOELASTIC
-    // Of the points that one sum tells of.
-    var told = 0.0;
-#endif
     for (var index = thread; index < opening.counts.y; index += PARTS) {
         let cluster = path_clusters[index];
         let end = opened_end(cluster.points.xy);
         let modes = cell_modes(cluster.cell.xyz);
         for (var i = cluster.points.x; i < end; i++) {
             let point = path_points[i];
-            let station = path_stations[point.numbers.x];
-            let section = section_of(station);
-            let p = point.place.xyz;
-            let H = strain_at(modes, p, cluster.inverse.xyz);
-            let y = cluster.middle.xyz - station.centre.xyz + p / cluster.inverse.xyz + displacement_at(modes, p);
-            let place = opened_place(section, across(y) * scale, deformation_gradient(H));
-            let intact = select(0.0, point.place.w, section.radius > 0.0) * opened_energy(cluster.cell.w, place, H);
-            energy += intact * section.left;
-#ifdef VISCOELASTIC
-            told += intact;
-            for (var once = select(0u, 1u, point.numbers.z == 0u); once == 0u; once++) {
-                opening_sums[point.numbers.y].by_moment.w = told;
-                told = 0.0;
-            }
-#endif
+            energy += section_of(path_stations[point.numbers.x]).left * energy_of_point(cluster, modes, point);
         }
     }
     for (var index = thread; index < opening.counts.z; index += PARTS) {
         let cell = near_cells[index];
         let mean = path_stations[opening.counts.x + cell.stations.x];
-#ifdef VISCOELASTIC
-        opening_sums[opening.sums.w + index].by_moment.w = 0.0;
-#endif
         for (var once = select(1u, 0u, mean.centre.w > 0.0); once == 0u; once++) {
             let section = section_of(mean);
             let modes = cell_modes(cell.cell.xyz);
@@ -72,12 +48,7 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
             let open = dj + (1.0 + dj) * dilated;
             energy += 0.5 * materials[cell.cell.w].bulk_modulus * volume
                 * (open * open - dj * dj + (1.0 + dj) * (1.0 + dj) * area * area * cell.inverse.w);
-            let eta = across(middle + gradient * (cell.place.xyz * width)) * scale;
-            let intact = cell.place.w * volume * opened_energy(cell.cell.w, opened_place(section, eta, gradient), H);
-            energy += intact * section.left;
-#ifdef VISCOELASTIC
-            opening_sums[opening.sums.w + index].by_moment.w = intact;
-#endif
+            energy += section.left * energy_of_shape(cell, mean, modes, H);
         }
     }
     opening_totals.elastic[thread / 128u][thread / 4u % 32u][thread % 4u] = energy;

@@ -45,6 +45,8 @@ pub enum Stage {
     MeasureNodes,
     /// Energy that opening adds, and its sums (once per frame).
     MeasureOpening,
+    /// Energy beside the opened path where nothing has relaxed (once per frame).
+    MeasureRelaxation,
     /// The stress beside the opened path relaxes (once per frame).
     RelaxPath,
     /// Sums over the contact nodes (once per frame).
@@ -61,7 +63,7 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 27] = [
+    pub const ALL: [Stage; 28] = [
         Stage::PathMeans,
         Stage::AdvanceTip,
         Stage::SoftenPath,
@@ -85,6 +87,7 @@ impl Stage {
         Stage::MeasureContact,
         // Adds to the loads of a flexible needle that the one above has summed.
         Stage::MeasureOpening,
+        Stage::MeasureRelaxation,
         Stage::RelaxPath,
         Stage::MeasureFaces,
         Stage::MeasureSeparation,
@@ -116,6 +119,7 @@ impl Stage {
             Stage::MeasureCells => "measure_cells",
             Stage::MeasureNodes => "measure_nodes",
             Stage::MeasureOpening => "measure_opening",
+            Stage::MeasureRelaxation => "measure_relaxation",
             Stage::RelaxPath => "relax_path",
             Stage::MeasureContact => "measure_contact",
             Stage::MeasureFaces => "measure_faces",
@@ -148,6 +152,7 @@ impl Stage {
             Stage::MeasureCells
                 | Stage::MeasureNodes
                 | Stage::MeasureOpening
+                | Stage::MeasureRelaxation
                 | Stage::RelaxPath
                 | Stage::MeasureContact
                 | Stage::MeasureFaces

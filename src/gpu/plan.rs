@@ -133,7 +133,7 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
         | Stage::OpeningNodes
         | Stage::MeasureOpening => puncture && opening,
         Stage::PathMeans | Stage::PathSums => puncture && opening && features.wide,
-        Stage::RelaxPath => puncture && opening && effects.viscoelastic.is_some(),
+        Stage::MeasureRelaxation | Stage::RelaxPath => puncture && opening && effects.viscoelastic.is_some(),
         Stage::IndenterContact => indentation,
         Stage::MeasureContact => puncture || indentation,
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
@@ -167,6 +167,7 @@ pub fn threads(stage: Stage, model: &Model, layout: &Layout, grain: Grain) -> u3
         Stage::PathMeans => 64 * section_counts(model)[0],
         Stage::PathSums => 64 * section_counts(model).iter().sum::<u32>(),
         Stage::MeasureOpening => OPENING_PARTS,
+        Stage::MeasureRelaxation => opening_counts(model)[0] + opening_counts(model)[1],
         Stage::NeedleContact | Stage::IndenterContact => model.contact_nodes.len() as u32,
         Stage::IntegrateNodes => 64 * busy_nodes(model).len() as u32,
         Stage::MeasureCells | Stage::MeasureNodes => grain.measure_threads,
