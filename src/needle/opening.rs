@@ -29,9 +29,8 @@ pub const EXACT: f64 = 2.0;
 /// See [`EXACT`].
 pub const FADED: f64 = 4.0;
 
-/// How the tissue around the hole changes its volume: by `m = 1 + b - f/(s + q)` times `rc^2` more area lies within s than that of the hole and
-/// the tissue at rest. Around a narrow hole tissue is stretched so far that its volume grows: by 5 % of the hole at Poisson's ratio 0.47, most of it
-/// within a third of a radius.
+/// How the tissue around the hole changes its volume: within s lies `m = 1 + b - f/(s + q)` times `rc^2` more area than at rest. Around a narrow
+/// hole tissue is stretched so far that it grows: by 5 % of the hole at Poisson's ratio 0.47, most of it within a third of a radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Growth {
     /// b: far from the path.
