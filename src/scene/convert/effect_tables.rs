@@ -178,7 +178,7 @@ impl Check<'_> {
             self.problems.report(
                 "puncture.scheme",
                 format!("the scheme opening does not carry {} yet", found.join(", ")),
-                "a solid needle in elastic tissue",
+                "a solid needle in elastic or viscoelastic tissue",
                 "write puncture.scheme = \"ring\"",
             );
         }
