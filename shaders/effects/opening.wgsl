@@ -92,7 +92,8 @@ struct OpeningRecord {
     angular_impulse: vec4<f32>,
     // Impulse along the needle of spreading and of friction [N s], work of the tool [J], dissipated by friction [J].
     parts: vec4<f32>,
-    // Force that opening takes per advance of the tip [N], energy in guide and stick springs [J], force that spreads the path [N]; w unused.
+    // Force that opening takes per advance of the tip [N], energy in guide and stick springs [J], force that spreads the path [N] and by how
+    // much it falls per length that the path is shifted on, at most [N/m].
     now: vec4<f32>,
     // What the tip dissipated beyond what it was told before it advanced [J]; what relaxation dissipated since t = 0 and in this frame [J];
     // w unused.

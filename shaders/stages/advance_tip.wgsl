@@ -120,7 +120,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
 #ifdef OPENING
     // The tissue that the tip opens as it advances is strained at once.
     resistance = opening_record.now.x;
-    let spreading = opening_record.now.z;
+    let spreading = Spreading(opening_record.now.z, opening_record.now.w, dimple_part(before) * tip_state.dimple);
 #endif
     var threshold = tip_threshold(before, speed) + resistance;
 #ifndef TETRAHEDRA
@@ -150,7 +150,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         mean_before = distance / f32(ANCHOR_COUNT);
         stretch_before = stretch / f32(ANCHOR_COUNT);
         touch = surface_touch(select(0.0, mean_before, before < puncture.exit), part, spreading);
-        threshold += dimple_closing(before) * touch.dimple * spreading;
+        threshold += dimple_closing(before) * touch.dimple * spreading.force;
         let excess = touch.force - threshold;
 #else
         let excess = spring * gap - threshold;
@@ -251,7 +251,7 @@ fn advance_tip(@builtin(local_invocation_index) lane: u32) {
         let held = touch_energy(touch);
         let was = SurfaceTouch(tip_state.touch_force, tip_state.dimple);
         let shifted = dimple_part(after) * touch.dimple - dimple_part(before) * was.dimple;
-        lost = 0.5 * (was.force * way + touch.force * (way - stretched)) + spreading * shifted
+        lost = 0.5 * (was.force * way + touch.force * (way - stretched)) + spreading.force * shifted
             - (held - touch_energy(was));
         tip_state.touch_stretch = stretch / f32(ANCHOR_COUNT);
         stored = bond_energy + held;

@@ -33,6 +33,7 @@ var<workgroup> parts: array<vec4<f32>, LANES>;
 var<workgroup> lateral: array<vec4<f32>, LANES>;
 var<workgroup> torque: array<vec4<f32>, LANES>;
 var<workgroup> bent: array<f32, LANES>;
+var<workgroup> most: array<f32, LANES>;
 
 // Part of a station that is on the shaft.
 fn on_shaft(i: u32) -> f32 {
@@ -108,6 +109,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
     // Sum of the normal forces on the shaft; work of the needle beside that of its motion as a whole [J].
     var squeezed = 0.0;
     var bend_work = 0.0;
+    var most_spread = 0.0;
     for (var i = lane; i < count; i += LANES) {
         let now = path_stations[i];
         // By the centre and by rc with all that follows from them.
@@ -153,6 +155,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         let by_radius = 0.5 * per_radius * dot(offset, offset);
         let tilted = dot(along_axis(axis, -guide, -t), t) + dot(guide, shift) * -now.place.w;
         let spread = (by.w + by_radius) * now.place.w * now.place.y - tilted;
+        most_spread = max(most_spread, spread);
         var stick = now.rubbing.z;
         var rubbing = 0.0;
         var bound = 0.0;
@@ -196,6 +199,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
     parts[lane] = along;
     lateral[lane] = aside;
     bent[lane] = bend_work;
+    most[lane] = most_spread;
     torque[lane] = vec4<f32>(turning, squeezed);
     workgroupBarrier();
     // Halves onto halves.
@@ -205,6 +209,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
             lateral[lane] += lateral[lane + half];
             torque[lane] += torque[lane + half];
             bent[lane] += bent[lane + half];
+            most[lane] = max(most[lane], most[lane + half]);
         }
         workgroupBarrier();
     }
@@ -229,6 +234,6 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         // The tip was told what the path took before it advanced: half of what that changed by comes off.
         let told = opening_record.now;
         opening_record.late.x += 0.5 * ((along.x - told.z) * tip_state.shifted - (aside.w - told.x) * tip_state.advanced);
-        opening_record.now = vec4<f32>(aside.w, along.w, along.x, 0.0);
+        opening_record.now = vec4<f32>(aside.w, along.w, along.x, most[0] / spacing);
     }
 }

@@ -116,6 +116,7 @@ impl CpuEngine {
             relaxation: vec![SectionRelaxation::default(); model.relaxing_stations()],
             opening_resistance: 0.0,
             opening_spreading: 0.0,
+            opening_stiffness: 0.0,
             touch: Touch::default(),
             pairs: vec![0.0; model.separation.pairs.len()],
             points: if model.has_history() { vec![PointState::default(); cells] } else { Vec::new() },

@@ -285,6 +285,7 @@ impl CpuEngine {
         self.state.opening_resistance =
             now.iter().zip(&radius).zip(&guides).map(|((n, r), g)| (r + g.by_radius) * n.full * n.cut_rate).sum();
         self.state.opening_spreading = spreads.iter().sum();
+        self.state.opening_stiffness = opening.shift_stiffness(&spreads);
         // The tip was told what the path took before it advanced: half of what that changed by comes off.
         let [advance, shift] = self.advanced;
         self.sums.energy.tip += 0.5 * (self.state.opening_spreading - old[1]) * shift

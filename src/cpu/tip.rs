@@ -11,7 +11,7 @@ use crate::engine::elements::CellStates;
 use crate::mesh::{BlockMesh, CORNERS, Mesh};
 use crate::model::{Model, PuncturePlan};
 use crate::needle::ToolPose;
-use crate::needle::tip_contact::Touch;
+use crate::needle::tip_contact::{Spreading, Touch};
 
 /// Nodes around a material point, their weights, and the derivative of the weights along the path [1/m].
 type Around = ([usize; 8], [f64; 8], [f64; 8]);
@@ -47,8 +47,8 @@ struct TipLoads {
 }
 
 impl TipLoads {
-    /// With the tip at `a` [m], the stiffness `spring` per anchor [N/m] and the force that spreads the opened path [N].
-    fn new(plan: &PuncturePlan, spring: f64, anchors: &[PlacedAnchor], a: f64, spreading: f64) -> Self {
+    /// With the tip at `a` [m], the stiffness `spring` per anchor [N/m] and what spreads the opened path.
+    fn new(plan: &PuncturePlan, spring: f64, anchors: &[PlacedAnchor], a: f64, spreading: &Spreading) -> Self {
         let Some(contact) = &plan.contact else {
             let each: Vec<f64> = anchors.iter().map(|p| spring * p.gap).collect();
             let stored = anchors.iter().map(|p| 0.5 * spring * p.gap * p.gap).sum();
@@ -132,9 +132,9 @@ impl CpuEngine {
                 .collect()
         };
         let mean_distance = |anchors: &[PlacedAnchor]| anchors.iter().map(|p| p.distance).sum::<f64>() / count;
-        let spreading = self.state.opening_spreading;
-        let loads = |anchors: &[PlacedAnchor], a: f64| TipLoads::new(plan, spring, anchors, a, spreading);
         let a = self.state.tip_coordinate;
+        let spreading = plan.contact.as_ref().map_or_else(Spreading::default, |contact| self.state.spreading(contact));
+        let loads = |anchors: &[PlacedAnchor], a: f64| TipLoads::new(plan, spring, anchors, a, &spreading);
         let mut anchors = place(&self.state.displacement, a);
         let bond_force = match model.effects.adhesion {
             Some(adhesion) => self.advance_bond(&adhesion, mean_distance(&anchors), a > 0.0 && a < plan.exit),
@@ -146,7 +146,7 @@ impl CpuEngine {
         let speed = pose.velocity.length();
         // The tissue that the tip opens as it advances is strained at once.
         let resistance = self.state.opening_resistance;
-        let closing = plan.contact.as_ref().map_or(0.0, |c| c.closing(a) * now.touch.dimple * spreading);
+        let closing = plan.contact.as_ref().map_or(0.0, |c| c.closing(a) * now.touch.dimple * spreading.force);
         let threshold = plan.threshold(a) * p.rate_factor(speed) + resistance + closing;
         self.advanced = [0.0; 2];
         if now.force > threshold {
@@ -154,7 +154,7 @@ impl CpuEngine {
             let (advance, cap) = match (&plan.opening, &plan.contact) {
                 (Some(opening), Some(contact)) => {
                     let cap = opening.advance_limit(plan.segment(a).shear_wave_speed, speed * self.dt, self.dt);
-                    let excess = contact.excess(now.force, threshold, contact.part(a), spreading);
+                    let excess = contact.excess(now.force, threshold, contact.part(a), &spreading);
                     let shortened = (lambda - contact.closing(a) * now.touch.dimple).max(puncture::LEAST_STRETCH);
                     ((excess / shortened).max(0.0).min(cap), cap)
                 }
@@ -176,7 +176,7 @@ impl CpuEngine {
                     self.advanced = [advance, shift];
                     // What the stretch became over the step, at the place where the tip was.
                     let stretched = advance * (stretch - old.stretch);
-                    contact.dissipated((old, new), (way, stretched), shift, spreading)
+                    contact.dissipated((old, new), (way, stretched), shift, spreading.force)
                 }
                 // Force after the advance times the loss of stretch: with the force of the next step this closes the
                 // trapezoidal rule of the leapfrog work; the loss of spring energy would count half a step twice.

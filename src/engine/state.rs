@@ -7,7 +7,7 @@ use crate::effects::adhesion::Bond;
 use crate::effects::viscoelastic::SectionRelaxation;
 use crate::material_point::PointState;
 use crate::needle::free_path::FreeTip;
-use crate::needle::tip_contact::Touch;
+use crate::needle::tip_contact::{Spreading, TipContact, Touch};
 
 /// The state that both engines can give and take, in f64 and SI, node order of the mesh.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -37,6 +37,8 @@ pub struct State {
     pub opening_resistance: f64,
     /// Force along the needle with which the tip spread the opened path in the last step, in the scheme `opening` [N].
     pub opening_spreading: f64,
+    /// By how much this force falls per length that the path is shifted on, at most [N/m].
+    pub opening_stiffness: f64,
     /// The tip on the surface, in the scheme `opening`.
     pub touch: Touch,
     /// Damage D of every pair of copies that may separate.
@@ -46,6 +48,12 @@ pub struct State {
 }
 
 impl State {
+    /// What spreads the opened path.
+    pub(crate) fn spreading(&self, contact: &TipContact) -> Spreading {
+        let shift = contact.part(self.tip_coordinate) * self.touch.dimple;
+        Spreading { force: self.opening_spreading, stiffness: self.opening_stiffness, shift }
+    }
+
     /// True where both are states of one model.
     pub fn fits(&self, other: &State) -> bool {
         let sizes = |s: &State| {

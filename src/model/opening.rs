@@ -179,6 +179,12 @@ impl OpeningPlan {
         }
     }
 
+    /// By how much the force that spreads the path falls per length that the path is shifted on [N/m], at most, of what spreads its stations
+    /// [N]: where each follows the one before it, the sum changes by what the last one holds when all move on by the spacing.
+    pub fn shift_stiffness(&self, spreads: &[f64]) -> f64 {
+        spreads.iter().fold(0.0, |most: f64, spread| most.max(*spread)) / self.spacing
+    }
+
     /// How far the tip may advance in a step of `dt` [s] in which the needle travels `travel` [m], in tissue with shear waves of this speed
     /// [m/s]: no faster than a crack runs, than nodes can follow, and stations open one after the other. No node can be left inside of the
     /// needle here, so the speed of the needle is no limit.

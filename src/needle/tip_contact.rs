@@ -15,6 +15,10 @@
 //! ```
 //! The second says that the dimple is in equilibrium with the whole force of the tip. An advance of the tip shortens the spring by
 //! `lambda da + p' U da` and moves the sections by `p' U da`.
+//!
+//! S is known from the step before, where the path was shifted by s_0, and falls as the path is shifted on, by K per length at most:
+//! `S = S_0 - K (p U - s_0)` ([`Spreading`]). Taken as it was, it swings from step to step where `K p^2` is more than
+//! `V'' + k_tip p^2` (fibres that stiffen), and the energy with it.
 //! u is linear in the root of Q between the [`KNOTS`] of a table, since the force of a cone grows like the square of the depth.
 
 use serde::{Deserialize, Serialize};
@@ -52,6 +56,24 @@ pub struct Touch {
     pub dimple: f64,
     /// By how much the disc moves along the needle per length of its path, d(x.t)/da.
     pub stretch: f64,
+}
+
+/// What spreads the opened path, as the step before has left it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spreading {
+    /// S_0 [N].
+    pub force: f64,
+    /// K [N/m].
+    pub stiffness: f64,
+    /// s_0 [m].
+    pub shift: f64,
+}
+
+impl Spreading {
+    /// The force that it would have if it were not shifted [N].
+    fn unshifted(&self) -> f64 {
+        self.force + self.stiffness * self.shift
+    }
 }
 
 /// The law of one surface and tip.
@@ -114,30 +136,37 @@ impl TipContact {
         4.0 * x * (1.0 - x * x) / self.length
     }
 
-    /// The tip with the gap `gap` [m] where the dimple shifts it by the part p, with the force `spreading` of the opened path [N].
-    pub fn touch(&self, gap: f64, part: f64, spreading: f64) -> Touch {
-        // Q/k + p^2 u(Q) = p (G + S/k).
-        let pressed = self.pressed(part * (gap + spreading / self.stiffness), part * part);
-        let dimple = self.depth(pressed.max(part * spreading).max(0.0));
+    /// The tip with the gap `gap` [m] where the dimple shifts it by the part p.
+    pub fn touch(&self, gap: f64, part: f64, spreading: &Spreading) -> Touch {
+        // Q = p (k G + S_0 + K s_0) - p^2 (k + K) u(Q).
+        let stiffness = self.stiffness + spreading.stiffness;
+        let pressed = self.pressed(part * (self.stiffness * gap + spreading.unshifted()), part * part, stiffness);
+        let dimple = self.depth(pressed.max(self.loaded(0.0, part, spreading)));
         Touch { force: self.stiffness * (gap - part * dimple).max(0.0), dimple, ..Touch::default() }
     }
 
-    /// Q with `Q/k + by u(Q) = length` [N].
-    fn pressed(&self, length: f64, by: f64) -> f64 {
-        if length <= 0.0 {
+    /// Q under the force F of the tip, which the dimple shifts by the part p [N].
+    fn loaded(&self, force: f64, part: f64, spreading: &Spreading) -> f64 {
+        self.pressed(part * (force + spreading.unshifted()), part * part, spreading.stiffness)
+    }
+
+    /// Q with `Q + by stiffness u(Q) = load` [N].
+    fn pressed(&self, load: f64, by: f64, stiffness: f64) -> f64 {
+        if load <= 0.0 {
             return 0.0;
         }
-        let begins = |k: &Knot| k.root * k.root / self.stiffness + by * k.depth <= length;
+        let by = by * stiffness;
+        let begins = |k: &Knot| k.root * k.root + by * k.depth <= load;
         let row = &self.knots[self.knots.partition_point(begins).max(1) - 1];
         let slope = by * row.slope;
-        let rest = length - by * (row.depth - row.slope * row.root);
-        let root = 2.0 * rest / (slope + (slope * slope + 4.0 * rest / self.stiffness).sqrt());
+        let rest = load - by * (row.depth - row.slope * row.root);
+        let root = 2.0 * rest / (slope + (slope * slope + 4.0 * rest).sqrt());
         root * root
     }
 
     /// G at which the tip force is F [m].
-    fn gap(&self, force: f64, part: f64, spreading: f64) -> f64 {
-        force / self.stiffness + part * self.depth((part * (force + spreading)).max(0.0))
+    fn gap(&self, force: f64, part: f64, spreading: &Spreading) -> f64 {
+        force / self.stiffness + part * self.depth(self.loaded(force, part, spreading))
     }
 
     /// What tip spring and dimple hold [J].
@@ -162,7 +191,7 @@ impl TipContact {
 
     /// By how much the gap of the tip with the part p is longer under the force F than under the threshold F_c [N]: what an advance has to
     /// shorten it by [m].
-    pub fn excess(&self, force: f64, threshold: f64, part: f64, spreading: f64) -> f64 {
+    pub fn excess(&self, force: f64, threshold: f64, part: f64, spreading: &Spreading) -> f64 {
         self.gap(force, part, spreading) - self.gap(threshold, part, spreading)
     }
 }
@@ -185,13 +214,14 @@ mod tests {
     fn force_and_gap_are_inverse() {
         let law = law();
         for part in [0.0, 0.3, 1.0] {
-            for load in [0.0, 0.01, 0.2] {
+            for (load, stiffness) in [(0.0, 0.0), (0.01, 0.0), (0.2, 0.0), (0.2, 500.0)] {
+                let load = Spreading { force: load, stiffness, shift: 0.3e-3 };
                 for force in [1e-5, 0.003, 0.1, 0.57, 0.999, 1.4] {
-                    let back = law.touch(law.gap(force, part, load), part, load).force;
-                    assert!((back / force - 1.0).abs() < 1e-6, "{part} {load} {force} {back}");
+                    let back = law.touch(law.gap(force, part, &load), part, &load).force;
+                    assert!((back / force - 1.0).abs() < 1e-6, "{part} {load:?} {force} {back}");
                 }
             }
-            assert_eq!(law.touch(-1e-3, part, 0.0).force, 0.0);
+            assert_eq!(law.touch(-1e-3, part, &Spreading::default()).force, 0.0);
         }
     }
 
@@ -200,10 +230,10 @@ mod tests {
         let law = law();
         for part in [0.0, 0.3, 1.0] {
             for gap in [1e-4, 2e-3, 4e-3] {
-                let energy = |g: f64| law.stored(law.touch(g, part, 0.0));
+                let energy = |g: f64| law.stored(law.touch(g, part, &Spreading::default()));
                 let step = 1e-8;
                 let difference = (energy(gap + step) - energy(gap - step)) / (2.0 * step);
-                let force = law.touch(gap, part, 0.0).force;
+                let force = law.touch(gap, part, &Spreading::default()).force;
                 assert!((difference / force - 1.0).abs() < 1e-4, "{part} {gap}: {difference} {force}");
             }
         }
@@ -213,10 +243,38 @@ mod tests {
     fn a_loaded_dimple_gives_its_work_back() {
         let law = law();
         let (gap, part) = (1.5e-3, 0.7);
-        let total = |s: f64| law.stored(law.touch(gap, part, s)) - s * part * law.touch(gap, part, s).dimple;
+        let touch = |force: f64| law.touch(gap, part, &Spreading { force, ..Spreading::default() });
+        let total = |s: f64| law.stored(touch(s)) - s * part * touch(s).dimple;
         let step = 1e-6;
         let difference = (total(0.1 + step) - total(0.1 - step)) / (2.0 * step);
-        assert!((difference / (-part * law.touch(gap, part, 0.1).dimple) - 1.0).abs() < 1e-4);
+        assert!((difference / (-part * touch(0.1).dimple) - 1.0).abs() < 1e-4);
+    }
+
+    /// The path spreads with a force that falls as it is shifted, by 2e3 N/m: with nothing known of this the dimple swings.
+    #[test]
+    fn a_stiff_path_and_the_dimple_come_to_rest() {
+        let law = law();
+        let (gap, part) = (1.0e-3, 0.7);
+        let force = |shift: f64| (1.5 - 2e3 * shift).max(0.0);
+        let swings = |stiffness: f64| {
+            let (mut shift, mut moved) = (0.0, 0.0);
+            for _ in 0..200 {
+                let spreading = Spreading { force: force(shift), stiffness, shift };
+                let next = part * law.touch(gap, part, &spreading).dimple;
+                (moved, shift) = ((next - shift).abs(), next);
+            }
+            (moved, shift)
+        };
+        assert!(swings(0.0).0 > 0.1e-3, "{:?}", swings(0.0));
+        for stiffness in [1.5e3, 2e3, 8e3] {
+            let (moved, shift) = swings(stiffness);
+            assert!(moved < 1e-9, "{stiffness}: {moved}");
+            // In equilibrium, whatever was taken for K.
+            let at_rest =
+                Touch { dimple: shift / part, force: law.stiffness * (gap - shift).max(0.0), ..Touch::default() };
+            let load = part * (at_rest.force + force(shift));
+            assert!((law.depth(load) / at_rest.dimple - 1.0).abs() < 1e-5, "{stiffness}: {at_rest:?}");
+        }
     }
 
     #[test]
@@ -231,11 +289,11 @@ mod tests {
     #[test]
     fn the_force_falls_as_the_crack_runs() {
         let law = law();
-        let full = law.gap(0.5, 1.0, 0.0);
+        let full = law.gap(0.5, 1.0, &Spreading::default());
         let mut last = 0.5;
         for i in 1..100 {
             let a = 1e-5 * f64::from(i);
-            let force = law.touch(full - a, law.part(a), 0.0).force;
+            let force = law.touch(full - a, law.part(a), &Spreading::default()).force;
             assert!(force < last, "{a} {force} {last}");
             last = force;
         }

@@ -52,6 +52,7 @@ pub(super) fn on_the_same_path(state: &State, next: &mut State) {
         *new = *old;
     }
     (next.opening_resistance, next.opening_spreading) = (state.opening_resistance, state.opening_spreading);
+    next.opening_stiffness = state.opening_stiffness;
     next.touch = state.touch;
 }
 

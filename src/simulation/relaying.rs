@@ -16,7 +16,7 @@ use crate::mesh::material_place::material_place;
 use crate::model::{Model, TipAnchor};
 use crate::needle::ToolPose;
 use crate::needle::path_line::PathLine;
-use crate::needle::tip_contact::Touch;
+use crate::needle::tip_contact::{TipContact, Touch};
 
 /// What a run goes on from on another line.
 struct GoesOn<'a> {
@@ -50,6 +50,14 @@ impl Simulation {
             }
             Found::Line(line, cut) => {
                 let from_line = laying.is_on();
+                let is_free = state.touch.force == 0.0 && (!from_line || gap_on(&self.model, &state, &now) <= 0.0);
+                if cut == 0.0
+                    && is_free
+                    && recedes(&now, &next)
+                    && gap_on(&self.model.relaid(line.clone()), &state, &next) <= 0.0
+                {
+                    return Ok(());
+                }
                 laying.come(&line, &next);
                 self.take_line(line, Some(GoesOn { state: &state, cut, pose: now, from_line }))
             }
@@ -114,6 +122,16 @@ impl Simulation {
     }
 }
 
+/// True where a needle moves against its own direction.
+fn recedes(now: &ToolPose, next: &ToolPose) -> bool {
+    (next.tip - now.tip).dot(next.direction) < 0.0
+}
+
+/// Depth of a tip that has not cut under the deformed skin, on the line of a model [m]; negative above it.
+fn gap_on(model: &Model, state: &State, pose: &ToolPose) -> f64 {
+    touch_at(model, state, 0.0, pose).0
+}
+
 /// Mean distance of the tip beyond its anchors at the material coordinate `cut` [m], and the tip on the surface: as CpuEngine::advance_tip.
 fn touch_at(model: &Model, state: &State, cut: f64, pose: &ToolPose) -> (f64, Touch) {
     let (Some(plan), Some(mesh)) = (&model.puncture, model.mesh.as_block()) else { return Default::default() };
@@ -125,6 +143,7 @@ fn touch_at(model: &Model, state: &State, cut: f64, pose: &ToolPose) -> (f64, To
     };
     let [mean, stretch] = (plan.anchors.iter().map(moved).sum::<DVec2>() / plan.anchors.len() as f64).to_array();
     let gap = (pose.tip - path.entry).dot(t) - cut * path.direction.dot(t) - mean;
-    let touch = plan.contact.as_ref().map(|contact| contact.touch(gap, contact.part(cut), state.opening_spreading));
+    let touch = |contact: &TipContact| contact.touch(gap, contact.part(cut), &state.spreading(contact));
+    let touch = plan.contact.as_ref().map(touch);
     (gap, Touch { stretch, ..touch.unwrap_or_default() })
 }

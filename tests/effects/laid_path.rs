@@ -217,3 +217,26 @@ fn a_hand_that_shakes_on_the_skin_creates_no_energy() {
     assert!(lines > 10 && last.tip_coordinate == 0.0 && last.force.axial > 0.3, "{lines} {last:?}");
     at_most("imbalance", largest_imbalance(&all), 0.01);
 }
+
+/// A tilted needle that goes aside close over the skin touches nothing, whichever way it goes: its line is where it is, not where it will be.
+#[test]
+fn a_tilted_needle_that_goes_aside_over_the_skin_touches_nothing() {
+    let purpose = Purpose { led: true, drawn: false, lanes: true };
+    let straight = scene("{kind=\"insert\", speed_mm_s=10.0, depth_mm=10.0}", &["puncture.path=\"free\""]);
+    let mut simulation = Simulation::for_purpose(straight, None, purpose).unwrap();
+    let start = simulation.hand().unwrap();
+    let direction = DQuat::from_rotation_y(0.5) * start.direction;
+    let (mut most, mut lines) = (0.0, 0);
+    for frame in 0..120 {
+        // A millimetre to one side, two to the other and back, 5 um over the skin.
+        let way = [frame, 60 - frame, frame - 120][((frame + 30) / 60) as usize];
+        simulation.lead(&HandPose { entry: DVec3::new(0.033e-3 * f64::from(way), 0.0, 0.0), direction, depth: -5e-6 });
+        let engines = simulation.replaced_engines();
+        let force = simulation.next_frame().unwrap().unwrap().force;
+        most = f64::max(most, (force.axial - force.inertia).abs());
+        lines += u64::from(simulation.replaced_engines() != engines);
+    }
+    println!("{lines} lines, force {most:.1e} N");
+    assert!(lines > 10, "{lines}");
+    assert_eq!(most, 0.0);
+}

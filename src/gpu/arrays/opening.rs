@@ -57,10 +57,13 @@ pub(super) const ARRAYS: &[Array] = &[
             for record in read_all::<OpeningRecord>(bytes) {
                 state.opening_resistance = record.now[0].into();
                 state.opening_spreading = record.now[2].into();
+                state.opening_stiffness = record.now[3].into();
             }
         },
         |_, state| {
-            let now = [state.opening_resistance as f32, 0.0, state.opening_spreading as f32, 0.0];
+            let [resistance, spreading, stiffness] =
+                [state.opening_resistance, state.opening_spreading, state.opening_stiffness].map(|v| v as f32);
+            let now = [resistance, 0.0, spreading, stiffness];
             to_bytes(&[OpeningRecord { now, ..OpeningRecord::zeroed() }])
         },
     ),
