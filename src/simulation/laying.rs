@@ -7,7 +7,7 @@
 //!
 //! Nothing acts on a needle that is on no line: the engine sees it far above the surface.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::engine::{State, StepInput};
@@ -16,6 +16,7 @@ use crate::mesh::material_place::{material_place, pulled_back, rest_position_at}
 use crate::model::{LaidPath, Model, TipAnchor};
 use crate::needle::ToolPose;
 use crate::needle::path_line::PathLine;
+use crate::needle::tip_contact::{TipContact, Touch};
 
 /// Height over the skin at which a tip comes to it, and at which it has left it [m].
 const COMES: f64 = 0.02e-3;
@@ -40,6 +41,9 @@ const FOLLOWS: f64 = 3.0;
 const ASIDE: f64 = 0.25;
 /// See [`ASIDE`].
 const ASIDE_ON_SKIN: f64 = 0.05;
+
+/// A needle that has gone aside by less is where it was [m].
+const SAME_PLACE: f64 = 1e-8;
 
 /// A track is the same where it begins within this part of the radius of the needle, at an angle below this [rad].
 const SAME_ENTRY: f64 = 0.5;
@@ -181,12 +185,11 @@ impl Laying {
     /// True where the tissue has to be looked at before the needle moves on to `next`.
     pub(super) fn must_look(&self, next: &ToolPose, radius: f64) -> bool {
         let near = (next.tip - self.line.piece(0.0).origin).dot(next.direction) < DEEP;
-        !self.is_on || near || self.has_moved(next, radius)
+        !self.is_on || near || self.has_moved(next, radius * if self.has_cut { ASIDE } else { ASIDE_ON_SKIN })
     }
 
-    /// True where the needle has turned or gone aside since its line was looked at.
-    fn has_moved(&self, next: &ToolPose, radius: f64) -> bool {
-        let way = radius * if self.has_cut { ASIDE } else { ASIDE_ON_SKIN };
+    /// True where the needle has turned since its line was looked at, or gone aside by more than this [m].
+    fn has_moved(&self, next: &ToolPose, way: f64) -> bool {
         let aside = next.tip - self.tip;
         let aside = aside - self.direction * aside.dot(self.direction);
         aside.length() > way || self.direction.angle_between(next.direction) > TURNED
@@ -218,6 +221,9 @@ impl Laying {
                 return Found::Nothing;
             }
             let Some(line) = tissue.line(rest, next) else { return Found::Nothing };
+            if recedes(now, next) && !presses(&model.relaid(line.clone()), state, next) {
+                return Found::Nothing;
+            }
             return match self.tracks.iter().find(|track| track.is_the_same(&line, radius)) {
                 Some(track) => Found::Line(track.line.clone(), track.cut),
                 None => Found::Line(line, 0.0),
@@ -228,13 +234,11 @@ impl Laying {
             return Found::Left;
         }
         let cut = state.tip_coordinate;
-        if !self.has_moved(next, radius) {
-            return Found::Nothing;
-        }
         if cut == 0.0 {
-            // Without friction the tip slides over the skin; the entry is where it presses.
-            let near = self.line.piece(0.0).origin;
-            return tissue.line(near, next).map_or(Found::Nothing, |line| Found::Line(line, 0.0));
+            return self.slide(model, state, &tissue, (now, next));
+        }
+        if !self.has_moved(next, radius * ASIDE) {
+            return Found::Nothing;
         }
         if next.depth <= now.depth {
             return Found::Nothing;
@@ -256,6 +260,38 @@ impl Laying {
     }
 }
 
+impl Laying {
+    /// The line of a needle that has not cut: without friction the tip slides over the skin, and the entry is where it presses.
+    ///
+    /// A line is where the needle will be at the end of the frame; a tilted needle that goes aside is at another height over it now. One that
+    /// touches the skin neither now nor then must not press on either line in between: it keeps the one that it rises from.
+    fn slide(&self, model: &Model, state: &State, tissue: &Tissue, (now, next): (&ToolPose, &ToolPose)) -> Found {
+        let radius = model.scene.needle().map_or(0.0, |needle| needle.radius);
+        let is_free = state.touch.force == 0.0 && !presses(model, state, now);
+        let way = if is_free && presses(model, state, next) { SAME_PLACE } else { radius * ASIDE_ON_SKIN };
+        if !self.has_moved(next, way) {
+            return Found::Nothing;
+        }
+        match tissue.line(self.line.piece(0.0).origin, next) {
+            Some(line) if is_free && recedes(now, next) && !presses(&model.relaid(line.clone()), state, next) => {
+                Found::Nothing
+            }
+            Some(line) => Found::Line(line, 0.0),
+            None => Found::Nothing,
+        }
+    }
+}
+
+/// True where a needle moves against its own direction.
+fn recedes(now: &ToolPose, next: &ToolPose) -> bool {
+    (next.tip - now.tip).dot(next.direction) < 0.0
+}
+
+/// True where a tip that has not cut is below the deformed skin, on the line of a model.
+fn presses(model: &Model, state: &State, pose: &ToolPose) -> bool {
+    touch_at(model, state, 0.0, pose).0 > 0.0
+}
+
 /// Direction in the material of a needle that goes on along `direction` from the rest position `at`: the mean over the lines of the tip.
 fn direction_ahead(model: &Model, tissue: &Tissue, at: DVec3, direction: DVec3) -> DVec3 {
     let Some(plan) = &model.puncture else { return direction };
@@ -271,4 +307,20 @@ impl Track {
         own.origin.distance(other.origin) < SAME_ENTRY * radius
             && own.direction.angle_between(other.direction) < SAME_ANGLE
     }
+}
+
+/// Mean distance of the tip beyond its anchors at the material coordinate `cut` [m], and the tip on the surface: as CpuEngine::advance_tip.
+pub(super) fn touch_at(model: &Model, state: &State, cut: f64, pose: &ToolPose) -> (f64, Touch) {
+    let (Some(plan), Some(mesh)) = (&model.puncture, model.mesh.as_block()) else { return Default::default() };
+    let (path, t) = (plan.path, pose.direction);
+    let moved = |anchor: &TipAnchor| {
+        let x = anchor.surface + path.direction * cut;
+        let at = material_place(mesh, &state.displacement, x);
+        DVec2::new((at.position - x).dot(t), (at.gradient * path.direction).dot(t))
+    };
+    let [mean, stretch] = (plan.anchors.iter().map(moved).sum::<DVec2>() / plan.anchors.len() as f64).to_array();
+    let gap = (pose.tip - path.entry).dot(t) - cut * path.direction.dot(t) - mean;
+    let touch = |contact: &TipContact| contact.touch(gap, contact.part(cut), &state.spreading(contact));
+    let touch = plan.contact.as_ref().map(touch);
+    (gap, Touch { stretch, ..touch.unwrap_or_default() })
 }

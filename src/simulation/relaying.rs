@@ -2,21 +2,17 @@
 
 use std::sync::Arc;
 
-use glam::DVec2;
-
 use super::Simulation;
 use super::carried::{carried, on_the_same_path};
 use super::change::Change;
-use super::laying::{Found, Laying};
+use super::laying::{Found, Laying, touch_at};
 use super::start::choose_step;
 use crate::engine::State;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::error::Result;
-use crate::mesh::material_place::material_place;
-use crate::model::{Model, TipAnchor};
+use crate::model::Model;
 use crate::needle::ToolPose;
 use crate::needle::path_line::PathLine;
-use crate::needle::tip_contact::{TipContact, Touch};
 
 /// What a run goes on from on another line.
 struct GoesOn<'a> {
@@ -50,14 +46,6 @@ impl Simulation {
             }
             Found::Line(line, cut) => {
                 let from_line = laying.is_on();
-                let is_free = state.touch.force == 0.0 && (!from_line || gap_on(&self.model, &state, &now) <= 0.0);
-                if cut == 0.0
-                    && is_free
-                    && recedes(&now, &next)
-                    && gap_on(&self.model.relaid(line.clone()), &state, &next) <= 0.0
-                {
-                    return Ok(());
-                }
                 laying.come(&line, &next);
                 self.take_line(line, Some(GoesOn { state: &state, cut, pose: now, from_line }))
             }
@@ -120,30 +108,4 @@ impl Simulation {
         self.due_steps = due_steps;
         Ok(())
     }
-}
-
-/// True where a needle moves against its own direction.
-fn recedes(now: &ToolPose, next: &ToolPose) -> bool {
-    (next.tip - now.tip).dot(next.direction) < 0.0
-}
-
-/// Depth of a tip that has not cut under the deformed skin, on the line of a model [m]; negative above it.
-fn gap_on(model: &Model, state: &State, pose: &ToolPose) -> f64 {
-    touch_at(model, state, 0.0, pose).0
-}
-
-/// Mean distance of the tip beyond its anchors at the material coordinate `cut` [m], and the tip on the surface: as CpuEngine::advance_tip.
-fn touch_at(model: &Model, state: &State, cut: f64, pose: &ToolPose) -> (f64, Touch) {
-    let (Some(plan), Some(mesh)) = (&model.puncture, model.mesh.as_block()) else { return Default::default() };
-    let (path, t) = (plan.path, pose.direction);
-    let moved = |anchor: &TipAnchor| {
-        let x = anchor.surface + path.direction * cut;
-        let at = material_place(mesh, &state.displacement, x);
-        DVec2::new((at.position - x).dot(t), (at.gradient * path.direction).dot(t))
-    };
-    let [mean, stretch] = (plan.anchors.iter().map(moved).sum::<DVec2>() / plan.anchors.len() as f64).to_array();
-    let gap = (pose.tip - path.entry).dot(t) - cut * path.direction.dot(t) - mean;
-    let touch = |contact: &TipContact| contact.touch(gap, contact.part(cut), &state.spreading(contact));
-    let touch = plan.contact.as_ref().map(touch);
-    (gap, Touch { stretch, ..touch.unwrap_or_default() })
 }
