@@ -349,6 +349,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "StraightAxis",
         "BentAxis",
         "SurfaceTouch",
+        "Spreading",
         "Pressing",
         "Contact",
         "Memory",
