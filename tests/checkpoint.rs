@@ -158,7 +158,7 @@ fn a_killed_run_goes_on_to_the_same_tables() {
     let again = stylet(folder.path()).args(["run", "--resume", "killed"]).output().unwrap();
     assert_eq!(again.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&again.stderr).contains("has finished: nothing is left to go on with"));
-    std::fs::write(&checkpoint, b"stylet checkpoint 5\nrubbish").unwrap();
+    std::fs::write(&checkpoint, b"stylet checkpoint 6\nrubbish").unwrap();
     let damaged = stylet(folder.path()).args(["run", "--resume", "killed"]).output().unwrap();
     assert_eq!(damaged.status.code(), Some(2));
     let told = String::from_utf8_lossy(&damaged.stderr);

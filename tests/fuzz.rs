@@ -601,7 +601,7 @@ fn short_files_cannot_ask_for_much() {
     let text = lines.join("\n");
     let (meant, bytes) = measured(|| named("scene").survives(text.as_bytes()));
     assert!(!meant && bytes > 20 << 20 && bytes <= named("scene").memory(text.len()), "{bytes} B");
-    let mut bomb = b"stylet checkpoint 5\n".to_vec();
+    let mut bomb = b"stylet checkpoint 6\n".to_vec();
     let mut encoder = flate2::write::ZlibEncoder::new(&mut bomb, flate2::Compression::best());
     std::io::Write::write_all(&mut encoder, &vec![0xff; 64 << 20]).unwrap();
     encoder.finish().unwrap();

@@ -32,7 +32,7 @@
 #endif
 
 @group(1) @binding(1) var<storage, read> node_mass: array<f32>;
-// u in fixed point; w: steps of this frame in which the mass of the node was raised.
+// u in fixed point; w: bits of the f32 mass of the last step over that at rest, 0 before the first.
 @group(2) @binding(0) var<storage, read_write> node_displacement: array<vec4<i32>>;
 // v at the half step [m/s]; w: energy that mass damping took in this frame [J].
 @group(2) @binding(1) var<storage, read_write> node_velocity: array<vec4<f32>>;
@@ -69,10 +69,17 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     var force = sum.xyz;
     var mass = scaled_mass;
     var displacement = node_displacement[node];
-    let old = node_velocity[node];
+    let last = node_velocity[node];
 #ifdef MASS_SCALING
     mass = stable_mass(scaled_mass, sum.w);
-    displacement.w += select(0, 1, mass > scaled_mass);
+    // A node whose mass changes keeps its kinetic energy: src/effects/mass_scaling.rs.
+    let inertia = mass / scaled_mass;
+    let inertia_before = max(bitcast<f32>(displacement.w), 1.0);
+    displacement.w = bitcast<i32>(inertia);
+    let slowed = select(1.0, sqrt(inertia_before / inertia), inertia != inertia_before);
+#else
+    let inertia_before = 1.0;
+    let slowed = 1.0;
 #endif
 #ifdef GRAVITY
     force += gravity.acceleration.xyz * scaled_mass;
@@ -87,15 +94,15 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     force += load;
 #endif
     let half = 0.5 * params.mass_damping * params.dt;
-    var next = (old.xyz * (1.0 - half) + force * (params.dt / mass)) / (1.0 + half);
 #ifdef EMPTY_CELLS
     let held = held_components(place) | standing_components(thread);
 #else
     let held = held_components(place);
 #endif
     let is_free = vec3<f32>((vec3<u32>(held) & vec3<u32>(1u, 2u, 4u)) == vec3<u32>(0u));
+    let old = last.xyz * (1.0 - is_free + is_free * slowed);
     // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
-    next *= is_free;
+    var next = (old * (1.0 - half) + force * (params.dt / mass)) / (1.0 + half) * is_free;
     // A loop that runs once or not at all: software adapters skip it, where they would walk through an `if`.
     let square = dot(next, next);
     let fast = square > params.speed_limit * params.speed_limit;
@@ -110,29 +117,32 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
 #endif
 #ifdef NODE_WORK
     // What the support adds so that the node moves as prescribed, times its velocity at mid step.
-    let middle = 0.5 * (old.xyz + prescribed);
-    let reaction = (mass / params.dt) * (prescribed - old.xyz) - force;
+    let middle = 0.5 * (old + prescribed);
+    let reaction = (mass / params.dt) * (prescribed - old) - force;
     var work = params.dt * dot(reaction * (1.0 - is_free), middle);
 #endif
     next += prescribed;
 #ifdef NODE_WORK
 #ifdef LOADED_FACES
-    work += params.dt * 0.5 * dot(load, old.xyz + next);
+    work += params.dt * 0.5 * dot(load, old + next);
 #endif
 #ifdef TIED
     work *= share;
 #endif
     node_work[node] += work;
 #endif
-    let mid = 0.5 * (old.xyz + next) * is_free;
+    let mid = 0.5 * (old + next) * is_free;
     var taken = params.mass_damping * params.dt * mass * dot(mid, mid);
 #ifdef TIED
     taken *= share;
 #endif
     let ratio = sum.w * params.dt * params.dt / (4.0 * mass);
-    for (var once = select(1u, 0u, mass > scaled_mass || fast || ratio > WATCHED_STEP_RATIO); once == 0u; once++) {
-        // The kinetic energy is told with the mass at rest: what the rest of the mass gained in this step is gone.
-        var raised = 0.5 * (mass - scaled_mass) * (dot(next, next) - dot(old.xyz, old.xyz));
+    for (var once = select(1u, 0u, mass > scaled_mass || inertia_before > 1.0 || fast || ratio > WATCHED_STEP_RATIO); once == 0u; once++) {
+        // The kinetic energy is told with the mass at rest: what the rest of the mass gained in this step is not in it, nor what that lost
+        // of its own, nor what the force did on the way that went.
+        let lost = last.xyz - old;
+        var raised = 0.5 * ((mass - scaled_mass) * (dot(next, next) - dot(old, old))
+            + scaled_mass * dot(lost, last.xyz + old) + params.dt * dot(force, lost));
         // Work of the force that holds the node back.
         var clamped = mass * (1.0 + half) * dot(stopped, mid);
 #ifdef TIED
@@ -140,10 +150,12 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         clamped *= share;
 #endif
         let before = node_cures[node];
-        let watched = max(before.w, select(0.0, ratio, ratio > WATCHED_STEP_RATIO));
-        node_cures[node] = vec4<f32>(before.xyz + vec3<f32>(raised, clamped, select(0.0, 1.0, fast)), watched);
+        let sums = bitcast<vec2<f32>>(before.xy) + vec2<f32>(raised, clamped);
+        let steps = before.z + select(0u, 1u, mass > scaled_mass) + select(0u, 65536u, fast);
+        let watched = max(bitcast<f32>(before.w), select(0.0, ratio, ratio > WATCHED_STEP_RATIO));
+        node_cures[node] = vec4<u32>(bitcast<vec2<u32>>(sums), steps, bitcast<u32>(watched));
     }
-    let damped = old.w + taken;
+    let damped = last.w + taken;
     node_velocity[node] = vec4<f32>(next, damped);
     let way = next * (params.dt * UNITS_PER_METRE);
     var units = round(way);

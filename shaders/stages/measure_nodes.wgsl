@@ -14,7 +14,7 @@
 #endif
 
 @group(1) @binding(1) var<storage, read> node_mass: array<f32>;
-@group(2) @binding(0) var<storage, read_write> node_displacement: array<vec4<i32>>;
+@group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 @group(2) @binding(1) var<storage, read_write> node_velocity: array<vec4<f32>>;
 
 // True where a float has the exponent of Inf or NaN.
@@ -70,13 +70,14 @@ fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         sums.moment_y += moment.y;
         sums.moment_z += moment.z;
         sums.max_speed = max(sums.max_speed, length(v.xyz));
-        sums.raised_mass += u32(u.w);
         let cures = node_cures[node];
-        sums.raised_energy += cures.x;
-        sums.clamped_energy += cures.y;
-        sums.clamped_nodes += u32(cures.z);
-        sums.step_ratio = max(sums.step_ratio, cures.w);
-        node_cures[node] = vec4<f32>(0.0);
+        let taken = bitcast<vec2<f32>>(cures.xy);
+        sums.raised_energy += taken.x;
+        sums.clamped_energy += taken.y;
+        sums.raised_mass += cures.z & 0xffffu;
+        sums.clamped_nodes += cures.z >> 16u;
+        sums.step_ratio = max(sums.step_ratio, bitcast<f32>(cures.w));
+        node_cures[node] = vec4<u32>(0u);
         // +-30 mm of the +-31 mm that the fixed point holds.
         let far = any(abs(u.xyz) > vec3<i32>(2061584302));
         sums.out_of_range += select(0u, 1u, far || not_finite(v.xyz));
@@ -85,7 +86,6 @@ fn measure_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_work
         node_work[node] = 0.0;
 #endif
         node_velocity[node] = vec4<f32>(v.xyz, 0.0);
-        node_displacement[node] = vec4<i32>(u.xyz, 0);
     }
 #ifdef WIDE
     let lane = thread % 64u;

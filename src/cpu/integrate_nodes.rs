@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::CpuEngine;
 use super::added::Added;
-use crate::effects::mass_scaling::stable_mass;
+use crate::effects::mass_scaling::{change_of_mass, stable_mass};
 use crate::engine::{StepInput, WATCHED_STEP_RATIO};
 use crate::model::Model;
 use crate::scene::Face;
@@ -75,16 +75,17 @@ impl CpuEngine {
             added: &self.added,
         };
         let nodes: Vec<NodeSums> = match lanes {
-            Some(lanes) => lanes.integrate(&step, &mut state.displacement, &mut state.velocity),
+            Some(lanes) => lanes.integrate(&step, (&mut state.displacement, &mut state.velocity, &mut state.inertia)),
             None => {
                 let gather = |node: usize| elements.gather(&model.mesh, cells, node);
                 state
                     .displacement
                     .par_iter_mut()
                     .zip(state.velocity.par_iter_mut())
+                    .zip(state.inertia.par_iter_mut())
                     .enumerate()
                     .with_min_len(256)
-                    .map(|(node, (u, v))| step.advance(node, gather, (u, v)))
+                    .map(|(node, ((u, v), inertia))| step.advance(node, gather, (u, v, inertia)))
                     .collect()
             }
         };
@@ -105,12 +106,12 @@ impl CpuEngine {
 }
 
 impl NodeStep<'_> {
-    /// Moves a node, displacement and velocity [m, m/s]; `gather`: force of the cells on it and their bound.
+    /// Moves a node: displacement and velocity [m, m/s], mass over that at rest; `gather`: force of the cells on it and their bound.
     pub fn advance(
         &self,
         node: usize,
         gather: impl Fn(usize) -> (DVec3, f64),
-        moved: (&mut DVec3, &mut DVec3),
+        moved: (&mut DVec3, &mut DVec3, &mut f32),
     ) -> NodeSums {
         advance_node(self, node, &self.acting(node, gather), moved)
     }
@@ -136,17 +137,24 @@ impl NodeStep<'_> {
     }
 }
 
-/// Moves a node by one step, no faster than the limit; displacement and velocity [m, m/s].
-fn advance_node(step: &NodeStep, node: usize, acting: &Acting, (u, v): (&mut DVec3, &mut DVec3)) -> NodeSums {
+/// Moves a node by one step, no faster than the limit: displacement and velocity [m, m/s], mass over that at rest.
+fn advance_node(
+    step: &NodeStep,
+    node: usize,
+    acting: &Acting,
+    (u, v, inertia): (&mut DVec3, &mut DVec3, &mut f32),
+) -> NodeSums {
     let NodeStep { model, dt, limit, .. } = *step;
     let Acting { force, load, bound, mass: scaled, share } = *acting;
     let alpha = model.scene.solver.mass_damping;
     let mass = if model.effects.mass_scaling.is_some() { stable_mass(scaled, bound, dt) } else { scaled };
     let ratio = bound * dt * dt / (4.0 * mass);
-    let old = *v;
-    let mut new = (old * (1.0 - 0.5 * alpha * dt) + force * (dt / mass)) / (1.0 + 0.5 * alpha * dt);
     // A held component moves as prescribed, whatever its load: the limit concerns the free ones.
     let fixed = model.fixed_components(node);
+    let came = *v;
+    let slowed = change_of_mass(inertia, mass / scaled);
+    let old = DVec3::from(std::array::from_fn(|a| if fixed[a] { came[a] } else { came[a] * slowed }));
+    let mut new = (old * (1.0 - 0.5 * alpha * dt) + force * (dt / mass)) / (1.0 + 0.5 * alpha * dt);
     for a in 0..3 {
         if fixed[a] {
             new[a] = 0.0;
@@ -180,8 +188,12 @@ fn advance_node(step: &NodeStep, node: usize, acting: &Acting, (u, v): (&mut DVe
     NodeSums {
         damping: share * alpha * mass * free_mid.length_squared() * dt,
         work: share * work,
-        // The kinetic energy is told with the mass at rest: what the rest of the mass gained in this step is gone.
-        raised_energy: share * 0.5 * (mass - scaled) * (new.length_squared() - old.length_squared()),
+        // The kinetic energy is told with the mass at rest: what the rest of the mass gained in this step is not in it, nor what that
+        // lost of its own, nor what the force did on the way that went.
+        raised_energy: share
+            * (0.5 * (mass - scaled) * (new.length_squared() - old.length_squared())
+                + 0.5 * scaled * (came.length_squared() - old.length_squared())
+                + 0.5 * dt * force.dot(came - old)),
         // Work of the force that holds the node back, `m (1 + alpha dt/2) / dt` times what it took of the velocity.
         clamped_energy: share * mass * (1.0 + 0.5 * alpha * dt) * stopped.dot(free_mid),
         clamped: u32::from(speed > limit),

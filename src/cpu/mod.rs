@@ -106,6 +106,7 @@ impl CpuEngine {
         State {
             displacement: vec![DVec3::ZERO; nodes],
             velocity: vec![DVec3::ZERO; nodes],
+            inertia: vec![1.0; nodes],
             stiffness: if model.puncture.is_some() { vec![1.0; cells] } else { Vec::new() },
             tip_coordinate: 0.0,
             tip: model.free_tip(),

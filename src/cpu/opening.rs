@@ -5,7 +5,7 @@ use super::lanes::opening::{OpeningInLanes, PointSums};
 use super::{ContactSums, CpuEngine};
 use crate::engine::elements::{CellForces, CellShape};
 use crate::material::TangentBound;
-use crate::material::kinematics::{cofactor, jacobian_minus_one};
+use crate::material::kinematics::{J_CONTINUATION, cofactor, jacobian_minus_one, norm_squared};
 use crate::material_point::{Material, PointState, Volumetric};
 use crate::mesh::CORNERS;
 use crate::model::opening::{
@@ -419,15 +419,42 @@ impl Shape<'_> {
         self.material.stress(h, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default())
     }
 
-    /// What opening adds at a place: derivatives of `W(F) - W(F_h)`, that difference (0 where nobody asks), per volume, and the bound of
+    /// What opening adds at a place: derivatives of `W(F) - a(J_h) W(F_h)`, that difference (0 where nobody asks), per volume, and the bound of
     /// the tangent there.
     fn opened(&self, map: &Opening<f64>, h: DMat3) -> (Derivatives<f64>, f64, TangentBound) {
         let f = DMat3::from_cols_array_2d(&map.gradient(&h.to_cols_array_2d()));
-        let bound = self.material.tangent_bound(f, &PointState::default());
+        let mut bound = self.material.tangent_bound(f, &PointState::default());
         let mut d = map.pull_back(&self.stress(f).to_cols_array_2d());
-        d.gradient = (DMat3::from_cols_array_2d(&d.gradient) - self.stress(h)).to_cols_array_2d();
         let energy = |h: DMat3| self.material.energy(h, 0.0, 1.0, &PointState::default()).stored;
-        (d, if self.measures { energy(f) - energy(h) } else { 0.0 }, bound)
+        let (stress, taken) = (self.stress(h), Taken::new(1.0 + jacobian_minus_one(h)));
+        let mut by_closed = stress * taken.part;
+        if taken.rate > 0.0 {
+            let (cof, w) = (cofactor(DMat3::IDENTITY + h), energy(h));
+            by_closed += cof * (taken.rate * w);
+            bound.turned +=
+                Taken::LARGEST_CURVATURE * w + 2.0 * taken.rate * (norm_squared(stress) / norm_squared(cof)).sqrt();
+        }
+        d.gradient = (DMat3::from_cols_array_2d(&d.gradient) - by_closed).to_cols_array_2d();
+        (d, if self.measures { energy(f) - taken.part * energy(h) } else { 0.0 }, bound)
+    }
+}
+
+/// Part a of the energy of the closed gradient that opening takes off at a place, by J of that gradient, and da/dJ. The cell counts what its
+/// middle holds. A corner that is inside out would hold far more by itself, and taking that off would fold it further, without bound. As
+/// `taken` in shaders/shared/opened_point.wgsl.
+struct Taken {
+    part: f64,
+    rate: f64,
+}
+
+impl Taken {
+    /// Most of d2a/dJ2.
+    const LARGEST_CURVATURE: f64 = 6.0 / (J_CONTINUATION * J_CONTINUATION);
+
+    /// All from the J on from which the law is that of tissue, nothing of what is inside out.
+    fn new(j: f64) -> Self {
+        let x = (j / J_CONTINUATION).clamp(0.0, 1.0);
+        Taken { part: x * x * (3.0 - 2.0 * x), rate: 6.0 * x * (1.0 - x) / J_CONTINUATION }
     }
 }
 
@@ -582,4 +609,38 @@ fn near_cell_forces(
     }
     let moment = moment_of(gradient, middle - section.centre, by_gradient, by_place);
     Some((forces, (sum, moment), [energy, intact]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::ElasticLaw;
+
+    /// What opening adds where a corner is squeezed flat and folded ever further: with the whole energy of the closed gradient taken off it fell
+    /// without bound, and a corner beside a needle that was turned hard folded until the run broke.
+    #[test]
+    fn a_folded_corner_gains_nothing_by_the_needle_beside_it() {
+        let material = Material::elastic(ElasticLaw::from_moduli(4.1e3, 4e4, 0.7), 1060.0);
+        let shape = Shape { material: &material, measures: true };
+        let direction = DVec3::new(0.019, 0.0815, -0.996).normalize();
+        let map = OpeningMap { direction, shaft: 0.454e-3, least: 1e-16 };
+        let rest_direction = DVec3::new(-0.03, -0.02, -1.0).normalize();
+        let section = Station { radius: 0.454e-3, rest_direction, ..Station::default() };
+        // As in a cell that folded: -0.5, -2.2 and, three times as far, -60.
+        let folded = DMat3::from_cols_array_2d(&[[-0.52, -1.25, -0.73], [-1.0, 0.16, -0.52], [-0.27, -0.58, 0.83]]);
+        let jacobian = |t: f64| 1.0 + jacobian_minus_one(folded * t);
+        let added = |t: f64, y: DVec3| shape.opened(&map.at(&section, y, folded * t), folded * t);
+        let around = (0..64).map(|i| DVec3::new((0.098 * f64::from(i)).cos(), (0.098 * f64::from(i)).sin(), 0.0));
+        let flat = (1..1000).map(|i| 1e-3 * f64::from(i)).find(|t| jacobian(*t) < 0.25).unwrap();
+        for (t, r) in [1.0, 2.0, 3.0].into_iter().flat_map(|t| [0.25e-3, 0.38e-3, 0.6e-3].map(|r| (t, r))) {
+            let least = around.clone().map(|y| added(t, y * r).1).fold(f64::INFINITY, f64::min);
+            assert!(least > 0.0, "J {:.2}, {r:.1e} m: {least:.2e} J/m^3", jacobian(t));
+        }
+        // The force is the derivative of this energy, too, where part of it is taken off.
+        let (y, step) = (DVec3::new(0.25e-3, 0.1e-3, 0.0), 1e-6);
+        let difference = (added(flat + step, y).1 - added(flat - step, y).1) / (2.0 * step);
+        let by_gradient = DMat3::from_cols_array_2d(&added(flat, y).0.gradient);
+        let exact: f64 = (0..3).map(|a| by_gradient.col(a).dot(folded.col(a))).sum();
+        assert!((difference / exact - 1.0).abs() < 1e-4, "{difference} {exact}");
+    }
 }

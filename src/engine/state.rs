@@ -16,6 +16,8 @@ pub struct State {
     pub displacement: Vec<DVec3>,
     /// Velocity v at the last half step [m/s].
     pub velocity: Vec<DVec3>,
+    /// Mass of the nodes in the last step over their mass at rest (see `src/effects/mass_scaling.rs`).
+    pub inertia: Vec<f32>,
     /// Remaining stiffness per cell; empty without `puncture`.
     pub stiffness: Vec<f64>,
     /// Material coordinate of the tip [m].
@@ -60,6 +62,7 @@ impl State {
             [
                 s.displacement.len(),
                 s.velocity.len(),
+                s.inertia.len(),
                 s.stiffness.len(),
                 s.cut_samples.len(),
                 s.contact.len(),

@@ -1,6 +1,6 @@
 //! The file that a run goes on from: `checkpoint.stylet`, replaced whole as the run goes, gone when it has ended well.
 //!
-//! Format: the line `stylet checkpoint 5`, then zlib of a postcard message. The checksum of zlib finds a damaged file.
+//! Format: the line `stylet checkpoint 6`, then zlib of a postcard message. The checksum of zlib finds a damaged file.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{BufReader, Read, Write};
@@ -19,7 +19,7 @@ use crate::simulation::checkpoint::Checkpoint;
 use crate::whole_file;
 use crate::{Error, Result};
 
-const MAGIC: &[u8] = b"stylet checkpoint 5\n";
+const MAGIC: &[u8] = b"stylet checkpoint 6\n";
 
 /// Bytes of a message that are unpacked to see whose it is.
 const FIRST: u64 = 4096;
@@ -54,7 +54,7 @@ pub struct RunCheckpoint {
 /// Raised by one wherever the same scene and hand give other forces than before: recordings of earlier builds are refused then, not
 /// continued or scored by another model. 2: contact of torn faces, tearing of a core, begin of a free path in a block. 3: advance
 /// of a tip some of whose springs are not stretched. 4: begin of plastic flow in 32 bits.
-const MODEL_EDITION: u32 = 9;
+const MODEL_EDITION: u32 = 10;
 
 /// A number that changes with anything that a scene says, its presets and meshes among it, and with the model, but not with its task or the
 /// place of the file.

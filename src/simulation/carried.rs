@@ -10,6 +10,7 @@ pub(super) fn carried(state: &State, from: &Model, to: &Model) -> State {
     let mut next = CpuEngine::new_state(to);
     next.displacement = state.displacement.clone();
     next.velocity = state.velocity.clone();
+    next.inertia = state.inertia.clone();
     (next.tip_coordinate, next.tip, next.bond) = (state.tip_coordinate, state.tip, state.bond);
     let fitting = |old: &Vec<f64>, new: &mut Vec<f64>| {
         if old.len() == new.len() {

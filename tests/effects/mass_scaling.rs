@@ -51,6 +51,32 @@ fn a_factor_of_one_changes_nothing_at_small_strain() {
     }
 }
 
+/// With its velocity, a node that becomes heavier would gain kinetic energy out of nothing.
+#[test]
+fn a_node_whose_mass_is_raised_keeps_its_kinetic_energy() {
+    let model = scaled(block([4.0, 4.0, 4.0], 1.0), 1.0);
+    let dt = 2.5 * wave_speed_bound(&model);
+    for (name, mut engine) in engines(&model, dt, 300) {
+        let mut random = Random(61);
+        let mut state = engine.read_state().unwrap();
+        state.velocity.iter_mut().for_each(|v| *v = random.vector() * 1e-3);
+        engine.write_state(&state).unwrap();
+        let kinetic = |masses: &dyn Fn(usize) -> f64, v: &[DVec3]| -> f64 {
+            v.iter().enumerate().map(|(n, v)| 0.5 * masses(n) * v.length_squared()).sum()
+        };
+        let at_rest = |n: usize| model.node_mass[n];
+        let before = kinetic(&at_rest, &state.velocity);
+        // Nothing is strained yet: no force does any work in the first step.
+        let sums = advance(engine.as_mut(), &model, dt, &mut 0, 1);
+        let after = engine.read_state().unwrap();
+        assert!(after.inertia.iter().all(|ratio| *ratio > 2.0), "{name}");
+        let with_raised = kinetic(&|n| model.node_mass[n] * f64::from(after.inertia[n]), &after.velocity);
+        at_most(&format!("{name}: kinetic energy"), (with_raised / before - 1.0).abs(), 2e-6);
+        let taken = before - kinetic(&at_rest, &after.velocity);
+        at_most(&format!("{name}: taken by raised masses"), (sums.energy.raised_mass / taken - 1.0).abs(), 2e-6);
+    }
+}
+
 /// Force of the driven face at rest [N].
 fn static_reaction(engine: &mut dyn Engine, model: &Model, dt: f64, steps: usize) -> DVec3 {
     let mut step = 0;

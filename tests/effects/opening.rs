@@ -556,3 +556,28 @@ fn stiff_fibres_beside_a_path_that_is_just_begun_keep_the_energy() {
         }
     }
 }
+
+/// The crack runs in and opens tissue that moves: masses that were raised under it made as much energy as the whole work, and stopped the run.
+#[test]
+fn soft_and_tough_tissue_takes_the_puncture_without_energy_of_raised_masses() {
+    let soft = ["material={youngs_modulus_kpa=12.0, poisson_ratio=0.45, toughness_j_m2=164.0}", "needle.gauge=\"18G\""];
+    let phases = "motion.phase=[{kind=\"insert\", speed_mm_s=5.0, depth_mm=7.0}]";
+    let scene = || scene(&[soft[0], soft[1], phases, FRICTION, "tissue.cell_size_mm=1.0"]);
+    let exact = frames(scene(), EngineChoice::Cpu64);
+    let peak = exact.iter().map(|f| f.force.axial).fold(0.0, f64::max);
+    let largest = |frames: &[FrameRecord], of: &dyn Fn(&FrameRecord) -> f64| frames.iter().map(of).fold(0.0, f64::max);
+    let cured = |f: &FrameRecord| f.energy.raised_mass.abs();
+    let check = |name: &str, frames: &[FrameRecord]| {
+        let work = largest(frames, &|f| f.energy.external);
+        println!("{name}: {:.2} % in raised masses", 100.0 * largest(frames, &cured) / work);
+        at_most("energy in raised masses over the work", largest(frames, &cured) / work, 0.02);
+        at_most("imbalance", largest(frames, &|f| f.energy.imbalance().abs()), 0.004);
+    };
+    check("f64", &exact);
+    for engine in engines_here() {
+        let found = frames(scene(), engine);
+        check(&format!("{engine:?}"), &found);
+        let apart = exact.iter().zip(&found).map(|(a, b)| (a.force.axial - b.force.axial).abs()).fold(0.0, f64::max);
+        at_most("apart", apart / peak, 0.01);
+    }
+}

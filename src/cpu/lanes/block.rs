@@ -8,7 +8,7 @@
 use glam::DVec3;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::nodes::{NODE, NodeLines};
+use super::nodes::{Moved, NODE, NodeLines};
 use super::number::{HalfWide, half_wide};
 use super::opening::{LaneOpening, OpeningInLanes};
 use super::points::Points;
@@ -306,12 +306,12 @@ impl LaneBlock {
     }
 
     /// Moves all nodes.
-    pub fn integrate(&mut self, step: &NodeStep, u: &mut [DVec3], v: &mut [DVec3]) -> Vec<NodeSums> {
+    pub fn integrate(&mut self, step: &NodeStep, moved: Moved) -> Vec<NodeSums> {
         let stride = self.grid.stride;
         let places = self.places.chunks_exact_mut(PLACE * stride);
         let arch = self.grid.arch;
         let keep = |places: &mut [f32], u: &[DVec3]| set_places(arch, stride, places, u);
-        self.nodes.integrate(arch, &self.team, step, (u, v), (places.collect(), keep))
+        self.nodes.integrate(arch, &self.team, step, moved, (places.collect(), keep))
     }
 }
 

@@ -18,7 +18,7 @@ mod tets;
 use glam::DVec3;
 
 use self::block::LaneBlock;
-use self::nodes::NodeLines;
+use self::nodes::{Moved, NodeLines};
 use self::opening::OpeningInLanes;
 use self::tets::LaneTets;
 use super::integrate_nodes::{NodeStep, NodeSums};
@@ -152,10 +152,10 @@ impl LaneCells {
     }
 
     /// Moves all nodes, displacement and velocity; sums of their lines, in order.
-    pub(super) fn integrate(&mut self, step: &NodeStep, u: &mut [DVec3], v: &mut [DVec3]) -> Vec<NodeSums> {
+    pub(super) fn integrate(&mut self, step: &NodeStep, moved: Moved) -> Vec<NodeSums> {
         match self {
-            LaneCells::Block(cells) => cells.integrate(step, u, v),
-            LaneCells::Tets(cells) => cells.integrate(step, u, v),
+            LaneCells::Block(cells) => cells.integrate(step, moved),
+            LaneCells::Tets(cells) => cells.integrate(step, moved),
         }
     }
 

@@ -11,7 +11,7 @@ use pulp::{Arch, Simd, WithSimd};
 use super::WIDEST;
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
-use crate::effects::mass_scaling::{MOST_RAISED, RAISED_STEP_RATIO};
+use crate::effects::mass_scaling::{MOST_RAISED, RAISED_STEP_RATIO, change_of_mass};
 use crate::engine::WATCHED_STEP_RATIO;
 use crate::engine::elements::CellForces;
 use crate::model::{HELD, Model};
@@ -113,14 +113,14 @@ impl NodeLines {
         }
     }
 
-    /// Moves all nodes, displacement and velocity; sums of the lines, in their order: those of parts would hang on the size of the team.
+    /// Moves all nodes: displacement, velocity and mass over that at rest; sums of the lines, in their order: those of parts would hang on the size of the team.
     /// `places`: what cells read of the displacement of every line, and what brings it up to date.
     pub fn integrate<P: Send>(
         &self,
         arch: Arch,
         team: &Team,
         step: &NodeStep,
-        (displacement, velocity): (&mut [DVec3], &mut [DVec3]),
+        (displacement, velocity, inertia): Moved,
         (mut places, keep): (Vec<&mut [P]>, impl Fn(&mut [P], &[DVec3]) + Sync),
     ) -> Vec<NodeSums> {
         let (width, stride) = (self.width, self.stride);
@@ -128,27 +128,35 @@ impl NodeLines {
         let any = |node: usize| self.at(node);
         let is_plain = step.model.node_load.is_empty();
         let part = team.part(places.len());
-        let nodes = displacement.chunks_mut(part * width).zip(velocity.chunks_mut(part * width));
+        let moved = displacement.chunks_mut(part * width).zip(velocity.chunks_mut(part * width));
+        let nodes = moved.zip(inertia.chunks_mut(part * width));
         let lines = places.chunks_mut(part).zip(self.numbers.chunks(part * NODE * stride));
         let items: Vec<_> = nodes.zip(lines).collect();
-        let of_parts = team.map(items, |number, ((u, v), (places, numbers))| {
+        let of_parts = team.map(items, |number, (((u, v), inertia), (places, numbers))| {
             let mut scratch = Scratch::new(width);
             let mut all = Vec::with_capacity(places.len());
             let lines = places.iter_mut().zip(numbers.chunks_exact(NODE * stride));
-            for (i, ((places, numbers), (u, v))) in lines.zip(u.chunks_mut(width).zip(v.chunks_mut(width))).enumerate()
-            {
+            let moved = u.chunks_mut(width).zip(v.chunks_mut(width)).zip(inertia.chunks_mut(width));
+            for (i, ((places, numbers), ((u, v), inertia))) in lines.zip(moved).enumerate() {
                 let first = (number * part + i) * width;
                 let line = NodeLine { all: self, numbers };
                 let mut sums = NodeSums::default();
                 if is_plain {
-                    arch.dispatch(PlainLine { step, first, line, u, v, scratch: &mut scratch, sums: &mut sums });
+                    arch.dispatch(PlainLine {
+                        step,
+                        first,
+                        line,
+                        moved: (u, v, inertia),
+                        scratch: &mut scratch,
+                        sums: &mut sums,
+                    });
                 } else {
                     scratch.others.clear();
                     scratch.others.extend((0..u.len()).map(|i| (i, u[i], v[i])));
                 }
                 for (i, old_u, old_v) in scratch.others.drain(..) {
                     (u[i], v[i]) = (old_u, old_v);
-                    sums.add(&step.advance(first + i, any, (&mut u[i], &mut v[i])));
+                    sums.add(&step.advance(first + i, any, (&mut u[i], &mut v[i], &mut inertia[i])));
                 }
                 keep(places, u);
                 all.push(sums);
@@ -178,6 +186,9 @@ impl<'a> NodeLine<'a> {
     }
 }
 
+/// What a step changes of nodes: displacement and velocity [m, m/s], mass over that at rest.
+pub type Moved<'a> = (&'a mut [DVec3], &'a mut [DVec3], &'a mut [f32]);
+
 /// Arrays of a line, with room for a vector behind it: per component kick, new velocity, mass, raised part of it and weight, these the share
 /// of a tied copy; nodes that are not plain, as they were.
 struct Scratch {
@@ -190,6 +201,8 @@ struct Scratch {
     no_force: Vec<DVec3>,
     no_bound: Vec<f64>,
     others: Vec<(usize, DVec3, DVec3)>,
+    /// Nodes whose mass is another than before: over that at rest, and that at rest [kg].
+    changed: Vec<(usize, f32, f64)>,
 }
 
 impl Scratch {
@@ -204,6 +217,7 @@ impl Scratch {
             no_force: vec![DVec3::ZERO; width],
             no_bound: vec![0.0; width],
             others: Vec::new(),
+            changed: Vec::new(),
         }
     }
 }
@@ -217,8 +231,7 @@ struct PlainLine<'a, 'b> {
     step: &'a NodeStep<'b>,
     first: usize,
     line: NodeLine<'a>,
-    u: &'a mut [DVec3],
-    v: &'a mut [DVec3],
+    moved: Moved<'a>,
     scratch: &'a mut Scratch,
     sums: &'a mut NodeSums,
 }
@@ -228,11 +241,12 @@ impl WithSimd for PlainLine<'_, '_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let PlainLine { step, first, line, u, v, scratch, sums } = self;
+        let PlainLine { step, first, line, moved: (u, v, inertia), scratch, sums } = self;
         let NodeStep { model, dt, gravity, .. } = *step;
-        let Scratch { kick, new, mass, raised, weight, no_force, no_bound, others } = scratch;
+        let Scratch { kick, new, mass, raised, weight, no_force, no_bound, others, changed } = scratch;
         let falls = gravity != DVec3::ZERO;
         others.clear();
+        changed.clear();
         let count = u.len();
         let masses = &model.node_mass[first..first + count];
         let nothing = (&no_force[..count], &no_bound[..count]);
@@ -276,6 +290,10 @@ impl WithSimd for PlainLine<'_, '_> {
                 (*kick, *mass, *raised) = ([0.0; 3], [0.0; 3], [0.0; 3]);
                 continue;
             }
+            let now = (all / own) as f32;
+            if now != inertia[i] {
+                changed.push((i, now, share * own));
+            }
             let by = dt / all;
             let force = if falls { force + gravity * own } else { force };
             *kick = [force.x * by, force.y * by, force.z * by];
@@ -297,6 +315,17 @@ impl WithSimd for PlainLine<'_, '_> {
         let lanes = S::F64_LANES;
         new[..old.len()].copy_from_slice(old);
         new[old.len()..].fill(0.0);
+        // What a change of the mass takes, as `advance_node` has it.
+        let mut taken = 0.0;
+        for (i, now, own) in changed.iter() {
+            let mut ratio = inertia[*i];
+            let slowed = change_of_mass(&mut ratio, f64::from(*now));
+            for (v, (kick, mass)) in new[3 * i..][..3].iter_mut().zip(kick[3 * i..].iter().zip(&mass[3 * i..])) {
+                let came = *v;
+                *v *= slowed;
+                taken += 0.5 * (own * (came * came - *v * *v) + mass * kick * (came - *v));
+            }
+        }
         let zero = simd.splat_f64s(0.0);
         let (mut damped, mut gained, mut fastest, mut fallen) = (zero, zero, zero, zero);
         let (a_s, c_s, half) = (simd.splat_f64s(a), simd.splat_f64s(c), simd.splat_f64s(0.5));
@@ -326,7 +355,10 @@ impl WithSimd for PlainLine<'_, '_> {
         }
         sums.raised += more;
         sums.damping += alpha * dt * damped;
-        sums.raised_energy += gained;
+        sums.raised_energy += gained + taken;
+        for (i, now, _) in changed.iter() {
+            inertia[*i] = *now;
+        }
         if falls {
             sums.work += dt * simd.reduce_sum_f64s(fallen);
         }

@@ -9,7 +9,7 @@
 use glam::DVec3;
 use pulp::Arch;
 
-use super::nodes::NodeLines;
+use super::nodes::{Moved, NodeLines};
 use super::points::Points;
 use super::tet_vectors::{Deformed, Forces};
 use super::{LaneMaterial, WIDEST, materials_of, threads_for};
@@ -312,9 +312,9 @@ impl LaneTets {
     }
 
     /// Moves all nodes.
-    pub fn integrate(&mut self, step: &NodeStep, u: &mut [DVec3], v: &mut [DVec3]) -> Vec<NodeSums> {
+    pub fn integrate(&mut self, step: &NodeStep, moved: Moved) -> Vec<NodeSums> {
         let places = self.places.chunks_mut(LINE).collect();
-        self.nodes.integrate(self.shapes.arch, &self.team, step, (u, v), (places, set_places))
+        self.nodes.integrate(self.shapes.arch, &self.team, step, moved, (places, set_places))
     }
 }
 

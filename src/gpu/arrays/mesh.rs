@@ -42,10 +42,16 @@ pub(super) const ARRAYS: &[Array] = &[
     Array::constant("mesh_nodes", |s| bytes_of(&mesh_nodes(s.model, s.layout))).at(Place::Sampled(4)),
     Array::constant("node_cells", |s| bytes_of(&s.layout.fours().cells)).at(Place::Sampled(4)),
     Array::state("node_displacement", |s| zeros(s.nodes(), 16)).at(Place::Texels).exchanged(
-        |bytes, _, state| state.displacement = read_all(bytes).map(displacement).collect(),
+        |bytes, _, state| {
+            state.displacement = read_all(bytes).map(displacement).collect();
+            // 0 before the first step.
+            state.inertia = read_all::<[f32; 4]>(bytes).map(|u| u[3].max(1.0)).collect();
+        },
         |_, state| {
             let fixed = |x: f64| (x / DISPLACEMENT_UNIT).round() as i32;
-            let u = state.displacement.iter().map(|u| [fixed(u.x), fixed(u.y), fixed(u.z), 0]);
+            let bits = |inertia: &f32| inertia.to_bits() as i32;
+            let nodes = state.displacement.iter().zip(&state.inertia);
+            let u = nodes.map(|(u, inertia)| [fixed(u.x), fixed(u.y), fixed(u.z), bits(inertia)]);
             to_bytes(&u.collect::<Vec<[i32; 4]>>())
         },
     ),
