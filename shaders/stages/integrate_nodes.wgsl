@@ -72,11 +72,11 @@ fn integrate_nodes(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     let last = node_velocity[node];
 #ifdef MASS_SCALING
     mass = stable_mass(scaled_mass, sum.w);
-    // A node whose mass changes keeps its kinetic energy: src/effects/mass_scaling.rs.
+    // A node whose mass rises keeps its kinetic energy: src/effects/mass_scaling.rs.
     let inertia = mass / scaled_mass;
     let inertia_before = max(bitcast<f32>(displacement.w), 1.0);
     displacement.w = bitcast<i32>(inertia);
-    let slowed = select(1.0, sqrt(inertia_before / inertia), inertia != inertia_before);
+    let slowed = select(1.0, sqrt(inertia_before / inertia), inertia > inertia_before);
 #else
     let inertia_before = 1.0;
     let slowed = 1.0;

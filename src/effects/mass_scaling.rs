@@ -4,8 +4,9 @@
 //! Selective part: where cells are squeezed and stiffen, the nodal mass of one step is raised to
 //! `m* = max(m, k dt^2 / (4 * 0.9^2))` with `k` the bound of the nodal stiffness [N/m] (tissue, contact, tip springs;
 //! `Elements::stiffness_bound`), which keeps
-//! the step stable and leaves statics untouched. A node whose mass changes keeps its kinetic energy, `v sqrt(m*)` stays: with its velocity it
-//! would gain energy, as much as all work in soft, tough tissue where the crack runs in and tissue that moves is opened. Range of validity: needle speed well below the scaled shear
+//! the step stable and leaves statics untouched. A node whose mass rises keeps its kinetic energy, `v sqrt(m*)` stays: with its velocity it
+//! would gain energy, as much as all work in soft, tough tissue where the crack runs in and tissue that moves is opened. One whose mass falls
+//! keeps its velocity. Range of validity: needle speed well below the scaled shear
 //! wave speed; kinetic over internal energy is reported and should stay below 5 %.
 //! Source: Olovsson, Simonsson & Unosson 2005 (selective mass scaling); Joldes et al. 2008 (tissue).
 
@@ -49,11 +50,12 @@ pub fn stable_mass(mass: f64, bound: f64, dt: f64) -> f64 {
     (bound * dt * dt / (4.0 * RAISED_STEP_RATIO)).max(mass).min(MOST_RAISED * mass)
 }
 
-/// Factor of the velocity of a node whose mass over that at rest is `ratio` now; `inertia`: that of the step before, then this one.
+/// Factor of the velocity of a node whose mass over that at rest is `ratio` now; `inertia`: that of the step before, then this one. Not above
+/// 1: a node that is light again would strike with all that it had.
 pub fn change_of_mass(inertia: &mut f32, ratio: f64) -> f64 {
     let (before, now) = (*inertia, ratio as f32);
     *inertia = now;
-    if before == now { 1.0 } else { f64::from(before / now).sqrt() }
+    if now > before { f64::from(before / now).sqrt() } else { 1.0 }
 }
 
 /// Largest ratio of tool speed to scaled shear wave speed that `auto` allows (dimensionless).

@@ -44,7 +44,13 @@ fn every_membrane_has_its_drop_at_its_depth() {
     println!("{drops:?}");
     assert_eq!(drops.len(), 3, "{drops:?}");
     for (drop, top) in drops.iter().zip([0.0, 4e-3, 8e-3]) {
-        assert!((drop.tip_coordinate_m - top).abs() < 0.5e-3, "{drop:?} at {top}");
+        // It stands before the membrane until that gives way; in the frame of the largest force it may run on by a part of a millimetre.
+        let at = run.records.iter().position(|r| (r.depth - drop.depth_m).abs() < 1e-9).unwrap();
+        let stands = run.records[at - 1].tip_coordinate;
+        assert!(
+            (stands - top).abs() < 0.1e-3 && drop.tip_coordinate_m >= stands,
+            "{drop:?} at {top}, before at {stands}"
+        );
         assert!(drop.depth_m > top + 0.5e-3, "the surface follows the tip: {drop:?}");
     }
     // The tip is in a membrane or it is not: one of the two parts is the force of the tip, but for a frame in between.
