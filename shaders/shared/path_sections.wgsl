@@ -1,6 +1,7 @@
 // Where the sections of an opened path are, how far they are behind the tip, and what of them is cut.
 // Equations: src/needle/opening.rs and CpuEngine::stations_now.
 #import effects/opening
+#import shared/beside_needle
 
 #ifndef WIDE
 @group(1) @binding(22) var<storage, read> path_entries: array<OpeningEntry>;
@@ -63,7 +64,8 @@ fn place_sections(lane: u32, coordinate: f32, shift: f32) {
         let bend = clamp((tip_length - behind) / spacing + 0.5, 0.0, 1.0);
         let full = select(shaft - 0.5 * steep * spacing * bend * bend, steep * max(behind, 0.0), bend == 1.0);
         let slope = select(0.0, steep * bend, behind > 0.0);
-        path_stations[i].centre = vec4<f32>(middle, full * cut);
+        let still_open = left_beside(beside_needle(middle, behind, full, depth.z).offset).x;
+        path_stations[i].centre = vec4<f32>(middle, full * cut * still_open);
         path_stations[i].place = vec4<f32>(behind, cut, rate, slope);
         path_stations[i].rubbing.x = full;
 #ifdef VISCOELASTIC

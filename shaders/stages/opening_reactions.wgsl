@@ -5,14 +5,7 @@
 #import effects/puncture
 #import effects/opening
 #import shared/tip_read
-#ifdef LAID
-#import shared/swing
-#endif
-#ifdef FLEXIBLE_NEEDLE
-#import shared/bent_axis
-#else
-#import shared/straight_axis
-#endif
+#import shared/beside_needle
 
 #ifdef FRICTION
 @group(2) @binding(1) var<storage, read> node_velocity: array<vec4<f32>>;
@@ -141,20 +134,20 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
             weight += on;
         }
         normal = select(0.0, normal / weight, weight > 0.0);
-        // Where the middle is open it is held on the axis; sections of a bevel lie aside of the tip as far as they are wide.
+        // Where the middle is open it is held on the axis; sections of a bevel lie aside of the tip as far as they are wide. One that lies
+        // beside the needle closes: `guide` in src/cpu/opening.rs.
         let per_radius = opening.numbers.y / opening.direction.w;
-        let held = per_radius * now.centre.w;
-        let axis = axis_at(now.place.x);
-        let lever = across(opening.entry.xyz + now.centre.xyz - step_input.tip.xyz);
-        var shift = opening.surface.yzw / now.depth.z;
-#ifdef LAID
-        shift = swing(puncture.reference.xyz, t, shift);
-#endif
-        let offset = off_axis(axis, lever) - shift * now.rubbing.x;
-        let guide = offset * -held;
-        let by_radius = 0.5 * per_radius * dot(offset, offset);
-        let tilted = dot(along_axis(axis, -guide, -t), t) + dot(guide, shift) * -now.place.w;
-        let spread = (by.w + by_radius) * now.place.w * now.place.y - tilted;
+        let beside = beside_needle(now.centre.xyz, now.place.x, now.rubbing.x, now.depth.z);
+        let axis = beside.axis;
+        let lever = beside.lever;
+        let offset = beside.offset;
+        let left = left_beside(offset);
+        let whole = now.rubbing.x * now.place.y;
+        let by_radius = by.w + 0.5 * per_radius * dot(offset, offset);
+        let guide = offset * -(per_radius * now.centre.w + 2.0 * by_radius * whole * left.y);
+        let held = whole * (per_radius + leaving_curvature() * abs(by.w));
+        let tilted = dot(along_axis(axis, -guide, -t), t) + dot(guide, beside.shift) * -now.place.w;
+        let spread = by_radius * now.place.w * now.place.y * left.x - tilted;
         most_spread = max(most_spread, spread);
         var stick = now.rubbing.z;
         var rubbing = 0.0;
@@ -177,8 +170,8 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         stick = stretch;
         bound = 2.0 * kt;
 #endif
-        along += vec4<f32>(spread, rubbing, 0.0, 0.5 * held * dot(offset, offset));
-        aside += vec4<f32>(guide, (by.w + by_radius) * now.rubbing.x * now.place.z);
+        along += vec4<f32>(spread, rubbing, 0.0, 0.5 * per_radius * now.centre.w * dot(offset, offset));
+        aside += vec4<f32>(guide, by_radius * now.rubbing.x * now.place.z * left.x);
 #ifdef LAID
         // As the moment of all forces on the tissue.
         let from_tip = opening.entry.xyz - step_input.tip.xyz;

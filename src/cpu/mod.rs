@@ -9,6 +9,7 @@ mod lanes;
 mod needle_contact;
 mod needle_touch;
 mod opening;
+mod path_reactions;
 mod slit_contact;
 mod team;
 mod tip;

@@ -1,8 +1,10 @@
 //! Stage `opening`: tissue beside the path of the needle, carried by points, in f64 or by the lanes; stations, guide and friction. Equations:
 //! src/needle/opening.rs.
 
+use super::CpuEngine;
 use super::lanes::opening::{OpeningInLanes, PointSums};
-use super::{ContactSums, CpuEngine};
+use super::path_reactions::guide;
+use crate::engine::State;
 use crate::engine::elements::{CellForces, CellShape};
 use crate::material::TangentBound;
 use crate::material::kinematics::{J_CONTINUATION, cofactor, jacobian_minus_one, norm_squared};
@@ -16,21 +18,22 @@ use crate::needle::centre_line::Bend;
 use crate::needle::opening::{Derivatives, Opening, OpeningMap, Station, outer, squared_norm_bound};
 use crate::needle::{ToolPose, swing};
 use glam::{DMat3, DVec3};
+use std::sync::Arc;
 
 /// What is derived of one station: of the energy E.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct StationSums {
     /// By its centre and the rate of its centre [N], [J].
-    centre: DVec3,
-    centre_rate: DVec3,
+    pub(super) centre: DVec3,
+    pub(super) centre_rate: DVec3,
     /// By rc [N] and rc_Z [J].
-    radius: f64,
-    radius_rate: f64,
+    pub(super) radius: f64,
+    pub(super) radius_rate: f64,
     /// Moment of the forces on nodes (with the sign of f_int) about the centre [N m]: what a needle that turns feels.
-    moment: DVec3,
-    energy: f64,
+    pub(super) moment: DVec3,
+    pub(super) energy: f64,
     /// Energy of the shape without relaxation, its part in cells around the path with it [J].
-    shape: f64,
+    pub(super) shape: f64,
 }
 
 impl StationSums {
@@ -63,24 +66,35 @@ impl From<&PointSums> for StationSums {
 
 /// A station as it is: geometry, place along the needle, and what the tip has cut.
 #[derive(Debug, Clone, Copy, Default)]
-struct Now {
-    section: Station,
+pub(super) struct Now {
+    pub(super) section: Station,
     /// Middle of the section of the needle [m], and velocity of the tissue there, where it may rub [m/s].
-    disc: DVec3,
-    velocity: DVec3,
+    pub(super) disc: DVec3,
+    pub(super) velocity: DVec3,
     /// Distance behind the tip [m].
-    behind: f64,
-    cut: f64,
-    cut_rate: f64,
-    /// rc that a cut station would have [m], and its rate with `behind`; the same of the needle itself.
-    full: f64,
-    slope: f64,
-    radius: f64,
-    rate: f64,
+    pub(super) behind: f64,
+    pub(super) cut: f64,
+    pub(super) cut_rate: f64,
+    /// rc that a cut station would have [m], and its rate with `behind`.
+    pub(super) full: f64,
+    pub(super) slope: f64,
+    /// Middle of the path from the axis of the needle, across it [m], and that axis.
+    pub(super) aside: DVec3,
+    pub(super) axis: Axis,
+    /// Part of the opening that is left where it lies beside the needle, and its rate with the square of that distance [1/m^2].
+    pub(super) left: f64,
+    pub(super) leaving: f64,
+}
+
+/// The axis of the needle at a station: how it changes with the distance behind the tip, and its velocity [m/s], where the needle bends.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Axis {
+    pub(super) slope: DVec3,
+    pub(super) rate: DVec3,
 }
 
 /// Differences of a quantity along the stations: weights of the neighbours before and behind station `i`.
-fn neighbours(i: usize, count: usize, spacing: f64) -> (usize, usize, f64) {
+pub(super) fn neighbours(i: usize, count: usize, spacing: f64) -> (usize, usize, f64) {
     let (before, behind) = (i.saturating_sub(1), (i + 1).min(count - 1));
     (before, behind, 1.0 / (spacing * (behind - before) as f64))
 }
@@ -92,11 +106,13 @@ fn within(stations: &[Station], near: &NearCell) -> Station {
 
 impl CpuEngine {
     /// Where all stations are.
-    fn stations_now(&self, plan: &PuncturePlan, opening: &OpeningPlan, pose: &ToolPose) -> Vec<Now> {
+    fn stations_now(&self, plan: &PuncturePlan, opening: &OpeningPlan, (pose, step): (&ToolPose, u64)) -> Vec<Now> {
         let (rest, u, a) = (&self.rest, &self.state.displacement, self.state.tip_coordinate);
         let t = pose.direction;
         let shift = plan.contact.as_ref().map_or(0.0, |c| c.part(a)) * self.state.touch.dimple;
         let (velocities, rubs) = (&self.state.velocity, self.model.effects.friction.is_some());
+        // Sections of a bevel lie aside of the tip as far as they are wide.
+        let bevel = swing(plan.reference, t, plan.profile.shift);
         let mut now = self.each(opening.stations.len(), |i| {
             let station = &opening.stations[i];
             if opening.is_ahead(station, a) {
@@ -108,16 +124,24 @@ impl CpuEngine {
             let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.shaft));
             let (full, slope) = (radius * opened, rate * opened);
             let (cut, cut_rate) = opening.cut(station, a);
+            let bend = match &self.centre_line {
+                Some(line) => line.at(behind, (step - line.first_step) as f64 * self.dt),
+                None => Bend::default(),
+            };
+            let aside = centre - pose.tip;
+            let aside = aside - t * aside.dot(t) - bend.offset - bevel * radius;
+            let (left, leaving) = opening.left_beside(aside.length_squared());
+            let axis = Axis { slope: bend.slope + bevel * rate, rate: bend.rate };
             let section = Station {
                 centre,
-                radius: full * cut,
+                radius: full * cut * left,
                 rest_direction: station.direction,
                 growth: station.growth,
                 relaxed: self.state.relaxation.get(i).map_or(0.0, |r| 1.0 - r.left),
                 ..Station::default()
             };
             let velocity = if rubs { mean_of(&station.disc, &station.nodes, velocities) } else { DVec3::ZERO };
-            Now { section, disc, velocity, behind, cut, cut_rate, full, slope, radius, rate }
+            Now { section, disc, velocity, behind, cut, cut_rate, full, slope, aside, axis, left, leaving }
         });
         for i in 0..now.len() {
             let (before, behind, by) = neighbours(i, now.len(), opening.spacing);
@@ -129,10 +153,24 @@ impl CpuEngine {
         now
     }
 
+    /// What an opened path holds in a state of `model`, with the needle where `pose` says [J]: tissue, guide and stick springs.
+    pub(crate) fn opening_energy(model: &Arc<Model>, state: &State, pose: &ToolPose) -> f64 {
+        let (Some(plan), Some(opening)) = (&model.puncture, model.opening()) else { return 0.0 };
+        let mut engine = CpuEngine::new(model.clone(), 1.0);
+        engine.state = state.clone();
+        engine.measures = true;
+        let now = engine.stations_now(plan, opening, (pose, 0));
+        let sections: Vec<Station> = now.iter().map(|n| n.section).collect();
+        let (_, elastic) = engine.opened_in_f64(model, (opening, &opening.map(pose.direction)), &sections);
+        let stick = model.effects.friction.as_ref().map_or(0.0, |f| 0.5 * f.stiffness_ratio * opening.stick);
+        let springs = now.iter().zip(&state.stations).map(|(n, s)| guide(opening, n, 0.0).stored + stick * s * s);
+        elastic + springs.sum::<f64>()
+    }
+
     /// Stage `opening`: forces of points, near cells, the guide on the needle and friction.
     pub(super) fn opening(&mut self, plan: &PuncturePlan, opening: &OpeningPlan, pose: &ToolPose, step: u64) {
         let model = self.model.clone();
-        let now = self.stations_now(plan, opening, pose);
+        let now = self.stations_now(plan, opening, (pose, step));
         let sections: Vec<Station> = now.iter().map(|n| n.section).collect();
         let map = opening.map(pose.direction);
         let (sums, elastic) = match self.opened_in_lanes(&model, (opening, &map), &sections) {
@@ -142,7 +180,7 @@ impl CpuEngine {
         if self.measures {
             self.opening_elastic = elastic;
         }
-        self.station_reactions(opening, plan, (pose, step), &now, &sums);
+        self.station_reactions(opening, pose, &now, &sums);
         if self.measures {
             self.relax(&model, opening, &now, &sums);
         }
@@ -253,156 +291,6 @@ impl CpuEngine {
         }
         Some((sums, elastic))
     }
-
-    /// Forces of the stations on their nodes, on the needle and on the tip; friction.
-    fn station_reactions(
-        &mut self,
-        opening: &OpeningPlan,
-        plan: &PuncturePlan,
-        (pose, step): (&ToolPose, u64),
-        now: &[Now],
-        sums: &[StationSums],
-    ) {
-        let t = pose.direction;
-        let model = self.model.clone();
-        let count = now.len();
-        // By rc with all that follows from it, and by the centre.
-        let mut radius: Vec<f64> = sums.iter().map(|s| s.radius).collect();
-        let mut rates = vec![DVec3::ZERO; count];
-        for (i, s) in sums.iter().enumerate() {
-            let (before, behind, by) = neighbours(i, count, opening.spacing);
-            radius[behind] += s.radius_rate * by;
-            radius[before] -= s.radius_rate * by;
-            let rate = s.centre_rate - t * s.centre_rate.dot(t);
-            rates[behind] += rate * by;
-            rates[before] -= rate * by;
-        }
-        let guides: Vec<Guide> = now.iter().map(|n| self.guide(opening, plan, pose, step, n)).collect();
-        // Along the needle: by how rc and the axis change behind the tip.
-        let spreads: Vec<f64> =
-            now.iter().zip(&radius).zip(&guides).map(|((n, r), g)| r * n.slope * n.cut + g.along).collect();
-        let old = [self.state.opening_resistance, self.state.opening_spreading];
-        self.state.opening_resistance =
-            now.iter().zip(&radius).zip(&guides).map(|((n, r), g)| (r + g.by_radius) * n.full * n.cut_rate).sum();
-        self.state.opening_spreading = spreads.iter().sum();
-        self.state.opening_stiffness = opening.shift_stiffness(&spreads);
-        // The tip was told what the path took before it advanced: half of what that changed by comes off.
-        let [advance, shift] = self.advanced;
-        self.sums.energy.tip += 0.5 * (self.state.opening_spreading - old[1]) * shift
-            - 0.5 * (self.state.opening_resistance - old[0]) * advance;
-        let normal = averaged_normal(opening, now, sums);
-        let mut stored = 0.0;
-        let (mut booked, mut bend_work) = (ContactSums::default(), 0.0);
-        let friction = model.effects.friction.unwrap_or_default();
-        let rubs = model.effects.friction.is_some();
-        let kt = friction.stiffness_ratio * opening.stick;
-        // Everywhere along the path: a mass that was raised where friction sets in would swing with another energy.
-        let stick_bound = if rubs { 2.0 * kt } else { 0.0 };
-        for (i, station) in opening.stations.iter().enumerate() {
-            let n = &now[i];
-            let Guide { force: guide, held, .. } = guides[i];
-            stored += guides[i].stored;
-            let spread = spreads[i];
-            let mut rubbing = 0.0;
-            let memory = &mut self.state.stations[i];
-            let on_shaft =
-                crate::effects::friction::part_on_shaft(n.behind, opening.tip_length, friction.fade_length) * n.cut;
-            let squeeze = normal[i].max(0.0) * on_shaft;
-            self.sums.shaft_normal_impulse += squeeze * self.dt;
-            let limit = friction.coefficient * squeeze;
-            if rubs && (limit > 0.0 || *memory != 0.0) {
-                let motion = (n.velocity - pose.velocity_behind()).dot(t) * self.dt;
-                let (old, trial) = (*memory, *memory + motion);
-                *memory = if limit > 0.0 { trial.clamp(-limit / kt, limit / kt) } else { 0.0 };
-                rubbing = -kt * *memory;
-                booked.friction_work += 0.5 * kt * (old + *memory) * (trial - *memory);
-                stored += 0.5 * kt * *memory * *memory;
-            }
-            let along = t * (spread + rubbing);
-            for (place, w) in station.disc.iter().filter(|_| rubs || along != DVec3::ZERO) {
-                self.added.add(station.nodes[usize::from(*place)] as usize, along * *w, stick_bound * w);
-            }
-            let across = guide - sums[i].centre - rates[i];
-            for (place, w) in station.centre.iter().filter(|_| across != DVec3::ZERO || held > 0.0) {
-                let node = station.nodes[usize::from(*place)] as usize;
-                self.added.add(node, across * *w, 2.0 * held * w);
-            }
-            booked.normal += t * spread + guide;
-            booked.friction += t * rubbing;
-            // As the moment of all forces on the tissue.
-            let lever = n.section.centre - pose.tip;
-            booked.torque += match model.laid {
-                Some(_) => {
-                    let along_at = n.disc - pose.tip;
-                    lever.cross(guide - rates[i]) + along_at.cross(along) - sums[i].moment
-                }
-                None => (lever - t * lever.dot(t) - t * n.behind).cross(guide),
-            };
-            if let Some(line) = self.centre_line {
-                let impulse = (t * (spread + rubbing) + guide) * self.dt;
-                line.share(&mut self.sums.needle_loads, n.behind, impulse);
-                bend_work += guide.dot(guides[i].rate) * self.dt;
-            }
-        }
-        self.sums.book(&booked, pose, self.dt);
-        self.sums.tool_work += bend_work;
-        self.sums.last_tool_work += bend_work;
-        self.contact_energy += stored;
-    }
-}
-
-impl CpuEngine {
-    /// What holds the middle of a station on the axis of the needle where it is open.
-    fn guide(&self, opening: &OpeningPlan, plan: &PuncturePlan, pose: &ToolPose, step: u64, now: &Now) -> Guide {
-        let t = pose.direction;
-        let bend = match &self.centre_line {
-            Some(line) => line.at(now.behind, (step - line.first_step) as f64 * self.dt),
-            None => Bend::default(),
-        };
-        // Sections of a bevel lie aside of the tip as far as they are wide.
-        let bevel = swing(plan.reference, t, plan.profile.shift);
-        let axis = bend.offset + bevel * now.radius;
-        let aside = now.section.centre - pose.tip;
-        let aside = aside - t * aside.dot(t) - axis;
-        let per_radius = opening.guide / opening.shaft;
-        let held = per_radius * now.section.radius;
-        let by_radius = 0.5 * per_radius * aside.length_squared();
-        Guide {
-            force: aside * -held,
-            held,
-            stored: 0.5 * held * aside.length_squared(),
-            by_radius,
-            along: by_radius * now.slope * now.cut - held * aside.dot(bend.slope + bevel * now.rate),
-            rate: bend.rate,
-        }
-    }
-}
-
-/// What holds the middle of a station on the needle.
-#[derive(Debug, Clone, Copy)]
-struct Guide {
-    /// Force on the path, across the needle [N], and its stiffness [N/m].
-    force: DVec3,
-    held: f64,
-    stored: f64,
-    /// Derivatives of what is stored by rc at fixed place, and by the distance behind the tip [N].
-    by_radius: f64,
-    along: f64,
-    /// Velocity of the axis of a flexible needle there [m/s].
-    rate: DVec3,
-}
-
-/// Normal force of every station [N], averaged over its neighbours on the shaft: it is known cell by cell.
-fn averaged_normal(opening: &OpeningPlan, now: &[Now], sums: &[StationSums]) -> Vec<f64> {
-    let on = |n: &Now| if n.behind >= opening.tip_length { n.cut } else { 0.0 };
-    (0..now.len())
-        .map(|i| {
-            let around = i.saturating_sub(opening.averaged)..=(i + opening.averaged).min(now.len() - 1);
-            let weight: f64 = around.clone().map(|j| on(&now[j])).sum();
-            let sum: f64 = around.map(|j| on(&now[j]) * sums[j].radius).sum();
-            if weight > 0.0 { sum / weight } else { 0.0 }
-        })
-        .collect()
 }
 
 /// What keeps the shape: law and fibres, without the pressure, which is the cell's.

@@ -38,8 +38,8 @@ pub const LARGEST_MATERIAL_COUNT: usize = 256;
 pub const HELD: u32 = 7;
 
 /// Largest way of a node in one step, part of the smallest edge. With 0.05 tissue that snaps off a needle loses twice the energy
-/// (`free_hand/reinsertion.toml` in its usual step: 8.5 against 3.7 %); with 0.25 squeezed cells outrun the masses that are raised for
-/// them, and a block that is let go from 0.4 of its height triples its energy.
+/// (`free_hand/reinsertion.toml` with the ring, in its usual step: 8.5 against 3.7 %); with 0.25 squeezed cells outrun the masses that
+/// are raised for them, and a block that is let go from 0.4 of its height triples its energy.
 const SPEED_PER_STEP: f64 = 0.1;
 
 /// A path that is laid while the needle comes.

@@ -45,6 +45,9 @@ const ASIDE_ON_SKIN: f64 = 0.05;
 /// A needle that has gone aside by less is where it was [m].
 const SAME_PLACE: f64 = 1e-8;
 
+/// A needle this many radii beside its path in the material has left it: less than half of the opening is left there (OpeningPlan::left_beside).
+const BESIDE: f64 = crate::model::opening::LEAVES * std::f64::consts::SQRT_2;
+
 /// A track is the same where it begins within this part of the radius of the needle, at an angle below this [rad].
 const SAME_ENTRY: f64 = 0.5;
 /// See [`SAME_ENTRY`].
@@ -243,6 +246,9 @@ impl Laying {
         if next.depth <= now.depth {
             return Found::Nothing;
         }
+        if self.lies_beside(&tissue, next, radius) {
+            return tissue.line(rest, next).map_or(Found::Nothing, |line| Found::Line(line, 0.0));
+        }
         // What is open ends where the tip has cut, or where it is if it was drawn back.
         let (_, at) = self.line.coordinates(rest);
         let is_back = at + radius < cut;
@@ -261,6 +267,18 @@ impl Laying {
 }
 
 impl Laying {
+    /// True where the needle lies beside its path as far as it is in the tissue: the sections have slid off it, and where it goes on it
+    /// meets tissue that is whole.
+    fn lies_beside(&self, tissue: &Tissue, pose: &ToolPose, radius: f64) -> bool {
+        const PLACES: i32 = 5;
+        let depth = (pose.tip - self.line.piece(0.0).origin).dot(pose.direction);
+        (0..PLACES).all(|i| {
+            let behind = depth * f64::from(i) / f64::from(PLACES);
+            let (aside, _) = self.line.coordinates(tissue.rest(pose.tip - pose.direction * behind));
+            aside > BESIDE * radius
+        })
+    }
+
     /// The line of a needle that has not cut: without friction the tip slides over the skin, and the entry is where it presses.
     ///
     /// A line is where the needle will be at the end of the frame; a tilted needle that goes aside is at another height over it now. One that

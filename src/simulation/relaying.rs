@@ -7,6 +7,7 @@ use super::carried::{carried, on_the_same_path};
 use super::change::Change;
 use super::laying::{Found, Laying, touch_at};
 use super::start::choose_step;
+use crate::cpu::CpuEngine;
 use crate::engine::State;
 use crate::engine::stable_dt::wave_speed_bound;
 use crate::error::Result;
@@ -46,6 +47,9 @@ impl Simulation {
             }
             Found::Line(line, cut) => {
                 let from_line = laying.is_on();
+                if from_line && cut == 0.0 && state.tip_coordinate > 0.0 {
+                    laying.leave(state.tip_coordinate);
+                }
                 laying.come(&line, &next);
                 self.take_line(line, Some(GoesOn { state: &state, cut, pose: now, from_line }))
             }
@@ -86,7 +90,8 @@ impl Simulation {
         if goes_on && cut > 0.0 {
             on_the_same_path(state, &mut next);
         }
-        // The tip presses on another place of the tissue: what its springs hold there instead is work of the laying.
+        // The tip presses on another place of the tissue: what its springs hold there instead is work of the laying, and so is what a path
+        // held that a needle leaves at its side.
         let held = |model: &Model, touch| model.tip_contact().map_or(0.0, |contact| contact.stored(touch));
         // The touch of the state is a step older than its displacements; over that step the old line works as ever. A needle that was on no
         // line held nothing.
@@ -94,7 +99,10 @@ impl Simulation {
             true => touch_at(&self.model, state, state.tip_coordinate, &pose).1,
             false => state.touch,
         };
-        let before = held(&self.model, old_touch);
+        let mut before = held(&self.model, old_touch);
+        if from_line && !goes_on && state.tip_coordinate > 0.0 {
+            before += CpuEngine::opening_energy(&self.model, state, &pose);
+        }
         (next.bond.gap, next.touch) = touch_at(change.model(), state, cut, &pose);
         self.recorder.book_laying(held(change.model(), next.touch) - before);
         engine.write_state(&next)?;

@@ -49,9 +49,7 @@ fn free_motions_stay_finite_and_in_balance() {
         ("creep", &[FREE, "motion.phase.0.depth_mm=3.0", "motion.phase.1.depth_mm=3.1"], 0.02),
         ("stop_and_go", &[FREE], 0.02),
     ] {
-        // Drawn out while it is held 3 mm aside an opened path loses 2.8 % at this step, 7 % at the usual one: cause not found.
-        let opened = if overrides.contains(&DRAWN_OUT) { 0.03 } else { 0.01 };
-        for (scheme, bound) in [(&[RING][..], imbalance), (&OPENED, opened)] {
+        for (scheme, bound) in [(&[RING][..], imbalance), (&OPENED, 0.01)] {
             let overrides: Vec<&str> = overrides.iter().chain(scheme).copied().chain([COARSE]).collect();
             let run = run(&format!("free_hand/{name}.toml"), &overrides, best_engine());
             check(&format!("{name}, {}", scheme[0]), &run, bound);
@@ -59,19 +57,28 @@ fn free_motions_stay_finite_and_in_balance() {
     }
 }
 
+/// Mean of a part of the force between two depths of a phase [N].
+fn mean_force(run: &Run, phase: usize, [from, to]: [f64; 2], part: fn(&FrameRecord) -> f64) -> f64 {
+    let chosen = run.records.iter().filter(|r| r.phase == phase && r.depth > from && r.depth < to);
+    let values: Vec<f64> = chosen.map(part).collect();
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn cutting(record: &FrameRecord) -> f64 {
+    record.force.cutting
+}
+
 #[test]
 fn a_track_is_open_until_its_end() {
-    let run = run("free_hand/reinsertion.toml", &[COARSE], best_engine());
-    check("reinsertion", &run, 0.02);
-    let mean = |phase: usize, from: f64, to: f64, part: fn(&FrameRecord) -> f64| {
-        let chosen = run.records.iter().filter(|r| r.phase == phase && r.depth > from && r.depth < to);
-        let values: Vec<f64> = chosen.map(part).collect();
-        values.iter().sum::<f64>() / values.len() as f64
-    };
-    let cutting = |r: &FrameRecord| r.force.cutting;
-    let (first, again) = (mean(0, 3.5e-3, 4.8e-3, cutting), mean(2, 3.5e-3, 4.8e-3, cutting));
-    let (push, push_again) = (mean(0, 3.5e-3, 4.8e-3, |r| r.force.axial), mean(2, 3.5e-3, 4.8e-3, |r| r.force.axial));
-    let (beyond, beside) = (mean(2, 7.0e-3, 8.0e-3, cutting), mean(5, 4.0e-3, 6.0e-3, cutting));
+    // A quarter of the usual step: folded surface cells that let go of the shaft are too fast for the usual one, which loses 6 % of the energy.
+    let run = run("free_hand/reinsertion.toml", &[COARSE, RING, "solver.safety=0.2"], best_engine());
+    check("reinsertion, ring", &run, 0.02);
+    let shallow = [3.5e-3, 4.8e-3];
+    let axial = |r: &FrameRecord| r.force.axial;
+    let (first, again) = (mean_force(&run, 0, shallow, cutting), mean_force(&run, 2, shallow, cutting));
+    let (push, push_again) = (mean_force(&run, 0, shallow, axial), mean_force(&run, 2, shallow, axial));
+    let beyond = mean_force(&run, 2, [7.0e-3, 8.0e-3], cutting);
+    let beside = mean_force(&run, 5, [4.0e-3, 6.0e-3], cutting);
     println!(
         "cutting {first:.3} N, again {again:.3} N; axial {push:.3} N, again {push_again:.3} N; cutting beyond the end"
     );
@@ -79,6 +86,37 @@ fn a_track_is_open_until_its_end() {
     assert!((first - 0.3).abs() < 0.01, "{first}");
     assert!(again < 0.05 * first && push_again < 0.6 * push, "{again} {push_again}");
     assert!((beyond - 0.3).abs() < 0.01 && (beside - 0.3).abs() < 0.02, "{beyond} {beside}");
+}
+
+/// Nothing is cut in the old track, whole tissue beyond it; a tip that is drawn aside just below the skin slips out of its track, dents the skin
+/// beside it and cuts there as it did at first.
+#[test]
+fn an_opened_track_is_open_until_its_end_and_tissue_slides_off_a_tip_beside_it() {
+    let mut engines = vec![EngineChoice::Cpu];
+    if best_engine() == EngineChoice::Gpu {
+        engines.push(EngineChoice::Gpu);
+    }
+    for engine in engines {
+        let run = run("free_hand/reinsertion.toml", &[COARSE], engine);
+        check("reinsertion, opened", &run, 0.01);
+        assert_eq!(run.summary.inverted_cells, 0);
+        assert_eq!(run.simulation.verdict().sentence(), None);
+        let again = mean_force(&run, 2, [3.5e-3, 5.5e-3], cutting);
+        let [first, beside] = [0, 5].map(|phase| mean_force(&run, phase, [5.4e-3, 6.0e-3], cutting));
+        let beyond = mean_force(&run, 2, [7.0e-3, 8.0e-3], cutting);
+        let of_phase = |phase: usize| run.records.iter().filter(move |r| r.phase == phase);
+        let largest = |phase: usize| of_phase(phase).map(cutting).fold(0.0, f64::max);
+        println!("first {first:.3} N, again {again:.4} N, beyond the end {beyond:.3} N, beside it {beside:.3} N");
+        println!("puncture {:.3} N, beside the track {:.3} N", largest(0), largest(5));
+        assert!(again.abs() < 1e-3, "{again}");
+        assert!(beyond > 0.03, "{beyond}");
+        assert_near("force of the tip beside the track [N]", beside, first, 0.15);
+        assert_near("puncture beside the track [N]", largest(5), largest(0), 0.05);
+        // What it felt while it was drawn aside was tissue that held on to it.
+        let aside = of_phase(4).map(|r| r.force.lateral.x).fold(0.0, f64::max);
+        let left = of_phase(4).next_back().unwrap().force.lateral.length();
+        assert!(aside > 0.15 && left < 0.5 * aside, "{aside} {left}");
+    }
 }
 
 #[test]
