@@ -240,3 +240,46 @@ fn a_tilted_needle_that_goes_aside_over_the_skin_touches_nothing() {
     assert!(lines > 10, "{lines}");
     assert_eq!(most, 0.0);
 }
+
+/// Soft, tough tissue that a shaft turned about its entry draws far aside: by how far the tip is drawn back counts along the needle. As it was
+/// counted in the material the tip pressed on what it had cut, with half of all work so far, and a turn by 60 degrees was stopped.
+#[test]
+fn a_needle_that_is_turned_far_presses_on_nothing_that_it_has_cut() {
+    const SOFT: &str = r#"
+effects = ["puncture", "friction", "mass_scaling"]
+[tissue]
+size_mm = [20.0, 16.0, 14.0]
+cell_size_mm = 1.0
+[material]
+youngs_modulus_kpa = 12.0
+poisson_ratio = 0.45
+toughness_j_m2 = 164.0
+[needle]
+gauge = "18G"
+tip_half_angle_deg = 18.0
+[puncture]
+scheme = "opening"
+[outputs]
+pictures_at_depth_mm = []
+fields_at_depth_mm = []
+"#;
+    for (degrees, bound) in [(25.0, 0.01), (60.0, 0.02)] {
+        let motion = format!(
+            "motion.phase=[{{kind=\"insert\", speed_mm_s=5.0, depth_mm=9.0}}, \
+             {{kind=\"turn\", angle_deg={degrees}, rate_deg_s=30.0, pivot_mm=[0.0, 0.0, 0.0]}}, \
+             {{kind=\"turn\", angle_deg=0.0, rate_deg_s=30.0, pivot_mm=[0.0, 0.0, 0.0]}}]"
+        );
+        let soft = Scene::parse(Path::new("soft.toml"), SOFT, &[motion]).unwrap();
+        let mut simulation = Simulation::new(soft, EngineChoice::Cpu).unwrap();
+        let mut all = Vec::new();
+        while let Some(frame) = simulation.next_frame().unwrap() {
+            all.push(frame);
+        }
+        let work = all.last().unwrap().energy.external_max;
+        let changes = all.iter().map(|f| f.energy.changes.abs()).fold(0.0, f64::max);
+        println!("{degrees} degrees: imbalance {:.2e}, changes {:.2e}", largest_imbalance(&all), changes / work);
+        at_most("imbalance", largest_imbalance(&all), bound);
+        at_most("changes", changes / work, 0.15);
+        assert_eq!(simulation.verdict().sentence(), None);
+    }
+}
