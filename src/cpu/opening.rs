@@ -14,7 +14,7 @@ use crate::model::opening::{
     NearCell, OpeningPlan, OpeningStation, PathPoint, VOLUME_PLACE, is_volume_place, mean_of, mean_place,
 };
 use crate::model::{Model, PuncturePlan};
-use crate::needle::centre_line::Bend;
+use crate::needle::centre_line::{Bend, CentreLine};
 use crate::needle::opening::{Derivatives, Opening, OpeningMap, Station, outer, squared_norm_bound};
 use crate::needle::{ToolPose, swing};
 use glam::{DMat3, DVec3};
@@ -151,6 +151,21 @@ impl CpuEngine {
             now[i].section.radius_rate = (b.radius - a.radius) * by;
         }
         now
+    }
+
+    /// The path of a state of `model` as it is open: all sections, with the needle where `pose` says, bent along `line`.
+    pub(crate) fn opened_sections(
+        model: &Arc<Model>,
+        state: &State,
+        pose: &ToolPose,
+        line: Option<&CentreLine>,
+    ) -> Vec<Station> {
+        let (Some(plan), Some(opening)) = (&model.puncture, model.opening()) else { return Vec::new() };
+        let mut engine = CpuEngine::new(model.clone(), 1.0);
+        engine.state = state.clone();
+        engine.centre_line = line.copied();
+        let first_step = line.map_or(0, |line| line.first_step);
+        engine.stations_now(plan, opening, (pose, first_step)).iter().map(|n| n.section).collect()
     }
 
     /// What an opened path holds in a state of `model`, with the needle where `pose` says [J]: tissue, guide and stick springs.

@@ -178,11 +178,7 @@ impl Model {
             self.plan_puncture_of_tets(params, needle);
             return;
         }
-        let line = self
-            .laid
-            .as_ref()
-            .map(|laid| laid.line.clone())
-            .unwrap_or_else(|| PathLine::straight(self.scene.motion.entry, self.scene.motion.direction));
+        let line = self.path_line();
         let ahead = line.ahead();
         let mut path = PlannedPath::into_block(ahead.origin, ahead.direction);
         // Where the line has turned the front of the tip is across it.
@@ -336,6 +332,12 @@ impl Model {
         plan.contact = Some(contact);
         plan.cells.clear();
         self.contact_nodes.iter_mut().for_each(|c| c.pushed = false);
+    }
+
+    /// The line along which the path is planned or laid.
+    pub fn path_line(&self) -> PathLine {
+        let straight = || PathLine::straight(self.scene.motion.entry, self.scene.motion.direction);
+        self.laid.as_ref().map_or_else(straight, |laid| laid.line.clone())
     }
 
     /// The same model with its path along another line, where paths are laid.

@@ -24,7 +24,7 @@ pub struct Field {
 /// Where its values are on the host.
 #[derive(Debug, Clone, Copy)]
 pub enum Values {
-    /// A vector per node.
+    /// A vector per node; empty where the scene has no such field.
     Nodes(fn(&FieldSnapshot) -> &[DVec3]),
     /// A number per cell; empty where the scene has no such field.
     Cells(fn(&FieldSnapshot) -> &[f64]),
@@ -96,13 +96,21 @@ const fn drawn(key: &'static str, label: &'static str, unit: Unit, range: Range,
 }
 
 /// All fields, in the order of the arrays of a file and of the list in a window.
-pub static FIELDS: [Field; 11] = [
+pub static FIELDS: [Field; 12] = [
     Field {
         key: "displacement_m",
         label: "displacement",
         unit: METRE,
         range: Range::Positive(1e-3),
         values: Values::Nodes(|s| &s.displacement),
+        lane: Lane::None,
+    },
+    Field {
+        key: "opened_displacement_m",
+        label: "displacement beside the open path",
+        unit: METRE,
+        range: Range::Positive(1e-3),
+        values: Values::Nodes(|s| &s.opened_displacement),
         lane: Lane::None,
     },
     VON_MISES,

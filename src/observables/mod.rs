@@ -212,6 +212,10 @@ pub struct FieldSnapshot {
     pub damage: Vec<f64>,
     /// Index of the material per cell, 0 outside all regions; empty without regions.
     pub material: Vec<f64>,
+    /// The path, where it is open and cells do not show it.
+    pub opened: Option<OpenedPath>,
+    /// Displacement to where the tissue is seen beside that path, per node [m]; empty without such a path.
+    pub opened_displacement: Vec<DVec3>,
 }
 
 mod core_sample;
@@ -221,6 +225,7 @@ pub mod field;
 #[allow(missing_docs)]
 mod judge;
 mod needle_volume;
+mod opened_path;
 #[allow(missing_docs)]
 pub mod quantity;
 mod recorder;
@@ -231,5 +236,6 @@ pub use crate::engine::{EnergyAccount, EnergyPart, FrameEnergies, Health};
 pub use core_sample::CoreSample;
 pub use judge::{Judge, Sizes, Trouble};
 pub use needle_volume::cells_in_needle;
+pub use opened_path::{OpenedCell, OpenedPath, OpenedPlace};
 pub use recorder::Recorder;
 pub use target::TargetRecord;

@@ -62,7 +62,7 @@ impl FieldFiles {
     }
 }
 
-/// Text of one VTU file. Empty cell fields are left out. `materials` are names for the numbers of the array `material`.
+/// Text of one VTU file. Empty fields are left out. `materials` are names for the numbers of the array `material`.
 pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot, materials: &[String]) -> String {
     let nodes = mesh.node_count();
     // Flat cells between the copies of a line are no tissue.
@@ -93,7 +93,8 @@ pub fn vtu(mesh: &Mesh, snapshot: &FieldSnapshot, materials: &[String]) -> Strin
     text += &array("types", "UInt8", 1, vec![kind; cells]);
     text += "</Cells>\n<PointData Vectors=\"displacement_m\">\n";
     for field in &FIELDS {
-        if let Values::Nodes(of) = field.values {
+        let Values::Nodes(of) = field.values else { continue };
+        if !of(snapshot).is_empty() {
             text += &array(field.key, "Float32", 3, floats(of(snapshot).iter().flat_map(|u| u.to_array())));
         }
     }

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::needle::Tool;
-use crate::observables::FieldSnapshot;
+use crate::observables::{FieldSnapshot, OpenedPath};
 use crate::observables::field::VON_MISES;
 use crate::scene::Scene;
 
@@ -22,6 +22,10 @@ const BESIDE_GRID_LINES: f64 = 0.02;
 
 /// Nodes that moved farther than this many block sizes are not drawn.
 const FARTHEST_MOVE: f64 = 2.0;
+
+/// Edges of triangles beside an opened path, in needle radii, and how often one is halved at most.
+const SHORTEST: f64 = 0.15;
+const MOST_HALVINGS: usize = 14;
 
 /// The tetrahedra of a hexahedron, corners in VTK order.
 const TETRAHEDRA: [[usize; 4]; 6] =
@@ -125,6 +129,14 @@ pub struct SliceTriangle {
     pub opened: bool,
 }
 
+impl SliceTriangle {
+    /// Its area [m^2].
+    pub fn area(&self) -> f64 {
+        let [a, b, c] = self.points;
+        0.5 * (b - a).perp_dot(c - a).abs()
+    }
+}
+
 /// What an edge in the cut separates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EdgeKind {
@@ -153,6 +165,81 @@ pub struct Slice {
     pub lines: Vec<SliceLine>,
     /// Cells that are not drawn because a node is not a finite number or far outside.
     pub cells_left_out: usize,
+    /// True where the tissue beside an opened path is drawn where the needle has pushed it.
+    pub is_opened: bool,
+}
+
+impl Slice {
+    /// Moves what lies beside an opened path to where it is seen, and takes the stress that it has there. The plane holds the axis of the
+    /// needle, from which the map leads away: what is in the plane stays in it.
+    fn open(&mut self, opened: &OpenedPath, plane: &Plane) {
+        self.is_opened = true;
+        let in_space = |p: DVec2| plane.origin + plane.right * p.x + plane.up * p.y;
+        let moved = |p: DVec2, rest: DVec3| opened.at(rest, in_space(p)).map(|at| (plane.project(at.place), at));
+        // Edges beside the path are so short, in needle radii: shorter where the map bends them more.
+        let longest = |ends: [(DVec2, DVec3); 2]| {
+            let near = |(p, rest): (DVec2, DVec3)| opened.distance(rest, in_space(p));
+            let middle = (0.5 * (ends[0].0 + ends[1].0), ends[0].1.lerp(ends[1].1, 0.5));
+            let nearest = [ends[0], middle, ends[1]].into_iter().filter_map(near).fold(f64::INFINITY, f64::min);
+            opened.shaft() * if nearest < 0.5 { SHORTEST } else { SHORTEST.max(0.5 * SHORTEST * nearest.powi(2)) }
+        };
+        let mut triangles = Vec::with_capacity(self.triangles.len());
+        for triangle in std::mem::take(&mut self.triangles) {
+            let mut open = vec![(triangle, 0)];
+            while let Some((t, depth)) = open.pop() {
+                // Every edge by itself, so that triangles on both sides of it halve it alike.
+                let edge = |n: usize| {
+                    let ends = [n, (n + 1) % 3].map(|n| (t.points[n], t.rest[n]));
+                    (ends[0].0.distance(ends[1].0) / longest(ends), n)
+                };
+                let (too_long, n) = (0..3).map(edge).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default();
+                let m = (n + 1) % 3;
+                if depth < MOST_HALVINGS && too_long > 1.0 {
+                    let middle = 0.5 * (t.points[n] + t.points[m]);
+                    let (rest, stress) = (t.rest[n].lerp(t.rest[m], 0.5), 0.5 * (t.von_mises[n] + t.von_mises[m]));
+                    for end in [n, m] {
+                        let mut half = t;
+                        (half.points[end], half.rest[end], half.von_mises[end]) = (middle, rest, stress);
+                        open.push((half, depth + 1));
+                    }
+                    continue;
+                }
+                // What spans the path would be drawn across the needle.
+                let sides = [0, 1, 2].map(|n| opened.offset_at(t.rest[n], in_space(t.points[n])));
+                let spans = |a: usize| match (sides[a], sides[(a + 1) % 3]) {
+                    (Some(a), Some(b)) => a.dot(b) < 0.0,
+                    _ => false,
+                };
+                if (0..3).any(spans) {
+                    continue;
+                }
+                let mut seen = t;
+                for corner in 0..3 {
+                    if let Some((place, at)) = moved(t.points[corner], t.rest[corner]) {
+                        seen.points[corner] = place;
+                        seen.von_mises[corner] += at.weight * (at.von_mises - t.von_mises[corner]);
+                    }
+                }
+                triangles.push(seen);
+            }
+        }
+        self.triangles = triangles;
+        let mut lines = Vec::with_capacity(self.lines.len());
+        for line in std::mem::take(&mut self.lines) {
+            let ends = [0, 1].map(|n| (line.points[n], line.rest[n]));
+            let parts = (ends[0].0.distance(ends[1].0) / longest(ends)).ceil().clamp(1.0, 64.0) as usize;
+            let at = |n: usize| {
+                let t = n as f64 / parts as f64;
+                let (p, rest) = (ends[0].0.lerp(ends[1].0, t), ends[0].1.lerp(ends[1].1, t));
+                (moved(p, rest).map_or(p, |m| m.0), rest)
+            };
+            for n in 0..parts {
+                let (a, b) = (at(n), at(n + 1));
+                lines.push(SliceLine { points: [a.0, b.0], rest: [a.1, b.1], kind: line.kind });
+            }
+        }
+        self.lines = lines;
+    }
 }
 
 /// Cuts the deformed tissue.
@@ -174,7 +261,9 @@ fn cut_cells(
     is_wanted: impl Fn(usize) -> bool,
 ) -> Slice {
     let plane = plane.beside_grid_lines(cell_size);
-    let von_mises = smoothed_to_nodes(mesh, VON_MISES.cells(snapshot), &snapshot.stiffness);
+    // Beside an opened path the stress is taken where it is, not over whole cells.
+    let of_cells = snapshot.opened.as_ref().map_or_else(|| VON_MISES.cells(snapshot), OpenedPath::coarse);
+    let von_mises = smoothed_to_nodes(mesh, of_cells, &snapshot.stiffness);
     let (low, high) = mesh.bounds();
     let farthest = FARTHEST_MOVE * (high - low).max_element();
     let kinds = match mesh {
@@ -282,6 +371,9 @@ fn cut_cells(
                 }
             }
         }
+    }
+    if let Some(opened) = &snapshot.opened {
+        slice.open(opened, &plane);
     }
     slice
 }

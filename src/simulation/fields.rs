@@ -3,6 +3,7 @@
 use glam::DMat3;
 
 use super::Simulation;
+use crate::cpu::CpuEngine;
 use crate::engine::State;
 use crate::engine::elements::{CellShape, CellStates, Elements};
 use crate::error::Result;
@@ -12,15 +13,42 @@ use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::needle::centre_line::CentreLine;
 use crate::needle::{Kinematics, ToolPose};
-use crate::observables::{FieldSnapshot, FrameRecord, cells_in_needle};
+use crate::observables::{FieldSnapshot, FrameRecord, OpenedCell, OpenedPath, cells_in_needle};
 
 impl Simulation {
     /// Fields of the present state; call it right after a frame registered with [`Simulation::stop_after`].
     pub fn snapshot(&mut self, record: &FrameRecord) -> Result<FieldSnapshot> {
         let state = self.engine.read_state()?;
         let line = self.needle.as_ref().map(|needle| needle.centre_line());
-        Ok(snapshot(&self.model, self.kinematics.as_ref(), record, state, line))
+        let pose = self.kinematics.as_ref().map(|kinematics| pose_of(kinematics, record));
+        let mut fields = snapshot(&self.model, self.kinematics.as_ref(), record, state.clone(), line);
+        if let Some(pose) = pose {
+            let sections = CpuEngine::opened_sections(&self.model, &state, &pose, line.as_ref());
+            let path = OpenedPath::new(&self.model, &state, (pose.direction, sections), &fields.von_mises);
+            if let Some(path) = path {
+                open(&self.model, path, &mut fields);
+            }
+        }
+        Ok(fields)
     }
+}
+
+/// Where the needle is; the tip of a bent one stays behind.
+fn pose_of(kinematics: &Kinematics, record: &FrameRecord) -> ToolPose {
+    let pose = kinematics.pose(record.time);
+    ToolPose { tip: pose.tip - pose.direction * record.needle.retreat, ..pose }
+}
+
+/// Adds what an opened path does to the fields of cells and nodes, which are those of the closed one.
+fn open(model: &Model, path: OpenedPath, fields: &mut FieldSnapshot) {
+    for OpenedCell { cell, von_mises, grown } in path.cells(&fields.displacement) {
+        fields.von_mises[cell] = von_mises;
+        let bulk_modulus = model.material(cell).law.bulk_modulus;
+        fields.pressure[cell] -= bulk_modulus * fields.jacobian[cell] * grown;
+        fields.jacobian[cell] *= 1.0 + grown;
+    }
+    fields.opened_displacement.clone_from(&path.displacement);
+    fields.opened = Some(path);
 }
 
 /// H = F - I at the centre of every cell.
@@ -33,7 +61,7 @@ pub(super) fn displacement_gradients(mesh: &Mesh, state: &State) -> Vec<DMat3> {
         .collect()
 }
 
-/// Stresses and Jacobians of a state, in f64; `line`: the centre-line of a bent needle then.
+/// Stresses and Jacobians of the cells of a state, in f64, with a path that is opened by a map as cells have it: closed; `line`: the centre-line of a bent needle then.
 pub fn snapshot(
     model: &Model,
     kinematics: Option<&Kinematics>,
@@ -51,11 +79,7 @@ pub fn snapshot(
         centre_line: line,
         ..Default::default()
     };
-    let pose = kinematics.map(|k| {
-        let pose = k.pose(record.time);
-        // The tip of a bent needle stays behind.
-        ToolPose { tip: pose.tip - pose.direction * record.needle.retreat, ..pose }
-    });
+    let pose = kinematics.map(|k| pose_of(k, record));
     fields.tool_pose = pose.map(|pose| (pose.tip, pose.direction));
     // Where the path is opened by a map, the cells are those of the closed one: no tissue is within the needle.
     let cuts = pose.filter(|_| model.puncture.is_some() && model.opening().is_none());

@@ -270,6 +270,9 @@ fn extent(mesh: &Mesh, plane: &Plane, slice: &Slice) -> (DVec2, DVec2) {
     (cut.0.max(rest.0 - slack), cut.1.min(rest.1 + slack))
 }
 
+/// Part of the tissue in a cut whose stress may lie above the scale, where a path is opened.
+const BEYOND_SCALE: f64 = 0.02;
+
 /// What the colours mean.
 struct StressScale {
     /// Stress at the upper end of the colour bar [Pa].
@@ -283,14 +286,28 @@ struct StressScale {
 impl StressScale {
     fn new(chosen: Option<f64>, slice: &Slice) -> Self {
         // Opened cells are drawn pale: they set no scale.
-        let largest = slice.triangles.iter().filter(|t| !t.opened).flat_map(|t| t.von_mises).fold(0.0, f64::max);
-        match chosen {
-            Some(top) if top > 0.0 => Self { top, steps: 4, exceeded: largest > top },
-            _ => {
-                let (top, steps) = rounded_up(largest);
-                Self { top, steps, exceeded: false }
-            }
+        let shown = || slice.triangles.iter().filter(|t| !t.opened);
+        let largest = shown().flat_map(|t| t.von_mises).fold(0.0, f64::max);
+        if let Some(top) = chosen.filter(|top| *top > 0.0) {
+            return Self { top, steps: 4, exceeded: largest > top };
         }
+        // At the wall of an opened path the stress is tens of times that beside it, in a seam: some of the tissue may lie above the scale.
+        let bulk = match slice.is_opened {
+            false => largest,
+            true => {
+                let mut areas: Vec<(f64, f64)> = shown().map(|t| (t.von_mises.iter().sum::<f64>() / 3.0, t.area())).collect();
+                areas.sort_by(|a, b| b.0.total_cmp(&a.0));
+                let mut left = BEYOND_SCALE * areas.iter().map(|(_, area)| area).sum::<f64>();
+                let above = |(_, area): &(f64, f64)| {
+                    left -= area;
+                    left > 0.0
+                };
+                let beyond = areas.iter().copied().take_while(above).count();
+                areas.get(beyond).map_or(largest, |(stress, _)| *stress)
+            }
+        };
+        let (top, steps) = rounded_up(bulk);
+        Self { top, steps, exceeded: largest > top }
     }
 }
 

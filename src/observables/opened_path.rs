@@ -1,0 +1,300 @@
+//! The tissue beside an opened path as it is seen. Cells carry a path of no width; where tissue lies around the needle, and how it is strained
+//! there, is told by the opening map (src/needle/opening.rs).
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+use crate::engine::State;
+use crate::engine::elements::CellShape;
+use crate::material::kinematics::jacobian_minus_one;
+use crate::material::von_mises;
+use crate::material_point::{PointState, Volumetric};
+use crate::mesh::{CORNERS, trilinear};
+use crate::model::Model;
+use crate::model::opening::{NearCell, VOLUME_PLACE, is_volume_place};
+use crate::needle::opening::{FADED, OpeningMap, Station};
+use crate::needle::path_line::PathLine;
+
+/// Places along an edge of a cell at which its mean is taken.
+const PLACES: usize = 4;
+
+/// Within the first distance from the middle of the path the stress is that of the map, beyond the second that of cells whose nodes are where
+/// they are seen, which resolve it there [needle radii]. What the map does where it fades cells take back between their nodes only.
+const NEAR: [f64; 2] = [1.0, 2.0];
+
+/// Radius of a section that hardly shows, in needle radii.
+const HARDLY_OPEN: f64 = 0.1;
+
+/// The path as it is open at one moment.
+#[derive(Debug, Clone)]
+pub struct OpenedPath {
+    model: Arc<Model>,
+    map: OpeningMap,
+    line: PathLine,
+    /// Material coordinate of the first section and distance between two [m].
+    first: f64,
+    spacing: f64,
+    sections: Vec<Station>,
+    /// Gradient of the displacement at the nodes that the map reaches: mean of the cells around each, by their volumes.
+    gradients: BTreeMap<usize, DMat3>,
+    /// Von Mises stress of the cells, of the places where their nodes are seen [Pa]; NaN in those that the path runs through.
+    coarse: Vec<f64>,
+    /// Displacement to where every node is seen [m].
+    pub displacement: Vec<DVec3>,
+}
+
+/// Sections and gradients tell one path from another.
+impl PartialEq for OpenedPath {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.map, &self.line, &self.sections, &self.gradients)
+            == (&other.map, &other.line, &other.sections, &other.gradients)
+    }
+}
+
+/// What opening does at one place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OpenedPlace {
+    /// Where the tissue is seen [m].
+    pub place: DVec3,
+    /// Von Mises stress beside the path [Pa], and the part that it has of the stress there: 1 near the path, 0 where cells resolve it.
+    pub von_mises: f64,
+    /// See `von_mises`.
+    pub weight: f64,
+}
+
+/// What opening does to one cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OpenedCell {
+    /// Index of the cell.
+    pub cell: usize,
+    /// Mean von Mises stress [Pa].
+    pub von_mises: f64,
+    /// Volume over that of the closed path, less one.
+    pub grown: f64,
+}
+
+impl OpenedPath {
+    /// The path of a `state` of `model` with these `sections` of its stations. `None` where the scene has none, or where nothing is open.
+    /// `closed`: von Mises stress of the cells with the path closed [Pa].
+    pub fn new(
+        model: &Arc<Model>,
+        state: &State,
+        (direction, sections): (DVec3, Vec<Station>),
+        closed: &[f64],
+    ) -> Option<Self> {
+        let opening = model.opening()?;
+        if sections.iter().all(|section| section.radius == 0.0) {
+            return None;
+        }
+        let mut sums: BTreeMap<usize, (DMat3, f64)> =
+            opening.nodes.iter().map(|node| (*node as usize, (DMat3::ZERO, 0.0))).collect();
+        for near in &opening.cells {
+            let cell = near.cell as usize;
+            if model.mesh.is_empty(cell) {
+                continue;
+            }
+            let shape = CellShape::new(&model.mesh, cell);
+            let h = shape.displacement_gradient(&shape.gather(&state.displacement));
+            for node in model.mesh.cell_nodes(cell).iter() {
+                if let Some((sum, volume)) = sums.get_mut(node) {
+                    *sum += h * shape.volume;
+                    *volume += shape.volume;
+                }
+            }
+        }
+        let mean = |(node, (sum, volume)): (usize, (DMat3, f64))| (volume > 0.0).then(|| (node, sum * (1.0 / volume)));
+        let mut path = OpenedPath {
+            map: opening.map(direction),
+            line: model.path_line(),
+            first: opening.stations[0].depth,
+            spacing: opening.spacing,
+            sections,
+            gradients: sums.into_iter().filter_map(mean).collect(),
+            model: model.clone(),
+            coarse: closed.to_vec(),
+            displacement: state.displacement.clone(),
+        };
+        for node in &opening.nodes {
+            let (rest, u) = (model.mesh.rest_position(*node as usize), &mut path.displacement[*node as usize]);
+            let y = rest + *u;
+            let section = path.section_at(rest);
+            if section.radius > 0.0 {
+                path.displacement[*node as usize] = path.map.place(&section, y) - rest;
+            }
+        }
+        for near in &opening.cells {
+            let cell = near.cell as usize;
+            path.coarse[cell] = path.coarse_stress(cell, closed[cell], &state.displacement);
+        }
+        Some(path)
+    }
+
+    /// Stress of a cell whose nodes are where they are seen, with that of the closed path as `closed` [Pa].
+    fn coarse_stress(&self, cell: usize, closed: f64, u: &[DVec3]) -> f64 {
+        let mesh = &self.model.mesh;
+        let nodes = mesh.cell_nodes(cell);
+        let middle = |of: &dyn Fn(usize) -> DVec3| nodes.iter().map(|n| of(*n)).sum::<DVec3>() / nodes.len() as f64;
+        let rest = middle(&|n| mesh.rest_position(n));
+        let section = self.section_at(rest);
+        if section.radius == 0.0 || mesh.is_empty(cell) {
+            return closed;
+        }
+        if self.offset(&section, rest + middle(&|n| u[n])).length() < NEAR[0] * self.map.shaft {
+            return f64::NAN;
+        }
+        let shape = CellShape::new(mesh, cell);
+        let of = |u: &[DVec3]| self.shape_stress(cell, shape.displacement_gradient(&shape.gather(u)));
+        (closed + section.left() * (of(&self.displacement) - of(u))).max(0.0)
+    }
+
+    /// Von Mises stress of law and fibres of a cell's material; a folded place has none, its J tells [Pa].
+    fn shape_stress(&self, cell: usize, h: DMat3) -> f64 {
+        let j = 1.0 + jacobian_minus_one(h);
+        if j <= 0.0 {
+            return 0.0;
+        }
+        let material = self.model.material(cell);
+        let p = material.stress(h, Volumetric { stress: 0.0, energy: 0.0 }, 1.0, &PointState::default());
+        von_mises(p * (DMat3::IDENTITY + h).transpose() * (1.0 / j))
+    }
+
+    /// Von Mises stress of the cells as their nodes are seen, without what lies in them beside the path [Pa]; NaN where the path runs through.
+    pub fn coarse(&self) -> &[f64] {
+        &self.coarse
+    }
+
+    /// Radius of the needle [m].
+    pub fn shaft(&self) -> f64 {
+        self.map.shaft
+    }
+
+    /// The path at the material coordinate of a rest position, between two sections.
+    fn section_at(&self, rest: DVec3) -> Station {
+        let along = (self.line.coordinates(rest).1 - self.first) / self.spacing;
+        let last = self.sections.len() - 1;
+        let before = (along.floor().max(0.0) as usize).min(last);
+        let (a, b) = (self.sections[before], self.sections[(before + 1).min(last)]);
+        // What is ahead of the tip is nowhere.
+        if a.radius == 0.0 || b.radius == 0.0 {
+            let open = if a.radius == 0.0 { b } else { a };
+            let part = (along - before as f64).clamp(0.0, 1.0);
+            let left = if a.radius == 0.0 { part } else { 1.0 - part };
+            return Station { radius: open.radius * left, ..open };
+        }
+        let t = (along - before as f64).clamp(0.0, 1.0);
+        let mix = |a: f64, b: f64| a + t * (b - a);
+        Station {
+            centre: a.centre.lerp(b.centre, t),
+            centre_rate: a.centre_rate.lerp(b.centre_rate, t),
+            radius: mix(a.radius, b.radius),
+            radius_rate: mix(a.radius_rate, b.radius_rate),
+            rest_direction: a.rest_direction,
+            growth: a.growth,
+            relaxed: mix(a.relaxed, b.relaxed),
+        }
+    }
+
+    /// Where a place of the closed tissue lies from the middle of the path, across the needle [m].
+    fn offset(&self, section: &Station, y: DVec3) -> DVec3 {
+        let offset = y - section.centre;
+        offset - self.map.direction * offset.dot(self.map.direction)
+    }
+
+    /// Where a place of the closed tissue lies from the middle of the path, across the needle [m]. `None` where it is
+    /// hardly open.
+    pub fn offset_at(&self, rest: DVec3, y: DVec3) -> Option<DVec3> {
+        let section = self.section_at(rest);
+        (section.radius > HARDLY_OPEN * self.map.shaft).then(|| self.offset(&section, y))
+    }
+
+    /// Where a place of the closed tissue lies from the middle of the path, in needle radii. `None` where the map does not reach.
+    pub fn distance(&self, rest: DVec3, y: DVec3) -> Option<f64> {
+        let section = self.section_at(rest);
+        let distance = self.offset(&section, y).length() / self.map.shaft;
+        (section.radius > 0.0 && distance < FADED).then_some(distance)
+    }
+
+    /// The smoothed gradient at a rest position, and the cell there.
+    fn gradient_at(&self, rest: DVec3) -> Option<(DMat3, usize)> {
+        let block = self.model.mesh.as_block()?;
+        let ([i, j, k], at) = block.locate(rest);
+        let cell = block.cell_index(i, j, k);
+        let (weights, _) = trilinear(at, block.cell_size(cell));
+        let (mut sum, mut total) = (DMat3::ZERO, 0.0);
+        for (node, weight) in block.cell_nodes(cell).iter().zip(weights) {
+            if let Some(h) = self.gradients.get(node) {
+                sum += *h * weight;
+                total += weight;
+            }
+        }
+        (total > 1e-9).then(|| (sum * (1.0 / total), cell))
+    }
+
+    /// Rest radius of the hole that the slit acts like, beside a rest position [m].
+    fn hole_at(&self, rest: DVec3) -> f64 {
+        let along = ((self.line.coordinates(rest).1 - self.first) / self.spacing).round().max(0.0);
+        let stations = self.model.opening().map_or(&[][..], |opening| &opening.stations);
+        stations.get((along as usize).min(stations.len().saturating_sub(1))).map_or(0.0, |station| station.hole)
+    }
+
+    /// What opening does to the tissue that is at `rest` [m] at rest, and at `y` [m] with the closed path. `None` where it does nothing.
+    pub fn at(&self, rest: DVec3, y: DVec3) -> Option<OpenedPlace> {
+        let section = self.section_at(rest);
+        let eta = self.offset(&section, y);
+        if section.radius == 0.0 || eta.length() >= FADED * self.map.shaft {
+            return None;
+        }
+        let place = self.map.place(&section, y);
+        let [near, far] = NEAR.map(|r| r * self.map.shaft);
+        let x = ((far - eta.length()) / (far - near)).clamp(0.0, 1.0);
+        let weight = x * x * (3.0 - 2.0 * x);
+        let (h, cell) = self.gradient_at(rest)?;
+        // No tissue is stretched more than at the rim of the slit.
+        let rim = self.hole_at(rest);
+        let y = y + eta * (rim / eta.length().max(1e-3 * rim) - 1.0).max(0.0);
+        let f = DMat3::from_cols_array_2d(&self.map.at(&section, y, h).gradient(&h.to_cols_array_2d()));
+        let von_mises = if weight > 0.0 { section.left() * self.shape_stress(cell, f) } else { 0.0 };
+        Some(OpenedPlace { place, von_mises, weight })
+    }
+
+    /// Cells that the map reaches; `u`: displacement of every node with the closed path [m].
+    pub fn cells(&self, u: &[DVec3]) -> Vec<OpenedCell> {
+        let Some((opening, block)) = self.model.opening().zip(self.model.mesh.as_block()) else { return Vec::new() };
+        let part = |n: usize| (n as f64 + 0.5) / PLACES as f64;
+        let of_cell = |near: &NearCell| {
+            let cell = near.cell as usize;
+            let (nodes, size) = (block.cell_nodes(cell), block.cell_size(cell));
+            let at = |local: DVec3| {
+                let (weights, _) = trilinear(local, size);
+                let corners = nodes.iter().zip(weights);
+                corners.fold([DVec3::ZERO; 2], |[rest, moved], (node, weight)| {
+                    [rest + block.rest_position(*node) * weight, moved + u[*node] * weight]
+                })
+            };
+            let stress = |n: usize| {
+                let [rest, moved] = at(DVec3::new(part(n % PLACES), part(n / PLACES % PLACES), part(n / PLACES / PLACES)));
+                let coarse = self.coarse[cell];
+                let mixed = |at: OpenedPlace| match coarse.is_nan() {
+                    true => at.von_mises,
+                    false => coarse + at.weight * (at.von_mises - coarse),
+                };
+                self.at(rest, rest + moved).map_or(if coarse.is_nan() { 0.0 } else { coarse }, mixed)
+            };
+            let von_mises = (0..PLACES.pow(3)).map(stress).sum::<f64>() / PLACES.pow(3) as f64;
+            // As the engines take the volume: what fading does at four places, what tissue grows by in the whole cell.
+            let stations = &self.sections[usize::from(near.first)..][..usize::from(near.count)];
+            let section = Station::mean(stations);
+            if section.radius == 0.0 {
+                return OpenedCell { cell, von_mises, grown: 0.0 };
+            }
+            let fades = (0..8).filter(|corner| is_volume_place(*corner)).map(|corner| {
+                let [rest, moved] = at(DVec3::splat(0.5) + DVec3::from(CORNERS[corner]) * (0.5 * VOLUME_PLACE));
+                self.map.dilation(&section, rest + moved).less_one / 4.0
+            });
+            OpenedCell { cell, von_mises, grown: fades.sum::<f64>() + section.radius.powi(2) * near.growth[0] }
+        };
+        opening.cells.iter().map(of_cell).collect()
+    }
+}
