@@ -74,6 +74,57 @@ fn of_a_needle_in_tissue() {
     compare("scenes/muscle_biopsy.toml", &["tissue.cell_size_mm=1.0", "motion.phase.0.depth_mm=5.0"], 140);
 }
 
+/// Beside an opened path nodes are where they are seen, and cells strained as they are there. The window takes the middle of the path for the
+/// axis of the needle, where the snapshot knows every section.
+#[test]
+fn of_an_opened_path() {
+    let Some(gpu) = gpu() else { return };
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/muscle_biopsy.toml");
+    let scene = Scene::load(&file, &["tissue.cell_size_mm=0.8".into()]).unwrap();
+    let purpose = Purpose { led: false, drawn: true, lanes: false };
+    let mut simulation = Simulation::for_purpose(scene, Some(gpu.clone()), purpose).unwrap();
+    let frames = 270;
+    simulation.stop_after(frames);
+    let mut record = simulation.next_frame().unwrap().unwrap();
+    while record.frame < frames {
+        record = simulation.next_frame().unwrap().unwrap();
+    }
+    let opened = simulation.snapshot(&record).unwrap().opened.unwrap();
+    let read = |record| -> Fields {
+        simulation.show_needle(record);
+        let engine = simulation.on_device().unwrap();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        engine.encode_fields(&mut encoder);
+        gpu.queue.submit([encoder.finish()]);
+        let bytes = gpu.read_back(engine.memory("drawn_cells").and_then(Memory::buffer).unwrap()).unwrap();
+        bytemuck::cast_slice(&bytes).to_vec()
+    };
+    // Without a needle in it the tissue is drawn with its path closed.
+    let (shut, open) = (read(None), read(Some(&record)));
+    let largest = opened.coarse().iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::max);
+    let (mut moved, mut through, mut worst, mut sum) = (0, 0, 0.0f64, 0.0);
+    for ((stress, open), shut) in opened.coarse().iter().zip(&open).zip(&shut) {
+        if stress.is_nan() {
+            // Beside the tip less than beside the shaft.
+            assert!(
+                open[0] >= shut[0],
+                "{} Pa, {} Pa with the path closed, in a cell that the needle runs through",
+                open[0],
+                shut[0]
+            );
+            through += usize::from(f64::from(open[0]) > 0.5 * largest);
+            continue;
+        }
+        let apart = (f64::from(open[0]) - stress).abs() / largest;
+        (worst, sum) = (worst.max(apart), sum + apart);
+        moved += usize::from((open[0] - shut[0]).abs() > 0.05 * largest as f32);
+    }
+    at_most("von Mises in one cell", worst, 0.06);
+    at_most("von Mises in all", sum / open.len() as f64, 1e-3);
+    println!("{moved} cells are strained by the path, {through} hold it");
+    assert!(moved > 50 && through > 20, "{moved} cells are strained by the path, {through} hold it");
+}
+
 #[test]
 fn of_histories() {
     compare("scenes/effects/plasticity.toml", &[], 40);

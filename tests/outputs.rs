@@ -219,6 +219,7 @@ fn snapshot(scene: &Scene, mesh: &Mesh, depth: f64) -> FieldSnapshot {
             let (aside, along, _) = place(x);
             if aside.length() < 0.7e-3 && along < depth { 0.02 } else { 1.0 }
         }),
+        ..Default::default()
     }
 }
 

@@ -32,7 +32,7 @@ fn anatomy_corner(
     // Weights are rounded to bytes.
     let sum = dot(lower, vec4<f32>(1.0)) + dot(upper, vec4<f32>(1.0));
     var out: AnatomyCorner;
-    let at = place + moved * (DISPLACEMENT_UNIT / max(sum, 0.01));
+    let at = seen_place(place + moved * (DISPLACEMENT_UNIT / max(sum, 0.01)));
     out.clip = view.view_projection * vec4<f32>(at, 1.0);
     out.normal = normal.xyz;
     out.colour = colour.rgb;

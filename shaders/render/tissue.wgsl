@@ -8,6 +8,8 @@ struct View {
     // How much of the tissue's surface, and of layers that are seen through, is drawn, 0..1; nodes from
     // row to row and from layer to layer of a block with labels.
     surface: vec4<f32>,
+    // Its path is opened beside it.
+    needle: DrawnNeedle,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -30,6 +32,11 @@ fn node_place(node: u32) -> vec3<f32> {
     return node_rest[node].xyz + vec3<f32>(node_displacement[node].xyz) * DISPLACEMENT_UNIT;
 }
 
+// Where tissue is seen that is at `y` with its path closed [m].
+fn seen_place(y: vec3<f32>) -> vec3<f32> {
+    return y + pushed_aside(view.needle, beside_axis(view.needle, y));
+}
+
 // 0..1 on the colour scale.
 fn on_scale(value: f32) -> f32 {
     let low = view.range.x;
@@ -48,7 +55,7 @@ fn node_field(node: u32) -> f32 {
 
 fn placed_corner(nodes: vec2<u32>, part: f32, value: f32) -> TissueCorner {
     var out: TissueCorner;
-    out.place = mix(node_place(nodes.x), node_place(nodes.y), part);
+    out.place = seen_place(mix(node_place(nodes.x), node_place(nodes.y), part));
     out.clip = view.view_projection * vec4<f32>(out.place, 1.0);
     // On the scale already here: a software adapter pays for every pixel.
     out.field = on_scale(value);

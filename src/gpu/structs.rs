@@ -39,6 +39,12 @@ shared_structs! {
         hourglass: f32,
         law: u32,
     }
+    /// shaders/shared/needle_in_tissue.wgsl
+    struct DrawnNeedle {
+        tip: [f32; 4],
+        direction: [f32; 4],
+        opened: [f32; 4],
+    }
     /// shaders/shared/point_history.wgsl
     struct PointHistory {
         flow: f32,

@@ -24,6 +24,9 @@ const PLACES: usize = 4;
 /// they are seen, which resolve it there [needle radii]. What the map does where it fades cells take back between their nodes only.
 const NEAR: [f64; 2] = [1.0, 2.0];
 
+/// How far beside the middle of the path a cut may run that is drawn as through it, in needle radii.
+const NEARLY_THROUGH: f64 = 0.25;
+
 /// Radius of a section that hardly shows, in needle radii.
 const HARDLY_OPEN: f64 = 0.1;
 
@@ -209,6 +212,14 @@ impl OpenedPath {
         (section.radius > HARDLY_OPEN * self.map.shaft).then(|| self.offset(&section, y))
     }
 
+    /// The place of the closed tissue beside `y` along `normal` [m] in which a cut with that normal holds the middle of the path, where it runs
+    /// nearly through it: a little beside the middle the map leads out of the cut.
+    pub fn level_with_middle(&self, rest: DVec3, y: DVec3, normal: DVec3) -> DVec3 {
+        let section = self.section_at(rest);
+        let aside = self.offset(&section, y).dot(normal);
+        if section.radius > 0.0 && aside.abs() < NEARLY_THROUGH * self.map.shaft { y - normal * aside } else { y }
+    }
+
     /// Where a place of the closed tissue lies from the middle of the path, in needle radii. `None` where the map does not reach.
     pub fn distance(&self, rest: DVec3, y: DVec3) -> Option<f64> {
         let section = self.section_at(rest);
@@ -274,7 +285,8 @@ impl OpenedPath {
                 })
             };
             let stress = |n: usize| {
-                let [rest, moved] = at(DVec3::new(part(n % PLACES), part(n / PLACES % PLACES), part(n / PLACES / PLACES)));
+                let [rest, moved] =
+                    at(DVec3::new(part(n % PLACES), part(n / PLACES % PLACES), part(n / PLACES / PLACES)));
                 let coarse = self.coarse[cell];
                 let mixed = |at: OpenedPlace| match coarse.is_nan() {
                     true => at.von_mises,

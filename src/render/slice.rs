@@ -9,8 +9,8 @@ use glam::{DVec2, DVec3};
 
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::needle::Tool;
-use crate::observables::{FieldSnapshot, OpenedPath};
 use crate::observables::field::VON_MISES;
+use crate::observables::{FieldSnapshot, OpenedPath};
 use crate::scene::Scene;
 
 /// Remaining stiffness below which a cell counts as opened by the tip.
@@ -174,11 +174,14 @@ impl Slice {
     /// needle, from which the map leads away: what is in the plane stays in it.
     fn open(&mut self, opened: &OpenedPath, plane: &Plane) {
         self.is_opened = true;
-        let in_space = |p: DVec2| plane.origin + plane.right * p.x + plane.up * p.y;
-        let moved = |p: DVec2, rest: DVec3| opened.at(rest, in_space(p)).map(|at| (plane.project(at.place), at));
+        let in_space = |p: DVec2, rest: DVec3| {
+            let place = plane.origin + plane.right * p.x + plane.up * p.y;
+            opened.level_with_middle(rest, place, plane.normal)
+        };
+        let moved = |p: DVec2, rest: DVec3| opened.at(rest, in_space(p, rest)).map(|at| (plane.project(at.place), at));
         // Edges beside the path are so short, in needle radii: shorter where the map bends them more.
         let longest = |ends: [(DVec2, DVec3); 2]| {
-            let near = |(p, rest): (DVec2, DVec3)| opened.distance(rest, in_space(p));
+            let near = |(p, rest): (DVec2, DVec3)| opened.distance(rest, in_space(p, rest));
             let middle = (0.5 * (ends[0].0 + ends[1].0), ends[0].1.lerp(ends[1].1, 0.5));
             let nearest = [ends[0], middle, ends[1]].into_iter().filter_map(near).fold(f64::INFINITY, f64::min);
             opened.shaft() * if nearest < 0.5 { SHORTEST } else { SHORTEST.max(0.5 * SHORTEST * nearest.powi(2)) }
@@ -205,7 +208,7 @@ impl Slice {
                     continue;
                 }
                 // What spans the path would be drawn across the needle.
-                let sides = [0, 1, 2].map(|n| opened.offset_at(t.rest[n], in_space(t.points[n])));
+                let sides = [0, 1, 2].map(|n| opened.offset_at(t.rest[n], in_space(t.points[n], t.rest[n])));
                 let spans = |a: usize| match (sides[a], sides[(a + 1) % 3]) {
                     (Some(a), Some(b)) => a.dot(b) < 0.0,
                     _ => false,

@@ -1,12 +1,13 @@
 //! Fields of the tissue at one moment, in f64.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
 use super::Simulation;
 use crate::cpu::CpuEngine;
 use crate::engine::State;
 use crate::engine::elements::{CellShape, CellStates, Elements};
 use crate::error::Result;
+use crate::gpu::structs::DrawnNeedle;
 use crate::material::von_mises;
 use crate::material_point::PointState;
 use crate::mesh::Mesh;
@@ -30,6 +31,33 @@ impl Simulation {
             }
         }
         Ok(fields)
+    }
+}
+
+impl Simulation {
+    /// Where a straight needle has opened its path, for those who draw tissue as it is seen; nothing is open around any other. The fields
+    /// that a device draws know it from here on.
+    pub fn show_needle(&self, record: Option<&FrameRecord>) -> DrawnNeedle {
+        let drawn = || {
+            let record = record.filter(|record| record.tip_coordinate > 0.0 && self.needle.is_none())?;
+            let (opening, pose) = (self.model.opening()?, self.tool_pose(record.time)?);
+            let cut = opening.stations.iter().filter(|station| (0.0..record.tip_coordinate).contains(&station.depth));
+            let opened = cut.map(|station| station.opened(opening.shaft)).collect::<Vec<_>>();
+            let vector = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
+            let mean = opened.iter().sum::<f64>() / opened.len().max(1) as f64;
+            Some(DrawnNeedle {
+                tip: vector(pose.tip, opening.shaft),
+                direction: vector(pose.direction, opening.tip_length),
+                opened: [mean as f32, 0.0, 0.0, 0.0],
+            })
+        };
+        let needle = drawn().unwrap_or_default();
+        if let Some(engine) = self.on_device()
+            && let Some(memory) = engine.memory("drawn_needle")
+        {
+            memory.write(&engine.gpu().queue, bytemuck::bytes_of(&needle));
+        }
+        needle
     }
 }
 

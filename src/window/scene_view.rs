@@ -10,12 +10,16 @@ use super::camera::Camera;
 use super::section::{self, Outline, RestPlane, TissueCorner};
 use super::tool_shape::ToolCorner;
 use crate::anatomy::colours::Rgb;
+use crate::gpu::structs::DrawnNeedle;
 use crate::gpu::{Bound, Gpu, GpuEngine};
 use crate::model::Model;
 use crate::observables::field::Field;
 use crate::{Error, Result};
 
-const SHADER: &str = include_str!("../../shaders/render/tissue.wgsl");
+const SHADER: &str = concat!(
+    include_str!("../../shaders/shared/needle_in_tissue.wgsl"),
+    include_str!("../../shaders/render/tissue.wgsl")
+);
 /// What comes to it where faces may part.
 const PARTED: &str = include_str!("../../shaders/render/parted.wgsl");
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -37,6 +41,7 @@ struct View {
     towards: [f32; 4],
     range: [f32; 4],
     surface: [f32; 4],
+    needle: DrawnNeedle,
 }
 
 /// Rectangle of the target that is drawn into [px].
@@ -64,6 +69,8 @@ pub struct SceneView {
     rest: wgpu::Buffer,
     /// Other copies of every node, where faces may separate.
     copies: Option<wgpu::Buffer>,
+    /// The needle in the tissue, which is drawn beside it.
+    pub needle: DrawnNeedle,
     /// What the table holds.
     colours: Colours,
     /// Natural colour of a block of one part whose faces may part.
@@ -226,6 +233,7 @@ impl SceneView {
             rest,
             copies,
             colours,
+            needle: DrawnNeedle::default(),
             plain: anatomy_view::only_part(model).map(|(_, colour)| colour),
         };
         drawing.cut(gpu, model, None, 0);
@@ -343,6 +351,7 @@ impl SceneView {
                 f32::from(u8::from(scale.logarithmic)),
             ],
             surface: [opacity, look.veil, row, layer],
+            needle: self.needle,
         };
         gpu.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
         let colours = plain.map_or(Colours::Map(look.map), Colours::Plain);

@@ -534,6 +534,75 @@ fn all_engines_relax_alike() {
     }
 }
 
+/// What is drawn and written of the tissue beside the shaft: where it lies, and its stress, against the round hole of the theory; nothing is
+/// drawn within the needle.
+#[test]
+fn tissue_beside_the_needle_is_seen_where_it_is_and_with_its_stress() {
+    for cell in ["tissue.cell_size_mm=1.0", "tissue.cell_size_mm=0.6"] {
+        let mut simulation = Simulation::new(scene(&[cell]), EngineChoice::Cpu).unwrap();
+        let deep = 255;
+        simulation.stop_after(deep);
+        let record = loop {
+            let record = simulation.next_frame().unwrap().unwrap();
+            if record.frame == deep {
+                break record;
+            }
+        };
+        let model = simulation.model.clone();
+        let fields = simulation.snapshot(&record).unwrap();
+        let (path, opening) = (fields.opened.as_ref().unwrap(), model.opening().unwrap());
+        let (shaft, law) = (opening.shaft, model.scene.material.law);
+        let block = model.mesh.as_block().unwrap();
+        let station = &opening.stations[opening.stations.len() / 2];
+        let hole = station.hole;
+        let (mut farthest, mut strongest, mut ratios) = (0.0f64, 0.0f64, [(0.0, 0.0); 3]);
+        for n in 0..120 {
+            let (angle, depth) = (0.7 + 2.399 * f64::from(n), 3.0e-3 + 1e-3 * f64::from(n % 3));
+            let r = shaft * [0.25, 0.5, 0.8, 1.2][n as usize % 4];
+            let rest = glam::DVec3::new(r * angle.cos(), r * angle.sin(), -depth);
+            let ([i, j, k], at) = block.locate(rest);
+            let cell = block.cell_index(i, j, k);
+            let (weights, _) = stylet::mesh::trilinear(at, block.cell_size(cell));
+            let corners = block.cell_nodes(cell);
+            let y = rest + corners.iter().zip(weights).map(|(n, w)| fields.displacement[*n] * w).sum::<glam::DVec3>();
+            let seen = path.at(rest, y).unwrap();
+            let x = (r * r + shaft * shaft - hole * hole).sqrt();
+            farthest = farthest.max((seen.place.truncate().length() / x - 1.0).abs());
+            if seen.weight == 1.0 {
+                // Tissue that changes its volume does so around the hole.
+                let j = 1.0 + (shaft * shaft - hole * hole) * station.growth.rate(r * r);
+                let f = glam::DVec3::new(j * r / x, x / r, 1.0);
+                let p = law.isochoric_stress(glam::DMat3::from_diagonal(f - glam::DVec3::ONE));
+                let sigma = glam::DVec3::new(p.x_axis.x * f.x, p.y_axis.y * f.y, p.z_axis.z) / j;
+                let theory = stylet::material::von_mises(glam::DMat3::from_diagonal(sigma));
+                strongest = strongest.max((seen.von_mises / theory - 1.0).abs());
+                let (sum, count) = &mut ratios[n as usize % 4];
+                (*sum, *count) = (*sum + seen.von_mises / theory, *count + 1.0);
+            }
+        }
+        println!("{cell}: {:.1} % of the place, {:.1} % of the stress", 1e2 * farthest, 1e2 * strongest);
+        at_most("place beside the shaft", farthest, 0.04);
+        at_most("stress beside the shaft", strongest, 0.25);
+        for (sum, count) in ratios {
+            close("mean stress at one distance", sum / count, 1.0, 0.06);
+        }
+
+        let plane = stylet::render::slice::Plane::of_scene(&model.scene, &model.mesh, &fields);
+        let slice = stylet::render::slice::cut(&model.mesh, &fields, &plane, model.scene.tissue.cell_size);
+        assert!(slice.is_opened);
+        let tip = plane.project(fields.tool_pose.unwrap().0);
+        let mut innermost = 0.0f64;
+        for t in &slice.triangles {
+            let middle = (t.points[0] + t.points[1] + t.points[2]) / 3.0;
+            let (behind, aside) = (middle.y - tip.y, (middle.x - tip.x).abs());
+            let radius = opening.radius(behind).0;
+            let inside = radius - aside;
+            innermost = innermost.max(inside / shaft);
+        }
+        at_most("drawn within the needle, in radii", innermost, 0.1);
+    }
+}
+
 /// Out again from just below the surface, where the dimple shifts a path that fibres make stiff: 17 to 23 % of the work were missing while the
 /// dimple swung from step to step.
 #[test]

@@ -587,11 +587,21 @@ fn a_broken_stage_names_file_and_line() {
 /// The shaders that draw: they are no stages.
 const DRAWING: [(&str, &str); 4] = [
     ("render/stress_picture", include_str!("../../shaders/render/stress_picture.wgsl")),
-    ("render/tissue", include_str!("../../shaders/render/tissue.wgsl")),
+    (
+        "render/tissue",
+        concat!(
+            include_str!("../../shaders/shared/needle_in_tissue.wgsl"),
+            include_str!("../../shaders/render/tissue.wgsl")
+        ),
+    ),
     // Where faces may part.
     (
         "render/tissue with render/parted",
-        concat!(include_str!("../../shaders/render/tissue.wgsl"), include_str!("../../shaders/render/parted.wgsl")),
+        concat!(
+            include_str!("../../shaders/shared/needle_in_tissue.wgsl"),
+            include_str!("../../shaders/render/tissue.wgsl"),
+            include_str!("../../shaders/render/parted.wgsl")
+        ),
     ),
     ("render/ultrasound", include_str!("../../shaders/render/ultrasound.wgsl")),
 ];

@@ -295,7 +295,8 @@ impl StressScale {
         let bulk = match slice.is_opened {
             false => largest,
             true => {
-                let mut areas: Vec<(f64, f64)> = shown().map(|t| (t.von_mises.iter().sum::<f64>() / 3.0, t.area())).collect();
+                let mut areas: Vec<(f64, f64)> =
+                    shown().map(|t| (t.von_mises.iter().sum::<f64>() / 3.0, t.area())).collect();
                 areas.sort_by(|a, b| b.0.total_cmp(&a.0));
                 let mut left = BEYOND_SCALE * areas.iter().map(|(_, area)| area).sum::<f64>();
                 let above = |(_, area): &(f64, f64)| {

@@ -145,6 +145,7 @@ impl PracticeScreen {
         // Stress is computed where it is looked at.
         let fields = self.shows_fields();
         self.practice.simulation.show(fields)?;
+        self.view.needle = self.practice.simulation.show_needle(self.practice.records.last());
         if fields && let Some(engine) = self.practice.simulation.on_device() {
             engine.encode_fields(encoder);
         }

@@ -1,0 +1,28 @@
+// Where tissue beside a needle is seen whose path is opened: the map of src/needle/opening.rs, for a path whose middle is on the axis of a
+// straight needle. For what is drawn; forces have the sections of the path.
+struct DrawnNeedle {
+    // Tip [m]; w: radius R of the shaft [m], 0 where nothing is open.
+    tip: vec4<f32>,
+    // Direction of the insertion; w: length of the tip [m].
+    direction: vec4<f32>,
+    // x: radius of the hole over that of the needle; the others unused.
+    opened: vec4<f32>,
+}
+
+// Where a place lies beside the axis, xyz [m], and the radius rc of the hole there, w [m].
+fn beside_axis(needle: DrawnNeedle, y: vec3<f32>) -> vec4<f32> {
+    let from_tip = y - needle.tip.xyz;
+    let behind = -dot(from_tip, needle.direction.xyz);
+    let radius = needle.tip.w * clamp(behind / max(needle.direction.w, 1e-9), 0.0, 1.0);
+    return vec4<f32>(from_tip + needle.direction.xyz * behind, radius * needle.opened.x);
+}
+
+// By how much the needle pushes a place aside [m]; `beside`: of beside_axis. Exact up to two radii, nothing beyond four.
+fn pushed_aside(needle: DrawnNeedle, beside: vec4<f32>) -> vec3<f32> {
+    let shaft = max(needle.tip.w, 1e-9);
+    let square = dot(beside.xyz, beside.xyz);
+    let x = clamp(0.5 * sqrt(square) / shaft - 1.0, 0.0, 1.0);
+    let left = 1.0 - x * x * x * (10.0 - x * (15.0 - 6.0 * x));
+    let least = 1e-3 * shaft;
+    return beside.xyz * (sqrt(1.0 + beside.w * beside.w * left / (square + least * least)) - 1.0);
+}
