@@ -270,6 +270,25 @@ impl OpenedPath {
         Some(OpenedPlace { place, von_mises, weight })
     }
 
+    /// Where tissue is with the closed path that rests at `rest` [m] and is seen at `seen` [m]; what would lie within the needle comes from the
+    /// middle of the path.
+    pub fn closed_place(&self, rest: DVec3, seen: DVec3) -> DVec3 {
+        let section = self.section_at(rest);
+        let eta = self.offset(&section, seen);
+        let distance = eta.length();
+        if section.radius == 0.0 || distance == 0.0 || distance >= FADED * self.map.shaft {
+            return seen;
+        }
+        // The map keeps the order of distances.
+        let reach = |part: f64| self.offset(&section, self.map.place(&section, seen + eta * (part - 1.0))).length();
+        let (mut low, mut high) = (0.0, 1.0);
+        while high - low > 1e-9 {
+            let middle = 0.5 * (low + high);
+            if reach(middle) < distance { low = middle } else { high = middle }
+        }
+        seen + eta * (low - 1.0)
+    }
+
     /// Cells that the map reaches; `u`: displacement of every node with the closed path [m].
     pub fn cells(&self, u: &[DVec3]) -> Vec<OpenedCell> {
         let Some((opening, block)) = self.model.opening().zip(self.model.mesh.as_block()) else { return Vec::new() };

@@ -4,7 +4,8 @@
 //! Both keep transforms as they resample images: from a point y of the new image to the point X of the old one that lies there now
 //! (3D Slicer, developer guide, "Transforms"; `itk::DisplacementFieldTransform`). The field here is therefore d(y) = X(y) - y with
 //! X + u(X) = y and u the displacement of the tissue, found by fixed-point iteration X <- y - u(X). Loaded as a transform it moves
-//! images, surfaces and points of the patient as the needle has moved the tissue. Vectors and places are LPS in mm in the files.
+//! images, surfaces and points of the patient as the needle has moved the tissue. Beside an opened path that is where the tissue is seen; a
+//! place within the needle leads to the middle of the path. Vectors and places are LPS in mm in the files.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,7 +19,7 @@ use crate::anatomy::write_nrrd::{self, VectorVolume};
 use crate::anatomy::{Case, LabelMap};
 use crate::mesh::{BlockMesh, Mesh, trilinear};
 use crate::model::Model;
-use crate::observables::FieldSnapshot;
+use crate::observables::{FieldSnapshot, OpenedPath};
 use crate::{Result, whole_file};
 
 /// Most steps of the inversion, with each of its factors.
@@ -29,9 +30,14 @@ const FACTORS: [f64; 3] = [1.0, 0.5, 0.2];
 const DONE: f64 = 1e-3;
 const FOUND: f64 = 0.1;
 
+/// Most steps that find the section of an opened path beside a place.
+const MOST_SECTIONS: usize = 8;
+
 /// The displacement of a block at any point, continued beyond its tissue.
 pub struct Deformation<'a> {
     block: &'a BlockMesh,
+    /// Path beside which tissue is pushed aside further.
+    opened: Option<&'a OpenedPath>,
     /// Per node [m].
     displacement: Vec<DVec3>,
 }
@@ -39,7 +45,7 @@ pub struct Deformation<'a> {
 impl<'a> Deformation<'a> {
     /// From displacements per node [m]. Nodes in the air have none of their own: they get that of the tissue next to them, so that
     /// the air goes with the skin. `rigid`: cells that stand still; no entries: there are none.
-    pub fn new(block: &'a BlockMesh, displacement: &[DVec3], rigid: &[bool]) -> Self {
+    pub fn new(block: &'a BlockMesh, displacement: &[DVec3], rigid: &[bool], opened: Option<&'a OpenedPath>) -> Self {
         let mut displacement = displacement.to_vec();
         let mut known = vec![block.empty.is_empty(); block.node_count()];
         for cell in (0..block.cell_count()).filter(|_| !block.empty.is_empty()) {
@@ -70,10 +76,10 @@ impl<'a> Deformation<'a> {
                 known[node] = true;
             }
         }
-        Deformation { block, displacement }
+        Deformation { block, opened, displacement }
     }
 
-    /// Displacement of what rests at X [m]; beyond the block that of the nearest point of it.
+    /// Displacement of what rests at X, with an opened path closed [m]; beyond the block that of the nearest point of it.
     pub fn at(&self, x: DVec3) -> DVec3 {
         let ([i, j, k], local) = self.block.locate(x);
         let (weights, _) = trilinear(local, DVec3::ONE);
@@ -81,8 +87,25 @@ impl<'a> Deformation<'a> {
         nodes.iter().zip(weights).map(|(node, weight)| self.displacement[*node] * weight).sum()
     }
 
-    /// What is at y now: where it rests, and by how far that misses [m].
-    pub fn rest_of(&self, y: DVec3, done: f64) -> (DVec3, f64) {
+    /// What is seen at x now: where it rests, and by how far that misses [m].
+    pub fn rest_of(&self, x: DVec3, done: f64) -> (DVec3, f64) {
+        let mut found = self.closed_rest_of(x, done);
+        let Some(path) = self.opened else { return found };
+        let mut closed = x;
+        for _ in 0..MOST_SECTIONS {
+            // The section beside it hangs on where it rests.
+            let next = path.closed_place(found.0, x);
+            if next.distance(closed) <= done {
+                break;
+            }
+            closed = next;
+            found = self.closed_rest_of(closed, done);
+        }
+        found
+    }
+
+    /// What is at y with the path closed: where it rests, and by how far that misses [m].
+    fn closed_rest_of(&self, y: DVec3, done: f64) -> (DVec3, f64) {
         let mut best = (y, self.at(y).length());
         for factor in FACTORS {
             let mut x = best.0;
@@ -187,7 +210,8 @@ pub fn write(
     stride: usize,
 ) -> Result<Vec<PathBuf>> {
     let (Some(case), Mesh::Block(block)) = (&model.scene.case, &model.mesh) else { return Ok(Vec::new()) };
-    let deformation = Deformation::new(block, &snapshot.displacement, &model.composition.rigid);
+    let deformation =
+        Deformation::new(block, &snapshot.displacement, &model.composition.rigid, snapshot.opened.as_ref());
     let mut written = Vec::new();
     let mut keep = |name: &str, bytes: &[u8]| -> Result<()> {
         let path = output.file(name);
@@ -301,7 +325,7 @@ mod tests {
     fn the_inverse_leads_back() {
         let block = block(10);
         let u: Vec<DVec3> = (0..block.node_count()).map(|n| push(block.rest_position(n))).collect();
-        let deformation = Deformation::new(&block, &u, &[]);
+        let deformation = Deformation::new(&block, &u, &[], None);
         for n in 0..500 {
             let part = |m: usize| (n * m % 97) as f64 / 97.0;
             let x = DVec3::new(part(1) * 18e-3 - 9e-3, part(5) * 18e-3 - 9e-3, part(11) * -19e-3);
@@ -314,7 +338,7 @@ mod tests {
     fn the_field_leads_from_now_to_rest() {
         let (block, case) = (block(10), case());
         let u: Vec<DVec3> = (0..block.node_count()).map(|n| push(block.rest_position(n))).collect();
-        let deformation = Deformation::new(&block, &u, &[]);
+        let deformation = Deformation::new(&block, &u, &[], None);
         let volumes = volumes(&deformation, &case, 1).unwrap();
         assert_eq!(volumes.folded, 0);
         // The middle of the axis: the tissue there came from above.
@@ -336,7 +360,7 @@ mod tests {
     #[test]
     fn without_motion_nothing_changes() {
         let (block, case) = (block(4), case());
-        let deformation = Deformation::new(&block, &vec![DVec3::ZERO; block.node_count()], &[]);
+        let deformation = Deformation::new(&block, &vec![DVec3::ZERO; block.node_count()], &[], None);
         let volumes = volumes(&deformation, &case, 1).unwrap();
         assert!(volumes.field.vectors.iter().all(|v| v.length() < 1e-15));
         let [ni, nj, _] = volumes.labels.size;
@@ -354,11 +378,11 @@ mod tests {
         let u: Vec<DVec3> = (0..block.node_count())
             .map(|node| if block.node_coordinates(node)[2] <= 2 { DVec3::NEG_Z * 1e-3 } else { DVec3::ZERO })
             .collect();
-        let deformation = Deformation::new(&block, &u, &[]);
+        let deformation = Deformation::new(&block, &u, &[], None);
         assert!(deformation.at(DVec3::new(1e-3, 2e-3, -1e-3)).distance(DVec3::NEG_Z * 1e-3) < 1e-15);
         // What is rigid stands still.
         let rigid: Vec<bool> = block.empty.clone();
-        let deformation = Deformation::new(&block, &u, &rigid);
+        let deformation = Deformation::new(&block, &u, &rigid, None);
         assert_eq!(deformation.at(DVec3::new(1e-3, 2e-3, 0.0)), DVec3::ZERO);
     }
 

@@ -566,6 +566,7 @@ fn tissue_beside_the_needle_is_seen_where_it_is_and_with_its_stress() {
             let corners = block.cell_nodes(cell);
             let y = rest + corners.iter().zip(weights).map(|(n, w)| fields.displacement[*n] * w).sum::<glam::DVec3>();
             let seen = path.at(rest, y).unwrap();
+            at_most("place with the path closed [m]", path.closed_place(rest, seen.place).distance(y), 1e-8);
             let x = (r * r + shaft * shaft - hole * hole).sqrt();
             farthest = farthest.max((seen.place.truncate().length() / x - 1.0).abs());
             if seen.weight == 1.0 {
