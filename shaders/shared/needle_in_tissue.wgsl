@@ -1,12 +1,16 @@
-// Where tissue beside a needle is seen whose path is opened: the map of src/needle/opening.rs, for a path whose middle is on the axis of a
-// straight needle. For what is drawn; forces have the sections of the path.
+// Where tissue beside a needle is seen whose path is opened: the map of src/needle/opening.rs, for a path whose middle is on the axis of the
+// needle. For what is drawn; forces have the sections of the path.
 struct DrawnNeedle {
     // Tip [m]; w: radius R of the shaft [m], 0 where nothing is open.
     tip: vec4<f32>,
     // Direction of the insertion; w: length of the tip [m].
     direction: vec4<f32>,
-    // x: radius of the hole over that of the needle; the others unused.
+    // x: radius of the hole over that of the needle; y: entries of `bend` per length behind the tip [1/m]; the others unused.
     opened: vec4<f32>,
+    // Where the middle of a section lies aside of the axis for its bevel, over its radius.
+    bevel: vec4<f32>,
+    // How the axis bends, from the tip on [m].
+    bend: array<vec4<f32>, 32>,
 }
 
 // Where a place lies beside the axis, xyz [m], and the radius rc of the hole there, w [m].
@@ -14,7 +18,11 @@ fn beside_axis(needle: DrawnNeedle, y: vec3<f32>) -> vec4<f32> {
     let from_tip = y - needle.tip.xyz;
     let behind = -dot(from_tip, needle.direction.xyz);
     let radius = needle.tip.w * clamp(behind / max(needle.direction.w, 1e-9), 0.0, 1.0);
-    return vec4<f32>(from_tip + needle.direction.xyz * behind, radius * needle.opened.x);
+    let along = clamp(behind * needle.opened.y, 0.0, 31.0);
+    let entry = min(u32(along), 30u);
+    let bend = mix(needle.bend[entry].xyz, needle.bend[entry + 1u].xyz, along - f32(entry));
+    let aside = from_tip + needle.direction.xyz * behind - bend - needle.bevel.xyz * radius;
+    return vec4<f32>(aside, radius * needle.opened.x);
 }
 
 // By how much the needle pushes a place aside [m]; `beside`: of beside_axis. Exact up to two radii, nothing beyond four.

@@ -44,6 +44,8 @@ shared_structs! {
         tip: [f32; 4],
         direction: [f32; 4],
         opened: [f32; 4],
+        bevel: [f32; 4],
+        bend: [[f32; 4]; 32],
     }
     /// shaders/shared/point_history.wgsl
     struct PointHistory {

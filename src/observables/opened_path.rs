@@ -14,6 +14,7 @@ use crate::material_point::{PointState, Volumetric};
 use crate::mesh::{CORNERS, trilinear};
 use crate::model::Model;
 use crate::model::opening::{NearCell, VOLUME_PLACE, is_volume_place};
+use crate::needle::lateral_axes;
 use crate::needle::opening::{FADED, OpeningMap, Station};
 use crate::needle::path_line::PathLine;
 
@@ -264,7 +265,8 @@ impl OpenedPath {
         let (h, cell) = self.gradient_at(rest)?;
         // No tissue is stretched more than at the rim of the slit.
         let rim = self.hole_at(rest);
-        let y = y + eta * (rim / eta.length().max(1e-3 * rim) - 1.0).max(0.0);
+        let away = eta.try_normalize().unwrap_or_else(|| lateral_axes(self.map.direction).0);
+        let y = y + away * (rim - eta.length()).max(0.0);
         let f = DMat3::from_cols_array_2d(&self.map.at(&section, y, h).gradient(&h.to_cols_array_2d()));
         let von_mises = if weight > 0.0 { section.left() * self.shape_stress(cell, f) } else { 0.0 };
         Some(OpenedPlace { place, von_mises, weight })
@@ -289,8 +291,8 @@ impl OpenedPath {
         seen + eta * (low - 1.0)
     }
 
-    /// Cells that the map reaches; `u`: displacement of every node with the closed path [m].
-    pub fn cells(&self, u: &[DVec3]) -> Vec<OpenedCell> {
+    /// Cells that the map reaches; `u`: displacement of every node, `closed`: von Mises stress of every cell, both with the closed path [m, Pa].
+    pub fn cells(&self, u: &[DVec3], closed: &[f64]) -> Vec<OpenedCell> {
         let Some((opening, block)) = self.model.opening().zip(self.model.mesh.as_block()) else { return Vec::new() };
         let part = |n: usize| (n as f64 + 0.5) / PLACES as f64;
         let of_cell = |near: &NearCell| {
@@ -306,12 +308,9 @@ impl OpenedPath {
             let stress = |n: usize| {
                 let [rest, moved] =
                     at(DVec3::new(part(n % PLACES), part(n / PLACES % PLACES), part(n / PLACES / PLACES)));
-                let coarse = self.coarse[cell];
-                let mixed = |at: OpenedPlace| match coarse.is_nan() {
-                    true => at.von_mises,
-                    false => coarse + at.weight * (at.von_mises - coarse),
-                };
-                self.at(rest, rest + moved).map_or(if coarse.is_nan() { 0.0 } else { coarse }, mixed)
+                // Ahead of the tip cells that the path runs through further up are those of the closed path.
+                let coarse = if self.coarse[cell].is_nan() { closed[cell] } else { self.coarse[cell] };
+                self.at(rest, rest + moved).map_or(coarse, |at| coarse + at.weight * (at.von_mises - coarse))
             };
             let von_mises = (0..PLACES.pow(3)).map(stress).sum::<f64>() / PLACES.pow(3) as f64;
             // As the engines take the volume: what fading does at four places, what tissue grows by in the whole cell.

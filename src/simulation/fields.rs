@@ -13,7 +13,7 @@ use crate::material_point::PointState;
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::needle::centre_line::CentreLine;
-use crate::needle::{Kinematics, ToolPose};
+use crate::needle::{Kinematics, ToolPose, swing};
 use crate::observables::{FieldSnapshot, FrameRecord, OpenedCell, OpenedPath, cells_in_needle};
 
 impl Simulation {
@@ -35,20 +35,24 @@ impl Simulation {
 }
 
 impl Simulation {
-    /// Where a straight needle has opened its path, for those who draw tissue as it is seen; nothing is open around any other. The fields
-    /// that a device draws know it from here on.
+    /// Where a needle has opened its path, for those who draw tissue as it is seen; nothing is open around any other. The fields that a
+    /// device draws know it from here on.
     pub fn show_needle(&self, record: Option<&FrameRecord>) -> DrawnNeedle {
         let drawn = || {
-            let record = record.filter(|record| record.tip_coordinate > 0.0 && self.needle.is_none())?;
-            let (opening, pose) = (self.model.opening()?, self.tool_pose(record.time)?);
+            let record = record.filter(|record| record.tip_coordinate > 0.0)?;
+            let (plan, opening) = (self.model.puncture.as_ref()?, self.model.opening()?);
+            let pose = pose_of(self.kinematics.as_ref()?, record);
             let cut = opening.stations.iter().filter(|station| (0.0..record.tip_coordinate).contains(&station.depth));
             let opened = cut.map(|station| station.opened(opening.shaft)).collect::<Vec<_>>();
             let vector = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
             let mean = opened.iter().sum::<f64>() / opened.len().max(1) as f64;
+            let line = self.centre_line();
             Some(DrawnNeedle {
                 tip: vector(pose.tip, opening.shaft),
                 direction: vector(pose.direction, opening.tip_length),
-                opened: [mean as f32, 0.0, 0.0, 0.0],
+                opened: [mean as f32, line.map_or(0.0, |line| 1.0 / line.spacing) as f32, 0.0, 0.0],
+                bevel: vector(swing(plan.reference, pose.direction, plan.profile.shift), 0.0),
+                bend: line.map_or_else(Default::default, |line| line.offset.map(|offset| vector(offset, 0.0))),
             })
         };
         let needle = drawn().unwrap_or_default();
@@ -69,7 +73,7 @@ fn pose_of(kinematics: &Kinematics, record: &FrameRecord) -> ToolPose {
 
 /// Adds what an opened path does to the fields of cells and nodes, which are those of the closed one.
 fn open(model: &Model, path: OpenedPath, fields: &mut FieldSnapshot) {
-    for OpenedCell { cell, von_mises, grown } in path.cells(&fields.displacement) {
+    for OpenedCell { cell, von_mises, grown } in path.cells(&fields.displacement, &fields.von_mises) {
         fields.von_mises[cell] = von_mises;
         let bulk_modulus = model.material(cell).law.bulk_modulus;
         fields.pressure[cell] -= bulk_modulus * fields.jacobian[cell] * grown;
