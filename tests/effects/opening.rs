@@ -588,6 +588,24 @@ fn tissue_beside_the_needle_is_seen_where_it_is_and_with_its_stress() {
             close("mean stress at one distance", sum / count, 1.0, 0.06);
         }
 
+        // Files lead to the same places; far from the path nothing is open.
+        let text = stylet::output::vtu::vtu(&model.mesh, &fields, &[]);
+        assert!(text.contains("Name=\"opened_displacement_m\""));
+        let (mut pushed, mut far) = (0, 0);
+        for (node, (seen, closed)) in fields.opened_displacement.iter().zip(&fields.displacement).enumerate() {
+            let rest = model.mesh.rest_position(node);
+            let r = rest.truncate().length();
+            if r > 5.0 * shaft {
+                far += 1;
+                assert!(seen.distance(*closed) < 1e-12, "{seen} {closed}");
+            } else if r > 0.1 * shaft && r < 2.0 * shaft && (3e-3..5e-3).contains(&-rest.z) {
+                pushed += 1;
+                let outside = (rest + *seen).truncate().length() / shaft;
+                assert!(outside > 0.99, "a node {:.2} radii from the axis is seen at {outside:.3}", r / shaft);
+            }
+        }
+        assert!(pushed > 10 && far > 200, "{pushed} {far}");
+
         let plane = stylet::render::slice::Plane::of_scene(&model.scene, &model.mesh, &fields);
         let slice = stylet::render::slice::cut(&model.mesh, &fields, &plane, model.scene.tissue.cell_size);
         assert!(slice.is_opened);
