@@ -328,7 +328,7 @@ fn describe_parameters(effect: &Effect, numbers: &Numbers) -> String {
             if p.scheme == SchemeWord::Opening {
                 let stiffness = four_digits(p.tip_stiffness * 1e-3);
                 return format!(
-                    "scheme opening (pictures and fields show the closed path), puncture {puncture}, cutting {cutting}, tip stiffness \
+                    "scheme opening, puncture {puncture}, cutting {cutting}, tip stiffness \
                      {stiffness} N/mm"
                 );
             }

@@ -466,14 +466,7 @@ mod tests {
     }
 
     fn area(slice: &Slice) -> f64 {
-        slice
-            .triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.points;
-                0.5 * (b - a).perp_dot(c - a).abs()
-            })
-            .sum()
+        slice.triangles.iter().map(SliceTriangle::area).sum()
     }
 
     fn snapshot(mesh: &Mesh, displacement: impl Fn(DVec3) -> DVec3) -> FieldSnapshot {

@@ -93,7 +93,8 @@ pub(super) fn displacement_gradients(mesh: &Mesh, state: &State) -> Vec<DMat3> {
         .collect()
 }
 
-/// Stresses and Jacobians of the cells of a state, in f64, with a path that is opened by a map as cells have it: closed; `line`: the centre-line of a bent needle then.
+/// Stresses and Jacobians of the cells of a state, in f64, with a path that is opened by a map as cells have it: closed; `line`: the
+/// centre-line of a bent needle then.
 pub fn snapshot(
     model: &Model,
     kinematics: Option<&Kinematics>,
