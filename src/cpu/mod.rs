@@ -169,7 +169,7 @@ impl CpuEngine {
             cells: if lanes.is_some() { Vec::new() } else { vec![CellForces::default(); cells] },
             lanes,
             elements,
-            added: Added::new(nodes),
+            added: Added::new(nodes).with_constant(path_reactions::stick_bounds(&model).into_iter()),
             tip_forces: Vec::new(),
             tip_energy: 0.0,
             tip_sway: DVec3::ZERO,
@@ -280,6 +280,14 @@ impl CpuEngine {
         }
     }
 
+    /// Puts what `work` makes of every index in its place, on all threads.
+    fn fill<R: Send>(&self, all: &mut [R], work: impl Fn(usize) -> R + Sync + Send) {
+        match &self.lanes {
+            Some(lanes) => lanes.team().fill(all, work),
+            None => all.par_iter_mut().enumerate().for_each(|(i, value)| *value = work(i)),
+        }
+    }
+
     /// Calls `work` with ranges that make up `0..count`, on all threads; results in their order.
     fn in_ranges<R: Send>(&self, count: usize, work: impl Fn(std::ops::Range<usize>) -> R + Sync + Send) -> Vec<R> {
         let ranges = |part: usize| (0..count).step_by(part).map(move |first| first..(first + part).min(count));
@@ -310,6 +318,8 @@ impl CpuEngine {
     fn element_forces(&mut self, input: &StepInput) {
         if let Some(lanes) = &mut self.lanes {
             let State { displacement, stiffness, .. } = &self.state;
+            // An opened path softens nothing: to look at every cell for that is as long as a stage.
+            let stiffness = if self.model.opening().is_some() { &[] } else { stiffness.as_slice() };
             lanes.compute(&self.model, &self.elements, displacement, stiffness, Some((self.dt, input.step)));
             return;
         }

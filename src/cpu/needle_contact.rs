@@ -130,6 +130,11 @@ impl CpuEngine {
         let profile = Profile { shift: turned, ..plan.profile };
         let (coordinate, tip) = (self.state.tip_coordinate, self.state.tip);
         let needle = Needle { model: &model, plan, pose, profile, d: -pose.direction, coordinate, tip, line };
+        if self.near.as_ref().is_some_and(|near| near.only_carry) {
+            self.carry_tip(&needle, &tip_loads);
+            self.tip_loads = tip_loads;
+            return;
+        }
         let looked_at = self.nodes_at_needle(&needle, &tip_loads);
         let State { contact, displacement, velocity, .. } = &self.state;
         let slit = SlitContact { model: &model, plan, profile, pose, coordinate, line, displacement, velocity };
@@ -161,6 +166,29 @@ impl CpuEngine {
         self.tip_loads = tip_loads;
         if let Some(near) = &mut self.near {
             near.keep(&looked_at, &self.state.contact);
+        }
+    }
+
+    /// The nodes that carry the tip of a planned, opened path, in the order of the contact nodes: nothing else of the contact acts there, and
+    /// nothing is remembered.
+    fn carry_tip(&mut self, needle: &Needle, tip_loads: &NodeLoads) {
+        let Needle { pose, line, .. } = *needle;
+        let mut carriers: Vec<u32> = self.near.iter().flat_map(|near| near.carriers(tip_loads)).collect();
+        carriers.sort_unstable();
+        self.contact_energy = self.tip_energy;
+        for index in carriers.into_iter().map(|index| index as usize) {
+            let node = needle.model.contact_nodes[index].node as usize;
+            let Some(load) = tip_loads.of(node) else { continue };
+            self.added.add(node, load.force, load.stiffness);
+            let lever = self.rest[node] + self.state.displacement[node] - pose.tip;
+            let sums = ContactSums { tip: load.force, torque: lever.cross(load.force), ..ContactSums::default() };
+            self.sums.book(&sums, pose, self.dt);
+            if line.is_some() {
+                let bend_power = load.force.dot(needle.place(lever, DVec3::ZERO).bend.rate);
+                self.sums.tool_work += bend_power * self.dt;
+                self.sums.last_tool_work += bend_power * self.dt;
+                self.node_impulse[index] += load.force * self.dt;
+            }
         }
     }
 
@@ -231,16 +259,11 @@ impl CpuEngine {
         Some(NodeAtNeedle { index, memory, sums, bound, bend_power })
     }
 
-    /// Numbers of the contact nodes that the needle may have to do with, in their order: all of them on a planned path; on an opened one what
-    /// carries the tip; on a free one, where every node is a contact node, what is not far from the needle and what it has touched or passed, too.
+    /// Numbers of the contact nodes that the needle may have to do with, in their order: all of them on a planned path; on a free one, where every
+    /// node is a contact node, what is not far from the needle, what it has touched or passed, and what carries the tip.
     fn nodes_at_needle(&mut self, needle: &Needle, tip_loads: &NodeLoads) -> Vec<u32> {
         let count = needle.model.contact_nodes.len();
         let all = || (0..count as u32).collect::<Vec<u32>>();
-        if let Some(near) = self.near.as_ref().filter(|near| near.only_carry) {
-            let mut carriers: Vec<u32> = near.carriers(tip_loads).collect();
-            carriers.sort_unstable();
-            return carriers;
-        }
         // A needle that bends is near to nothing along a straight line.
         if needle.line.is_some() {
             self.look_at_all();

@@ -10,9 +10,7 @@ use crate::material::TangentBound;
 use crate::material::kinematics::{J_CONTINUATION, cofactor, jacobian_minus_one, norm_squared};
 use crate::material_point::{Material, PointState, Volumetric};
 use crate::mesh::CORNERS;
-use crate::model::opening::{
-    NearCell, OpeningPlan, OpeningStation, PathPoint, VOLUME_PLACE, is_volume_place, mean_of, mean_place,
-};
+use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, PathPoint, VOLUME_PLACE, is_volume_place, mean_of};
 use crate::model::{Model, PuncturePlan};
 use crate::needle::centre_line::{Bend, CentreLine};
 use crate::needle::opening::{Derivatives, Opening, OpeningMap, Station, outer, squared_norm_bound};
@@ -107,19 +105,20 @@ fn within(stations: &[Station], near: &NearCell) -> Station {
 impl CpuEngine {
     /// Where all stations are.
     fn stations_now(&self, plan: &PuncturePlan, opening: &OpeningPlan, (pose, step): (&ToolPose, u64)) -> Vec<Now> {
-        let (rest, u, a) = (&self.rest, &self.state.displacement, self.state.tip_coordinate);
+        let (u, a) = (&self.state.displacement, self.state.tip_coordinate);
         let t = pose.direction;
         let shift = plan.contact.as_ref().map_or(0.0, |c| c.part(a)) * self.state.touch.dimple;
         let (velocities, rubs) = (&self.state.velocity, self.model.effects.friction.is_some());
         // Sections of a bevel lie aside of the tip as far as they are wide.
         let bevel = swing(plan.reference, t, plan.profile.shift);
-        let mut now = self.each(opening.stations.len(), |i| {
+        let mut now = vec![Now::default(); opening.stations.len()];
+        self.fill(&mut now, |i| {
             let station = &opening.stations[i];
             if opening.is_ahead(station, a) {
                 return Now::default();
             }
-            let centre = mean_place(&station.centre, &station.nodes, rest, u);
-            let disc = mean_place(&station.disc, &station.nodes, rest, u);
+            let centre = station.centre_at_rest + mean_of(&station.centre, &station.nodes, u);
+            let disc = station.disc_at_rest + mean_of(&station.disc, &station.nodes, u);
             let behind = (pose.tip - disc).dot(t) - shift;
             let ((radius, rate), opened) = (opening.radius(behind), station.opened(opening.shaft));
             let (full, slope) = (radius * opened, rate * opened);
@@ -271,23 +270,22 @@ impl CpuEngine {
         let OpeningInLanes { opening: lanes, team, numbers, stride } = lanes.as_mut()?.opening()?;
         let displacement = &state.displacement;
         let [vectors, cells] = lanes.compute(team, map, sections, displacement, measures);
-        for number in vectors {
-            for (lane, (station, index)) in lanes.points_of(number).to_vec().into_iter().enumerate() {
-                let (section, station) = (&sections[station], &opening.stations[station]);
-                let mut found = PointSums::default();
-                if section.radius > 0.0 {
-                    let u: Vec<DVec3> = station.nodes.iter().map(|n| displacement[*n as usize]).collect();
-                    let point = &station.points[index];
-                    let (d, moment, energy) =
-                        point_force(shape(point.cell), map, point, section, &u, |place, force, bound| {
-                            added.add(station.nodes[place] as usize, -force, bound);
-                        });
-                    found = PointSums::new(&d, moment, energy, point.volume * section.left());
-                }
-                lanes.set_point(number, lane, &found);
+        let (mut points, cells_of_spans) = lanes.gather(team, sections, (numbers, stride));
+        // What lanes do not know, in f64.
+        for (station, index) in vectors.into_iter().flat_map(|number| lanes.points_of(number)).copied() {
+            let (section, station_now) = (&sections[station], &opening.stations[station]);
+            if section.radius == 0.0 {
+                continue;
             }
+            let u: Vec<DVec3> = station_now.nodes.iter().map(|n| displacement[*n as usize]).collect();
+            let point = &station_now.points[index];
+            let (d, moment, energy) = point_force(shape(point.cell), map, point, section, &u, |place, force, bound| {
+                added.add(station_now.nodes[place] as usize, -force, bound);
+            });
+            let left = section.left();
+            let found = PointSums::new(&d, moment, energy, point.volume * left);
+            points[station].add(&PointSums { shape: found.shape / left, ..found });
         }
-        let (points, cells_of_spans) = lanes.gather(team, sections, (numbers, stride), added);
         let mut sums: Vec<StationSums> = points.iter().map(StationSums::from).collect();
         let mut elastic: f64 = sums.iter().map(|s| s.energy).sum();
         for ((first, count), found) in cells_of_spans {

@@ -5,7 +5,8 @@ use glam::DVec3;
 
 use super::opening::{Now, StationSums, neighbours};
 use super::{ContactSums, CpuEngine};
-use crate::model::opening::OpeningPlan;
+use crate::model::Model;
+use crate::model::opening::{OpeningPlan, OpeningStation};
 use crate::needle::ToolPose;
 
 impl CpuEngine {
@@ -49,8 +50,6 @@ impl CpuEngine {
         let friction = model.effects.friction.unwrap_or_default();
         let rubs = model.effects.friction.is_some();
         let kt = friction.stiffness_ratio * opening.stick;
-        // Everywhere along the path: a mass that was raised where friction sets in would swing with another energy.
-        let stick_bound = if rubs { 2.0 * kt } else { 0.0 };
         for (i, station) in opening.stations.iter().enumerate() {
             let n = &now[i];
             let Guide { force: guide, held, .. } = guides[i];
@@ -72,8 +71,8 @@ impl CpuEngine {
                 stored += 0.5 * kt * *memory * *memory;
             }
             let along = t * (spread + rubbing);
-            for (place, w) in station.disc.iter().filter(|_| rubs || along != DVec3::ZERO) {
-                self.added.add(station.nodes[usize::from(*place)] as usize, along * *w, stick_bound * w);
+            for (place, w) in station.disc.iter().filter(|_| along != DVec3::ZERO) {
+                self.added.add(station.nodes[usize::from(*place)] as usize, along * *w, 0.0);
             }
             let across = guide - sums[i].centre - rates[i];
             for (place, w) in station.centre.iter().filter(|_| across != DVec3::ZERO || held > 0.0) {
@@ -102,6 +101,17 @@ impl CpuEngine {
         self.sums.last_tool_work += bend_work;
         self.contact_energy += stored;
     }
+}
+
+/// Bounds of the stiffness of the stick springs of all stations at their nodes [N/m]. Everywhere along the path, and in every step: a mass that
+/// was raised where friction sets in would swing with another energy.
+pub(super) fn stick_bounds(model: &Model) -> Vec<(usize, f64)> {
+    let (Some(opening), Some(friction)) = (model.opening(), &model.effects.friction) else { return Vec::new() };
+    let bound = 2.0 * friction.stiffness_ratio * opening.stick;
+    let of_station = |station: &OpeningStation| -> Vec<(usize, f64)> {
+        station.disc.iter().map(|(place, w)| (station.nodes[usize::from(*place)] as usize, bound * w)).collect()
+    };
+    opening.stations.iter().flat_map(of_station).collect()
 }
 
 /// What holds the middle of a station on the axis of the needle where it is open; `opened`: derivative of the energy of opening by rc [N].

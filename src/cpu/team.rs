@@ -123,6 +123,16 @@ impl Team {
         self.map(parts, |_, range| range.map(&work).collect::<Vec<R>>()).into_iter().flatten().collect()
     }
 
+    /// Puts what `work` makes of every index in its place.
+    pub fn fill<R: Send>(&self, all: &mut [R], work: impl Fn(usize) -> R + Sync) {
+        let part = self.part(all.len());
+        self.map(all.chunks_mut(part), |number, values| {
+            for (i, value) in (number * part..).zip(values) {
+                *value = work(i);
+            }
+        });
+    }
+
     /// Runs the parts `0..parts` of a stage.
     fn run(&self, parts: usize, stage: &(dyn Fn(usize) + Sync)) {
         let shared = &*self.shared;

@@ -25,6 +25,30 @@ pub(super) fn anchor_columns(model: &Model) -> Arc<[Column]> {
     plan.anchors.iter().map(|anchor| block.column(anchor.surface.truncate())).collect()
 }
 
+/// A material coordinate [m], and the layer of a block that the anchor before was found in there: most lie in the same.
+struct Depth {
+    a: f64,
+    found: Option<(f64, (usize, f64))>,
+}
+
+impl Depth {
+    fn new(a: f64) -> Self {
+        Depth { a, found: None }
+    }
+
+    /// The layer at the height z [m], and the place in it, 0..1.
+    fn layer(&mut self, block: &BlockMesh, z: f64) -> (usize, f64) {
+        match self.found {
+            Some((height, layer)) if height == z => layer,
+            _ => {
+                let layer = block.along(2, z);
+                self.found = Some((z, layer));
+                layer
+            }
+        }
+    }
+}
+
 /// An anchor at the material coordinate of the tip.
 struct PlacedAnchor {
     /// Distance of the tip plane beyond it along the insertion, and its positive part inside the material [m].
@@ -66,14 +90,15 @@ impl TipLoads {
 
 impl CpuEngine {
     /// What is around the anchor number `index` at the material coordinate `a` [m].
-    fn around_anchor(mesh: &Mesh, plan: &PuncturePlan, (index, columns): (usize, &[Column]), a: f64) -> Around {
+    fn around_anchor(mesh: &Mesh, plan: &PuncturePlan, (index, columns): (usize, &[Column]), at: &mut Depth) -> Around {
+        let a = at.a;
         let direction = plan.path.direction;
         match mesh {
             Mesh::Block(block) => {
                 let x = plan.anchors[index].surface + direction * a;
                 let is_vertical = direction.truncate() == DVec2::ZERO;
                 let column = if is_vertical { columns[index] } else { block.column(x.truncate()) };
-                Self::weights(block, column, x.z, direction)
+                Self::weights(block, column, at.layer(block, x.z), direction)
             }
             Mesh::Tets(_) => {
                 let (nodes, weights, slopes) = plan.lines[index].weights(a);
@@ -84,10 +109,9 @@ impl CpuEngine {
         }
     }
 
-    /// Trilinear position in a column at the height `z` [m]: nodes, weights and derivative of the weights along `direction` (in a bent grid the
-    /// direction of its axis).
-    fn weights(mesh: &BlockMesh, ([i, j], in_column): Column, z: f64, direction: DVec3) -> Around {
-        let (k, zeta) = mesh.along(2, z);
+    /// Trilinear position in a column, in a layer and at a place in it: nodes, weights and derivative of the weights along `direction` (in a bent
+    /// grid the direction of its axis).
+    fn weights(mesh: &BlockMesh, ([i, j], in_column): Column, (k, zeta): (usize, f64), direction: DVec3) -> Around {
         let xi = in_column.extend(zeta);
         let cell = mesh.cell_index(i, j, k);
         let width = mesh.cell_size(cell);
@@ -116,9 +140,10 @@ impl CpuEngine {
         let tip_axial = (pose.tip - plan.path.entry).dot(t);
         let along_needle = if plan.path.direction == t { 1.0 } else { plan.path.direction.dot(t) };
         let place = |u: &[DVec3], a: f64| -> Vec<PlacedAnchor> {
+            let mut at = Depth::new(a);
             (0..plan.anchors.len())
                 .map(|index| {
-                    let (nodes, weights, slope) = Self::around_anchor(mesh, plan, (index, &columns), a);
+                    let (nodes, weights, slope) = Self::around_anchor(mesh, plan, (index, &columns), &mut at);
                     let (mut du, mut stretch) = (0.0, along_needle);
                     for i in 0..8 {
                         let along = u[nodes[i]].dot(t);

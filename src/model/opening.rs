@@ -50,6 +50,12 @@ const GAUSS: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_08),
 ];
 
+/// Of the rings of a station those from this one on are smooth on the scale of cells: where these hold four stations or more, every second
+/// station has one of them, in turn, for two.
+const SMOOTH_RINGS: usize = 3;
+/// See above.
+const STATIONS_IN_CELL: f64 = 4.0;
+
 /// Places of Gauss' rule in a cell, -1..1, are at the corners times this.
 pub const VOLUME_PLACE: f64 = 0.577_350_269_189_625_8;
 
@@ -91,6 +97,9 @@ pub struct OpeningStation {
     /// Mean of the innermost ring: the middle of the path. Mean over the section of the needle: where it is along the needle.
     pub centre: Mean,
     pub disc: Mean,
+    /// The same means of the rest positions [m].
+    pub centre_at_rest: DVec3,
+    pub disc_at_rest: DVec3,
     pub points: Vec<PathPoint>,
     /// Rest radius of the hole that the slit of the tip acts like [m], and how the tissue around it changes its volume.
     pub hole: f64,
@@ -360,15 +369,26 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, ne
     let centre = mean(&[hole], 8);
     let shaft = input.needle.radius;
     let disc = mean(&[0.125, 0.375, 0.625, 0.875].map(|part: f64| shaft * part.sqrt()), 8);
+    let at_rest = |mean: &Mean| {
+        mean.iter().map(|(n, w)| mesh.rest_position(nodes.list[usize::from(*n)] as usize) * *w).sum::<DVec3>()
+    };
+    let [centre_at_rest, disc_at_rest] = [at_rest(&centre), at_rest(&disc)];
     let long = (near / hole).ln();
+    let is_coarse = input.cell_size >= STATIONS_IN_CELL * spacing;
     let mut points = Vec::new();
     for (ring, (x, w)) in GAUSS.into_iter().enumerate() {
+        let place = ring as i32 + number;
+        let for_two = is_coarse && ring >= SMOOTH_RINGS;
+        if for_two && place.rem_euclid(2) == 1 {
+            continue;
+        }
+        let (row, length) = if for_two { (place.div_euclid(2), 2.0 * spacing) } else { (place, spacing) };
         let r = hole * (0.5 * long * (x + 1.0)).exp();
         // Neighbours along and across are turned against each other, and none lies on a plane of the grid.
-        let turn = if (ring as i32 + number) % 2 == 0 { 0.25 } else { 0.75 };
+        let turn = if row.rem_euclid(2) == 0 { 0.25 } else { 0.75 };
         // About one in every cell that a ring runs through.
         let angles = 4 * (std::f64::consts::TAU * r / input.cell_size / 4.0).ceil() as usize;
-        let volume = 0.5 * long * w * r * r * std::f64::consts::TAU / angles as f64 * spacing;
+        let volume = 0.5 * long * w * r * r * std::f64::consts::TAU / angles as f64 * length;
         for i in 0..angles {
             let place = at(r, (i as f64 + turn) / angles as f64);
             let Place { cell, corners, weights, gradients, local, inside } = place_in(mesh, place);
@@ -386,7 +406,19 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, ne
             });
         }
     }
-    OpeningStation { depth, middle, direction, nodes: nodes.list, centre, disc, points, hole, growth }
+    OpeningStation {
+        depth,
+        middle,
+        direction,
+        nodes: nodes.list,
+        centre,
+        disc,
+        centre_at_rest,
+        disc_at_rest,
+        points,
+        hole,
+        growth,
+    }
 }
 
 fn clusters_of(stations: &[OpeningStation]) -> Vec<Cluster> {
@@ -417,7 +449,8 @@ fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: 
             let low = mesh.rest_position(mesh.cell_nodes(cell)[0]);
             let (r, s) = coordinates(low + 0.5 * size);
             let reach = 0.5 * size.length();
-            if r > faded + reach || s > end + reach {
+            // No place of it is reached, where it is at rest.
+            if r > faded + VOLUME_PLACE * reach || s > end + reach {
                 return None;
             }
             let (share, place) = match r > near + reach {
@@ -478,16 +511,6 @@ fn growth_in_cells(stations: &[OpeningStation]) -> BTreeMap<u32, [f64; 2]> {
         }
     }
     sums
-}
-
-/// Mean of `y = X + u` over nodes, from the rest positions and displacements of all.
-pub fn mean_place(mean: &Mean, nodes: &[u32], rest: &[DVec3], u: &[DVec3]) -> DVec3 {
-    let mut sum = DVec3::ZERO;
-    for (place, w) in mean {
-        let node = nodes[*place as usize] as usize;
-        sum += (rest[node] + u[node]) * *w;
-    }
-    sum
 }
 
 /// Mean of a vector of every node.

@@ -228,16 +228,15 @@ fn both_engines_give_the_same_force() {
 
 #[test]
 fn a_tougher_tissue_is_cut_narrower_and_holds_the_needle_harder() {
-    // Nearly without change of volume, as the theory has it: at nu 0.49 400 J/m^2 take 4 % less, as a small hole in tissue that gives
-    // (reference 18 has 9 % less normal force for nu 0.493 and a hole of a twentieth of the needle).
+    // Narrow slits stretch the tissue beside them so far that even at a Poisson's ratio of 0.498 it grows: 2.6 % less force at 400 J/m^2.
     for toughness in ["100", "400"] {
         let material = "material={c10_kpa=9.52, c01_kpa=4.14, poisson_ratio=0.498, toughness_j_m2=";
         let scene = scene(&[&format!("{material}{toughness}}}"), "motion.phase.0.depth_mm=10.5"]);
-        let expected = predicted(&scene).tip_force;
+        let (expected, _) = with_change_of_volume(&scene);
         let frames = frames(scene, engines_here().pop().unwrap());
         let force = mean(&frames, 8.5e-3, 10.4e-3, |f| f.force.axial);
         println!("{toughness} J/m^2: {force:.4} N, theory {expected:.4} N");
-        close("steady force", force, expected, 0.03);
+        close("steady force", force, expected, 0.02);
     }
 }
 

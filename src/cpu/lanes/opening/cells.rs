@@ -3,10 +3,10 @@
 // Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
 #![allow(clippy::needless_range_loop)]
 
-use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
-use super::{CELL, CELL_SUMS, CORNER_FORCES, Cell, Found, Gathered, Lanes, Step, law_in_lanes, moment_of, opened};
+use super::sums::{ChunkSums, SUMS};
+use super::{CELL, CORNER_ROWS, Found, Gathered, Lanes, Step, law_in_lanes, moment_of, opened};
 use crate::cpu::lanes::WIDEST;
 use crate::cpu::lanes::corners::SIGNS;
 use crate::mesh::CORNERS;
@@ -19,7 +19,9 @@ pub(super) struct SomeCells<'a> {
     /// Number of the first vector.
     pub first: usize,
     pub found: &'a mut [Found],
-    pub sums: &'a mut [f32],
+    /// [`CORNER_ROWS`] rows of every vector.
+    pub corners: &'a mut [f32],
+    pub sums: ChunkSums<'a>,
 }
 
 impl WithSimd for SomeCells<'_> {
@@ -27,96 +29,86 @@ impl WithSimd for SomeCells<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let SomeCells { step, first, found, sums } = self;
+        let SomeCells { step, first, found, corners, mut sums } = self;
         let map = step.map.in_radii(Lanes::splat(simd, 0.0));
+        let all = step.all;
+        let mut scratch =
+            Scratch { path: Gathered::new(), from_first: [[[0.0; WIDEST]; 3]; SIGNS], of_lanes: [[0.0; WIDEST]; SUMS] };
+        if found.iter().any(|found| *found != Found::Closed) {
+            sums.clear();
+        }
         for i in 0..found.len() {
-            let sums = &mut sums[i * CELL_SUMS * WIDEST..(i + 1) * CELL_SUMS * WIDEST];
-            found[i] = cell_vector(simd, &step, &map, first + i, sums);
+            let corners = &mut corners[i * CORNER_ROWS * WIDEST..(i + 1) * CORNER_ROWS * WIDEST];
+            found[i] = cell_vector(simd, &step, &map, first + i, corners, &mut scratch);
+            if found[i] == Found::Known {
+                let cells = &all.cells[(first + i) * WIDEST..((first + i + 1) * WIDEST).min(all.cells.len())];
+                for lane in 0..cells.len() {
+                    sums.add(usize::from(cells[lane].span), &scratch.of_lanes, lane);
+                }
+            }
         }
     }
 }
 
+/// Rows that vectors share one after the other.
+struct Scratch {
+    path: Gathered,
+    /// Displacements of the corners less that of the first [m].
+    from_first: [[[f32; WIDEST]; 3]; SIGNS],
+    of_lanes: [[f32; WIDEST]; SUMS],
+}
+
 /// Cells from `number` times [`WIDEST`] on.
 #[inline(always)]
-fn cell_vector<S: Simd>(simd: S, step: &Step, map: &MapIn<Lanes<S>>, number: usize, out: &mut [f32]) -> Found {
+fn cell_vector<S: Simd>(
+    simd: S,
+    step: &Step,
+    map: &MapIn<Lanes<S>>,
+    number: usize,
+    corners: &mut [f32],
+    Scratch { path, from_first, of_lanes }: &mut Scratch,
+) -> Found {
     let all = step.all;
     let cells = &all.cells[number * WIDEST..((number + 1) * WIDEST).min(all.cells.len())];
-    let over_shaft = 1.0 / all.shaft;
-    let mut path = Gathered::new();
-    let mut gradients = [[[0.0f32; WIDEST]; 3]; 3];
+    let mut is_any_open = false;
     for lane in 0..cells.len() {
-        let cell = &cells[lane];
-        let span = &step.spans[usize::from(cell.span)];
-        if span.radius == 0.0 {
-            continue;
-        }
-        let mut u = [DVec3::ZERO; SIGNS];
-        for bits in 0..SIGNS {
-            u[bits] = step.u[cell.nodes[bits] as usize];
-        }
-        let (e0, e1, e2, e3) = (u[0] + u[1], u[2] + u[3], u[4] + u[5], u[6] + u[7]);
-        let by_x = ((u[1] - u[0]) + (u[3] - u[2])) + ((u[5] - u[4]) + (u[7] - u[6]));
-        let (by_y, by_z) = ((e1 - e0) + (e3 - e2), (e2 - e0) + (e3 - e1));
-        let columns = [by_x * cell.quarter.x, by_y * cell.quarter.y, by_z * cell.quarter.z];
-        for a in 0..3 {
-            for b in 0..3 {
-                gradients[a][b][lane] = columns[a][b] as f32;
-            }
-        }
-        path.set(lane, span, cell.middle + ((e0 + e1) + (e2 + e3)) * 0.125, over_shaft);
+        is_any_open |= step.spans[usize::from(cells[lane].span)].is_open;
     }
-    if !path.is_any_open {
+    if !is_any_open {
         return Found::Closed;
     }
     if !all.is_known[number] {
         return Found::Unknown;
     }
+    let over_shaft = 1.0 / all.shaft;
+    for lane in 0..cells.len() {
+        let cell = &cells[lane];
+        let first = step.u[cell.nodes[0] as usize];
+        path.set(lane, &step.spans[usize::from(cell.span)], cell.middle + first, over_shaft);
+        for bits in 1..SIGNS {
+            let other = step.u[cell.nodes[bits] as usize];
+            from_first[bits][0][lane] = (other.x - first.x) as f32;
+            from_first[bits][1][lane] = (other.y - first.y) as f32;
+            from_first[bits][2][lane] = (other.z - first.z) as f32;
+        }
+    }
+    for lane in cells.len()..WIDEST {
+        path.close(lane);
+        for bits in 1..SIGNS {
+            for axis in 0..3 {
+                from_first[bits][axis][lane] = 0.0;
+            }
+        }
+    }
     let constants = &all.constants[number * CELL * WIDEST..(number + 1) * CELL * WIDEST];
-    let mut by_gradient = [[0.0f32; WIDEST]; 9];
     let mut at = 0;
     while at < cells.len() {
-        if !cell_lanes(simd, step, map, (constants, &path, &gradients), at, (&mut by_gradient, out)) {
+        if !cell_lanes(simd, step, map, (constants, path, from_first), at, (corners, of_lanes)) {
             return Found::Unknown;
         }
         at += Lanes::<S>::COUNT;
     }
-    on_corners(cells, over_shaft, &by_gradient, out);
     Found::Known
-}
-
-/// Forces on the corners, from those by gradient and place: the gradient of y is that of the middle of the cell.
-#[inline(always)]
-fn on_corners(cells: &[Cell], over_shaft: f64, by_gradient: &[[f32; WIDEST]; 9], out: &mut [f32]) {
-    let mut quarters = [[0.0f64; WIDEST]; 3];
-    for (lane, cell) in cells.iter().enumerate() {
-        for axis in 0..3 {
-            quarters[axis][lane] = cell.quarter[axis];
-        }
-    }
-    let (forces, by_place) = out.split_at_mut(CORNER_FORCES * WIDEST);
-    for axis in 0..3 {
-        let (mut middle, mut by_axis) = ([0.0f64; WIDEST], [[0.0f64; WIDEST]; 3]);
-        for lane in 0..WIDEST {
-            middle[lane] = f64::from(by_place[axis * WIDEST + lane]) * over_shaft * 0.125;
-        }
-        for a in 0..3 {
-            for lane in 0..WIDEST {
-                by_axis[a][lane] = f64::from(by_gradient[3 * a + axis][lane]) * quarters[a][lane];
-            }
-        }
-        for bits in 0..SIGNS {
-            let row = &mut forces[(3 * bits + axis) * WIDEST..][..WIDEST];
-            let sign = |a: usize| if bits >> a & 1 == 1 { 1.0 } else { -1.0 };
-            let signs = [sign(0), sign(1), sign(2)];
-            for lane in 0..WIDEST {
-                let mut force = middle[lane];
-                for a in 0..3 {
-                    force += signs[a] * by_axis[a][lane];
-                }
-                row[lane] = force as f32;
-            }
-        }
-    }
 }
 
 /// Adds what acts at the place `offset` from the middle of a cell.
@@ -137,25 +129,34 @@ fn cell_lanes<S: Simd>(
     simd: S,
     step: &Step,
     map: &MapIn<Lanes<S>>,
-    (constants, path, gradients): (&[f32], &Gathered, &[[[f32; WIDEST]; 3]; 3]),
+    (constants, path, from_first): (&[f32], &Gathered, &[[[f32; WIDEST]; 3]; SIGNS]),
     at: usize,
-    (by_gradient, out): (&mut [[f32; WIDEST]; 9], &mut [f32]),
+    (corners, of_lanes): (&mut [f32], &mut [[f32; WIDEST]; SUMS]),
 ) -> bool {
     let all = step.all;
     let row = |row: usize| Lanes::load(simd, constants, row * WIDEST + at);
     let (zero, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-    let open_lanes = Lanes::load(simd, &path.open, at);
+    let open_lanes = path.open(simd, at);
     let [width, place] = [[row(0), row(1), row(2)], [row(3), row(4), row(5)]];
     let (volume, share, edge, b_squared) = (row(6) * open_lanes, row(7), row(8), row(9));
     let law = law_in_lanes(simd, all, constants, 10, at);
     let bulk = row(14);
+    let quarters = [row(17), row(18), row(19)];
+    let (over_shaft, eighth) = (Lanes::splat(simd, (1.0 / all.shaft) as f32), Lanes::splat(simd, 0.125));
     let mut h = [[zero; 3]; 3];
-    for a in 0..3 {
-        for b in 0..3 {
-            h[a][b] = Lanes::load(simd, &gradients[a][b], at);
-        }
+    let mut middle = path.beside(simd, at);
+    for axis in 0..3 {
+        let d = |bits: usize| Lanes::load(simd, &from_first[bits][axis], at);
+        let [d1, d2, d3, d4, d5, d6, d7] = [d(1), d(2), d(3), d(4), d(5), d(6), d(7)];
+        // Differences and sums of the four edges along x.
+        let (x0, x1, x2, x3) = (d1, d3 - d2, d5 - d4, d7 - d6);
+        let (e0, e1, e2, e3) = (d1, d2 + d3, d4 + d5, d6 + d7);
+        h[0][axis] = ((x0 + x1) + (x2 + x3)) * quarters[0];
+        h[1][axis] = ((e1 - e0) + (e3 - e2)) * quarters[1];
+        h[2][axis] = ((e2 - e0) + (e3 - e1)) * quarters[2];
+        let mean = ((e0 + e1) + (e2 + e3)) * eighth;
+        middle.offset[axis] = mean.mul_add(over_shaft, middle.offset[axis]);
     }
-    let middle = path.beside(simd, at);
     // (I + h) applied to a place in the cell.
     let mut sum = Derivatives::none(zero);
     let mut offset = [zero; 3];
@@ -166,7 +167,7 @@ fn cell_lanes<S: Simd>(
     let Some(shape) = opened(map, &Beside { offset, ..middle }, &h, &law, bulk, step.measures) else { return false };
     let closed = &shape.closed;
     let [closed_straight, closed_turned] = closed.tangent_bound(&law, bulk);
-    let shared = volume * share * Lanes::load(simd, &path.left, at);
+    let shared = volume * share * path.left(simd, at);
     sum.add(&Derivatives { place: [zero; 3], ..shape.d }, shared);
     let by_place = [shape.d.place[0] * shared, shape.d.place[1] * shared, shape.d.place[2] * shared];
     add_at(&mut sum, by_place, place);
@@ -226,17 +227,26 @@ fn cell_lanes<S: Simd>(
     let with = (bulk + turned) * cof_b * widened.mul_add(widened, uneven) + straight * grown * grown * b_squared;
     let without = (bulk + closed_turned) * cof_b + closed_straight * b_squared;
     let bound = Lanes::splat(simd, 8.0) * volume * (with - without).larger(zero);
-    for a in 0..3 {
-        for b in 0..3 {
-            sum.gradient[a][b].store(&mut by_gradient[3 * a + b], at);
+    // Forces on the corners: the gradient of y is that of the middle of the cell.
+    for axis in 0..3 {
+        let middle = sum.place[axis] * over_shaft * eighth;
+        let by = |a: usize| sum.gradient[a][axis] * quarters[a];
+        let [by_x, by_y, by_z] = [by(0), by(1), by(2)];
+        let along_x = [middle - by_x, middle + by_x];
+        for bits in 0..SIGNS {
+            let mut force = along_x[bits & 1];
+            force = if bits & 2 == 0 { force - by_y } else { force + by_y };
+            force = if bits & 4 == 0 { force - by_z } else { force + by_z };
+            force.store(corners, (3 * bits + axis) * WIDEST + at);
         }
     }
-    let mut put = |value: Lanes<S>, row: usize| value.store(out, (CORNER_FORCES + row) * WIDEST + at);
+    bound.store(corners, (CORNER_ROWS - 1) * WIDEST + at);
+    let mut put = |value: Lanes<S>, row: usize| value.store(&mut of_lanes[row], at);
     for a in 0..3 {
-        put(sum.place[a], a);
+        put(sum.place[a] * over_shaft, a);
         put(sum.centre_rate[a], 3 + a);
     }
-    put(sum.radius, 6);
+    put(sum.radius * over_shaft, 6);
     put(sum.radius_rate, 7);
     put(energy, 8);
     put(intact, 12);
@@ -246,6 +256,5 @@ fn cell_lanes<S: Simd>(
             put(moment[a], 9 + a);
         }
     }
-    bound.store(out, (CELL_SUMS - 1) * WIDEST + at);
     true
 }

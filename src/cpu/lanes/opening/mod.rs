@@ -1,6 +1,6 @@
 //! Tissue beside an opened path in lanes of f32: points side by side, those of a cell in a run of lanes, and cells around the path side by side.
 //! Equations: src/needle/opening.rs. Lengths are in radii of the needle, displacements of a cell those of its corners less that of the
-//! first one, both taken from f64; sums over lanes leave as f64.
+//! first one, both taken from f64. Sums of sections are f64, of [`CHUNK`] vectors each: no bit hangs on the number of threads.
 //!
 //! What a lane of these forms does not know (a cell out of the range of `material/regular.rs`) is left to the caller.
 
@@ -10,6 +10,7 @@
 mod cells;
 mod gathered;
 mod points;
+mod sums;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -18,12 +19,13 @@ use glam::DVec3;
 use pulp::{Arch, Simd};
 
 use self::cells::SomeCells;
-use self::gathered::Gathered;
+use self::gathered::{Gathered, Section};
 use self::points::SomePoints;
+use self::sums::{Chunk, Rows, SomeSums};
+pub(in crate::cpu) use self::sums::{OfSpan, PointSums};
 use super::corners::SIGNS;
 use super::number::Lanes;
 use super::{LaneMaterial, WIDEST};
-use crate::cpu::added::Added;
 use crate::cpu::team::Team;
 use crate::material::regular::{Constants, Regular};
 use crate::mesh::{BlockMesh, CORNERS, trilinear};
@@ -37,8 +39,6 @@ use crate::number::{Number, Tensor};
 const POINT: usize = 4 + 3 + LAW + SIGNS;
 /// Constants of a law.
 const LAW: usize = 5;
-/// Rows of what a vector of points gives: see [`PointSums`].
-const POINT_SUMS: usize = 12;
 /// Rows of what is summed up for a cell: forces by mode of the displacement and axis, then bounds of the corners.
 const RUN_SUMS: usize = 4 * SIGNS;
 /// f32 of a row in which vectors begin at any lane.
@@ -46,13 +46,13 @@ const ROOM: usize = 2 * WIDEST;
 /// Distances of lanes that are added up, one after the other, for sums of runs of up to [`WIDEST`].
 const STRIDES: [usize; 4] = [1, 2, 4, 8];
 /// Rows of a vector of cells: edges and place of what points do not carry [radii], volume [m^3], share of that, edge of the bound [radii],
-/// `|b|^2` [1/m^2], then the law: c1, c2, c3, c01 and bulk modulus; mean and variance of the growth [radii].
-const CELL: usize = 10 + LAW + 2;
-/// Rows of what a vector of cells gives: forces (as f_int) [N] on its corners, corner by corner, by the place [N], rate, radius [N] and its
-/// rate, energy, moment, energy of the shape without relaxation, bound.
-const CELL_SUMS: usize = CORNER_FORCES + 3 + 3 + 1 + 1 + 1 + 3 + 1 + 1;
-/// Rows of the forces on corners.
-const CORNER_FORCES: usize = 3 * SIGNS;
+/// `|b|^2` [1/m^2], then the law: c1, c2, c3, c01 and bulk modulus; mean and variance of the growth [radii]; a quarter of one over the edges
+/// [1/m].
+const CELL: usize = 10 + LAW + 2 + 3;
+/// Rows of what a vector of cells gives its nodes: forces (as f_int) [N] on its corners, corner by corner, and the bound [N/m] of each.
+const CORNER_ROWS: usize = 3 * SIGNS + 1;
+/// Vectors whose sums are added up before they are added to those of others.
+const CHUNK: usize = 4;
 
 /// Points side by side, at most [`WIDEST`].
 struct Vector {
@@ -62,8 +62,8 @@ struct Vector {
     /// False where a law is none that these forms know.
     is_known: bool,
     stations: [u16; WIDEST],
-    /// For every one of [`STRIDES`]: 1 where the lane so far behind is of the same run.
-    same_run: [[f32; WIDEST]; STRIDES.len()],
+    /// For every one of [`STRIDES`] that is shorter than its longest run: 1 where the lane so far behind is of the same run.
+    same_run: Vec<[f32; WIDEST]>,
     /// Station of the plan and place of every point in it.
     points: Vec<(usize, usize)>,
 }
@@ -73,6 +73,8 @@ struct Run {
     lanes: Range<usize>,
     /// Corners by the bits of their signs.
     nodes: [u32; SIGNS],
+    /// Where the numbers of its corners stand among those of the nodes.
+    numbers: [u32; SIGNS],
     /// Rest position of the first corner [m].
     origin: DVec3,
 }
@@ -84,9 +86,23 @@ struct Cell {
     nodes: [u32; SIGNS],
     /// Where the numbers of its corners stand among those of the nodes.
     numbers: [u32; SIGNS],
-    /// Middle at rest [m], and a quarter of one over its edges [1/m].
+    /// Middle at rest [m].
     middle: DVec3,
-    quarter: DVec3,
+}
+
+/// What adds to the nodes of a layer of cells of the block.
+#[derive(Default)]
+struct Layer {
+    /// Numbers of its cells.
+    cells: Vec<u32>,
+    /// Runs of points in it, each with its vector.
+    runs: Vec<(u32, u32)>,
+}
+
+impl Layer {
+    fn is_empty(&self) -> bool {
+        self.cells.is_empty() && self.runs.is_empty()
+    }
 }
 
 /// What does not change.
@@ -101,15 +117,16 @@ pub(in crate::cpu) struct LaneOpening {
     runs: Vec<Run>,
     /// [`POINT`] rows per vector of points.
     points: Vec<f32>,
-    /// Of every station: where its points stand, vector times [`WIDEST`] plus lane; in compressed rows.
-    starts: Vec<u32>,
-    of_station: Vec<u32>,
+    /// Of every [`CHUNK`] vectors of points: the stations that they lie at.
+    point_chunks: Vec<Chunk>,
     /// First station and number of stations of cells.
     spans: Vec<(u16, u16)>,
     cells: Vec<Cell>,
-    /// Their numbers, layer by layer of the block, and numbers of the nodes of a layer.
-    layers: Vec<Vec<u32>>,
-    layer: usize,
+    /// Of every [`CHUNK`] vectors of cells: their spans.
+    cell_chunks: Vec<Chunk>,
+    /// Layers of cells of the block, and numbers of a plane of nodes.
+    layers: Vec<Layer>,
+    plane: usize,
     /// False for vectors of cells in which a law is none that these forms know.
     is_known: Vec<bool>,
     /// [`CELL`] rows per vector of cells.
@@ -130,77 +147,19 @@ enum Found {
 /// What a step has found.
 #[derive(Default)]
 struct Out {
-    /// [`POINT_SUMS`] rows per vector of points.
-    points: Vec<f32>,
     vectors: Vec<Found>,
-    /// Per run: force (as f_int) [N] and bound [N/m] of the corners.
+    /// Per run: forces (as f_int) [N] and bounds [N/m] of the corners.
     runs: Vec<AtCorners>,
-    /// [`CELL_SUMS`] rows per vector of cells.
+    /// Per chunk of points and station in it, and per chunk of cells and span in it.
+    of_stations: Vec<Rows>,
+    of_spans: Vec<Rows>,
+    /// [`CORNER_ROWS`] rows per vector of cells.
     cells: Vec<f32>,
     cell_vectors: Vec<Found>,
 }
 
-/// Forces (as f_int) [N] and bounds [N/m] of the corners of a cell, by the bits of their signs.
-type AtCorners = [(DVec3, f64); SIGNS];
-
-/// Derivatives of the energy of points by what their station is.
-#[derive(Debug, Clone, Copy, Default)]
-pub(in crate::cpu) struct PointSums {
-    pub place: DVec3,
-    pub centre_rate: DVec3,
-    pub radius: f64,
-    pub radius_rate: f64,
-    /// Moment of the forces on nodes about the path.
-    pub moment: DVec3,
-    pub energy: f64,
-    /// Energy of the shape without relaxation [J].
-    pub shape: f64,
-}
-
-/// First station and number of stations in a cell, and what is derived of their mean.
-pub(in crate::cpu) type OfSpan = ((u16, u16), PointSums);
-
-impl PointSums {
-    /// Of derivatives and an energy per volume.
-    pub fn new(d: &Derivatives<f64>, moment: DVec3, energy: f64, volume: f64) -> Self {
-        let (place, centre_rate) = (DVec3::from(d.place), DVec3::from(d.centre_rate));
-        let (radius, radius_rate) = (d.radius, d.radius_rate);
-        PointSums { place, centre_rate, radius, radius_rate, moment, energy, shape: 0.0 }.times(volume)
-    }
-
-    fn add(&mut self, other: &Self) {
-        self.place += other.place;
-        self.centre_rate += other.centre_rate;
-        self.radius += other.radius;
-        self.radius_rate += other.radius_rate;
-        self.moment += other.moment;
-        self.energy += other.energy;
-        self.shape += other.shape;
-    }
-
-    /// All of it `by` times.
-    pub fn times(&self, by: f64) -> Self {
-        PointSums { shape: self.shape * by, ..PointSums::of(self.rows().map(|value| value * by)) }
-    }
-
-    fn rows(&self) -> [f64; POINT_SUMS] {
-        let (p, r, m) = (self.place, self.centre_rate, self.moment);
-        [p.x, p.y, p.z, r.x, r.y, r.z, self.radius, self.radius_rate, self.energy, m.x, m.y, m.z]
-    }
-
-    fn of(rows: [f64; POINT_SUMS]) -> Self {
-        let [px, py, pz, rx, ry, rz, radius, radius_rate, energy, mx, my, mz] = rows;
-        PointSums {
-            place: DVec3::new(px, py, pz),
-            centre_rate: DVec3::new(rx, ry, rz),
-            radius,
-            radius_rate,
-            moment: DVec3::new(mx, my, mz),
-            energy,
-            shape: 0.0,
-        }
-    }
-}
+/// Forces (as f_int) [N] of the corners of a cell, by axis and the bits of their signs, then their bounds [N/m].
+type AtCorners = [[f32; SIGNS]; 4];
 
 /// Corner of a cell with these bits, as meshes count them.
 fn corner_of_bits() -> [usize; SIGNS] {
@@ -243,7 +202,9 @@ impl LaneOpening {
         ordered.sort_by_key(|(cell, station, index)| (first_station[cell], *cell, *station, *index));
         let vector_count = ordered.len().div_ceil(WIDEST);
         let mut points = vec![0.0; vector_count * POINT * WIDEST];
-        let mut of_station = vec![Vec::new(); plan.stations.len()];
+        let numbers_of = |nodes: [u32; SIGNS]| nodes.map(|n| first_number(n as usize) as u32);
+        let mut layers: Vec<Layer> = (0..block.cells()[2]).map(|_| Layer::default()).collect();
+        let layer_of = |cell: usize| block.cell_coordinates(cell)[2];
         let (mut vectors, mut runs) = (Vec::with_capacity(vector_count), Vec::<Run>::new());
         for (number, (group, rows)) in ordered.chunks(WIDEST).zip(points.chunks_exact_mut(POINT * WIDEST)).enumerate() {
             let mut vector = Vector {
@@ -251,24 +212,29 @@ impl LaneOpening {
                 first_run: runs.len(),
                 is_known: true,
                 stations: [0; WIDEST],
-                same_run: STRIDES.map(|stride| {
-                    let is_same = |lane: usize| group.get(lane + stride).is_some_and(|other| other.0 == group[lane].0);
-                    std::array::from_fn(|lane| if is_same(lane) { 1.0 } else { 0.0 })
-                }),
+                same_run: STRIDES
+                    .into_iter()
+                    .filter(|stride| group.windows(stride + 1).any(|run| run[0].0 == run[*stride].0))
+                    .map(|stride| {
+                        let is_same =
+                            |lane: usize| group.get(lane + stride).is_some_and(|other| other.0 == group[lane].0);
+                        std::array::from_fn(|lane| if is_same(lane) { 1.0 } else { 0.0 })
+                    })
+                    .collect(),
                 points: group.iter().map(|(_, station, index)| (*station, *index)).collect(),
             };
             for (lane, (cell, station, index)) in group.iter().enumerate() {
                 let (cell, point) = (*cell as usize, &plan.stations[*station].points[*index]);
                 vector.is_known &= is_polynomial(cell as u32);
                 vector.stations[lane] = *station as u16;
-                of_station[*station].push((number * WIDEST + lane) as u32);
                 let is_next = lane > 0 && group[lane - 1].0 as usize == cell;
                 match runs.last_mut().filter(|_| is_next) {
                     Some(run) => run.lanes.end = lane + 1,
                     None => {
                         let nodes = nodes_of(cell);
                         let origin = block.rest_position(nodes[0] as usize);
-                        runs.push(Run { lanes: lane..lane + 1, nodes, origin });
+                        layers[layer_of(cell)].runs.push((runs.len() as u32, number as u32));
+                        runs.push(Run { lanes: lane..lane + 1, nodes, numbers: numbers_of(nodes), origin });
                     }
                 }
                 let edges = block.cell_size(cell);
@@ -304,6 +270,7 @@ impl LaneOpening {
                 let cell = near.cell as usize;
                 let (edges, nodes) = (block.cell_size(cell), nodes_of(cell));
                 let quarter = 0.25 / edges;
+                layers[layer_of(cell)].cells.push(number as u32);
                 let [width, place] = [edges / shaft, near.place * edges / shaft];
                 let values = [
                     width.x,
@@ -320,27 +287,25 @@ impl LaneOpening {
                 let rows = &mut constants[number / WIDEST * CELL * WIDEST..];
                 let area = shaft * shaft;
                 let growth = [near.growth[0] * area, near.growth[1] * area * area];
-                for (row, value) in values.into_iter().chain(law_of(cell)).chain(growth).enumerate() {
+                let rest = law_of(cell).into_iter().chain(growth).chain(quarter.to_array());
+                for (row, value) in values.into_iter().chain(rest).enumerate() {
                     rows[row * WIDEST + number % WIDEST] = value as f32;
                 }
                 Cell {
                     span: (spans.len() - 1) as u16,
                     nodes,
-                    numbers: nodes.map(|n| first_number(n as usize) as u32),
+                    numbers: numbers_of(nodes),
                     middle: block.rest_position(nodes[0] as usize) + 0.5 * edges,
-                    quarter,
                 }
             })
             .collect();
-        let mut layers = vec![Vec::new(); block.cells()[2]];
-        for (number, near) in plan.cells.iter().enumerate() {
-            layers[block.cell_coordinates(near.cell as usize)[2]].push(number as u32);
-        }
-        let mut starts = vec![0];
-        starts.extend(of_station.iter().scan(0, |sum, points: &Vec<u32>| {
-            *sum += points.len() as u32;
-            Some(*sum)
-        }));
+        let stations_of = |vectors: &[Vector]| {
+            let stations = vectors.iter().flat_map(|v| &v.stations[..v.count]);
+            stations.map(|station| usize::from(*station)).collect::<Vec<_>>()
+        };
+        let point_chunks = Chunk::all(vectors.chunks(CHUNK).map(stations_of));
+        let spans_of = |cells: &[Cell]| cells.iter().map(|cell| usize::from(cell.span)).collect::<Vec<_>>();
+        let cell_chunks = Chunk::all(cells.chunks(CHUNK * WIDEST).map(spans_of));
         LaneOpening {
             arch: Arch::new(),
             shaft,
@@ -348,20 +313,21 @@ impl LaneOpening {
             has_c01: materials.iter().any(|m| m.law.c01 != 0.0),
             turns: model.laid.is_some(),
             out: Out {
-                points: vec![0.0; vectors.len() * POINT_SUMS * WIDEST],
                 vectors: vec![Found::Closed; vectors.len()],
-                runs: vec![[(DVec3::ZERO, 0.0); SIGNS]; runs.len()],
-                cells: vec![0.0; cell_vectors * CELL_SUMS * WIDEST],
+                runs: vec![[[0.0; SIGNS]; 4]; runs.len()],
+                of_stations: Chunk::rows(&point_chunks),
+                of_spans: Chunk::rows(&cell_chunks),
+                cells: vec![0.0; cell_vectors * CORNER_ROWS * WIDEST],
                 cell_vectors: vec![Found::Closed; cell_vectors],
             },
             vectors,
             runs,
             points,
-            starts,
-            of_station: of_station.concat(),
+            point_chunks,
             spans,
+            cell_chunks,
             layers,
-            layer: first_number(block.node_index(0, 0, 1)) - first_number(block.node_index(0, 0, 0)),
+            plane: first_number(block.node_index(0, 0, 1)) - first_number(block.node_index(0, 0, 0)),
             is_known: plan
                 .cells
                 .chunks(WIDEST)
@@ -374,7 +340,9 @@ impl LaneOpening {
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        4 * (self.points.len() + self.constants.len() + self.out.points.len() + self.out.cells.len())
+        4 * (self.points.len() + self.constants.len() + self.out.cells.len())
+            + size_of_val(self.out.of_stations.as_slice())
+            + size_of_val(self.out.of_spans.as_slice())
             + size_of_val(self.vectors.as_slice())
             + size_of_val(self.runs.as_slice())
             + size_of_val(self.out.runs.as_slice())
@@ -394,24 +362,25 @@ impl LaneOpening {
         let mut out = std::mem::take(&mut self.out);
         let of_span =
             |(first, count): &(u16, u16)| Station::mean(&stations[usize::from(*first)..][..usize::from(*count)]);
-        let spans: Vec<Station> = self.spans.iter().map(of_span).collect();
-        let step = Step { all: self, map, stations, spans: &spans, u, measures };
-        let part = team.part(self.vectors.len());
+        let section = |station: &Station| Section::new(station, 1.0 / self.shaft);
+        let spans: Vec<Section> = self.spans.iter().map(|span| section(&of_span(span))).collect();
+        let stations: Vec<Section> = stations.iter().map(section).collect();
+        let step = Step { all: self, map, stations: &stations, spans: &spans, u, measures };
         let mut runs = out.runs.as_mut_slice();
-        let vectors = out.vectors.chunks_mut(part).zip(out.points.chunks_mut(part * POINT_SUMS * WIDEST));
-        let points = vectors.enumerate().map(|(number, (found, sums))| {
+        let mut sums = SomeSums::of(&self.point_chunks, &mut out.of_stations);
+        let points = out.vectors.chunks_mut(CHUNK).enumerate().map(|(number, found)| {
             let end = |vector: usize| self.vectors.get(vector).map_or(self.runs.len(), |v| v.first_run);
-            let first = number * part;
+            let first = number * CHUNK;
             let count = end(first + found.len()) - end(first);
             let own;
             (own, runs) = std::mem::take(&mut runs).split_at_mut(count);
-            Part::Points(SomePoints { step, first, found, runs: own, sums })
+            Part::Points(SomePoints { step, first, found, runs: own, sums: sums.next_chunk() })
         });
-        let part = team.part(out.cell_vectors.len());
-        let cells = out.cell_vectors.chunks_mut(part).zip(out.cells.chunks_mut(part * CELL_SUMS * WIDEST));
-        let cells = cells
-            .enumerate()
-            .map(|(number, (found, sums))| Part::Cells(SomeCells { step, first: number * part, found, sums }));
+        let cells = out.cell_vectors.chunks_mut(CHUNK).zip(out.cells.chunks_mut(CHUNK * CORNER_ROWS * WIDEST));
+        let mut sums = SomeSums::of(&self.cell_chunks, &mut out.of_spans);
+        let cells = cells.enumerate().map(|(number, (found, corners))| {
+            Part::Cells(SomeCells { step, first: number * CHUNK, found, corners, sums: sums.next_chunk() })
+        });
         team.map(points.chain(cells), |_, part| match part {
             Part::Points(points) => self.arch.dispatch(points),
             Part::Cells(cells) => self.arch.dispatch(cells),
@@ -430,126 +399,93 @@ impl LaneOpening {
         &self.vectors[vector].points
     }
 
-    /// Takes what the caller has found for a point of a vector.
-    pub fn set_point(&mut self, vector: usize, lane: usize, sums: &PointSums) {
-        for (row, value) in sums.rows().into_iter().enumerate() {
-            self.out.points[(vector * POINT_SUMS + row) * WIDEST + lane] = value as f32;
-        }
-    }
-
-    /// Sums of the points of a station.
-    fn of_station(&self, station: usize) -> PointSums {
-        let mut sums = [0.0; POINT_SUMS];
-        for place in &self.of_station[self.starts[station] as usize..self.starts[station + 1] as usize] {
-            let (vector, lane) = (*place as usize / WIDEST, *place as usize % WIDEST);
-            let rows = &self.out.points[vector * POINT_SUMS * WIDEST + lane..];
-            for row in 0..POINT_SUMS {
-                sums[row] += f64::from(rows[row * WIDEST]);
-            }
-        }
-        PointSums::of(sums)
-    }
-
-    /// Adds forces and bounds of the points.
-    fn points_at_nodes(&self, added: &mut Added) {
-        for (number, vector) in self.vectors.iter().enumerate() {
-            if self.out.vectors[number] != Found::Known {
-                continue;
-            }
-            let end = self.vectors.get(number + 1).map_or(self.runs.len(), |v| v.first_run);
-            for run in vector.first_run..end {
-                for (node, (force, bound)) in self.runs[run].nodes.iter().zip(&self.out.runs[run]) {
-                    added.add(*node as usize, -*force, *bound);
-                }
-            }
-        }
-    }
-
-    /// Sums of the points of every station that is open, with energies, then of the cells per pair of stations; the cells are added to the
-    /// numbers of the nodes, the points to what is added there. What the caller has to compute is left out of these.
+    /// Adds forces and bounds to the numbers of the nodes; sums of the points of every station that is open, with energies, and of the cells
+    /// per pair of stations. What the caller has to compute is left out of these.
     ///
-    /// Layers of cells that share no node side by side, first the even ones: no bit hangs on the number of threads.
+    /// Planes of nodes side by side, each from the layers of cells on both sides: no bit hangs on the number of threads.
     pub fn gather(
         &self,
         team: &Team,
         stations: &[Station],
         (numbers, stride): (&mut [f32], usize),
-        added: &mut Added,
     ) -> (Vec<PointSums>, Vec<OfSpan>) {
-        let mut added = Some(added);
-        let mut sums = vec![PointSums::default(); stations.len()];
-        let mut spans: Vec<_> = self.spans.iter().map(|span| (*span, PointSums::default())).collect();
-        for parity in 0..2 {
-            let first = parity * self.layer;
-            let numbers = numbers[first..].chunks_mut(2 * self.layer);
-            let layers = numbers.zip(self.layers.iter().skip(parity).step_by(2)).enumerate();
-            let layers = layers
-                .filter(|(_, (_, cells))| !cells.is_empty())
-                .map(|(i, (numbers, cells))| Gather::Layer { cells, numbers, first: first + 2 * i * self.layer });
-            let part = team.part(stations.len());
-            let of_points = sums.chunks_mut(part).enumerate().filter(|_| parity == 0);
-            let of_points = of_points.map(|(i, sums)| Gather::Stations { first: i * part, sums });
-            // The longest part first.
-            let points = added.take().map(Gather::Points).into_iter();
-            let found = team.map(points.chain(layers).chain(of_points), |_, part| match part {
-                Gather::Points(added) => {
-                    self.points_at_nodes(added);
-                    Vec::new()
+        let planes = numbers.chunks_mut(self.plane).enumerate();
+        let planes = planes.filter(|(k, _)| self.layers_at(*k).any(|(layer, _)| !layer.is_empty()));
+        let planes = planes.map(|(k, numbers)| Gather::Plane { k, numbers });
+        let found = team.map([Gather::Sums].into_iter().chain(planes), |_, part| match part {
+            Gather::Sums => Some(self.sums(stations)),
+            Gather::Plane { k, numbers } => {
+                for (layer, corners) in self.layers_at(k) {
+                    self.runs_at_nodes(&layer.runs, corners.clone(), numbers, (k * self.plane, stride));
+                    self.cells_at_nodes(&layer.cells, corners, numbers, (k * self.plane, stride));
                 }
-                Gather::Layer { cells, numbers, first } => self.layer_at_nodes(cells, numbers, (first, stride)),
-                Gather::Stations { first, sums } => {
-                    for (i, sums) in (first..).zip(sums).filter(|(i, _)| stations[*i].radius > 0.0) {
-                        *sums = self.of_station(i);
-                        sums.shape = sums.energy / stations[i].left();
-                    }
-                    Vec::new()
-                }
-            });
-            for (span, sums) in found.into_iter().flatten() {
-                spans[usize::from(span)].1.add(&sums);
+                None
             }
-        }
-        (sums, spans)
+        });
+        found.into_iter().next().flatten().unwrap_or_default()
     }
 
-    /// Cells of a layer, to numbers of nodes from `first` on, which lie `stride` apart.
-    fn layer_at_nodes(
+    /// Layers of cells at a plane of nodes, each with the corners (by the bits of their signs) that lie in the plane.
+    fn layers_at(&self, k: usize) -> impl Iterator<Item = (&Layer, Range<usize>)> {
+        let below = k.checked_sub(1).and_then(|below| self.layers.get(below));
+        let above = self.layers.get(k);
+        below.map(|layer| (layer, SIGNS / 2..SIGNS)).into_iter().chain(above.map(|layer| (layer, 0..SIGNS / 2)))
+    }
+
+    /// Sums of stations and of spans, chunk by chunk.
+    fn sums(&self, stations: &[Station]) -> (Vec<PointSums>, Vec<OfSpan>) {
+        let mut points = vec![PointSums::default(); stations.len()];
+        Chunk::add(&self.point_chunks, &self.out.of_stations, |station, rows| points[station].add_rows(rows));
+        for (sums, station) in points.iter_mut().zip(stations).filter(|(_, station)| station.radius > 0.0) {
+            sums.shape = sums.energy / station.left();
+        }
+        let mut spans: Vec<_> = self.spans.iter().map(|span| (*span, PointSums::default())).collect();
+        Chunk::add(&self.cell_chunks, &self.out.of_spans, |span, rows| spans[span].1.add_rows(rows));
+        (points, spans)
+    }
+
+    /// Runs of a layer, to numbers of nodes from `first` on, which lie `stride` apart.
+    fn runs_at_nodes(
         &self,
-        cells: &[u32],
+        runs: &[(u32, u32)],
+        corners: Range<usize>,
         numbers: &mut [f32],
         (first, stride): (usize, usize),
-    ) -> Vec<(u16, PointSums)> {
-        let mut spans: Vec<(u16, PointSums)> = Vec::new();
+    ) {
+        for (number, vector) in runs {
+            if self.out.vectors[*vector as usize] != Found::Known {
+                continue;
+            }
+            let (run, found) = (&self.runs[*number as usize], &self.out.runs[*number as usize]);
+            for bits in corners.clone() {
+                let at = run.numbers[bits] as usize - first;
+                let own = &mut numbers[at..=at + 3 * stride];
+                for axis in 0..3 {
+                    own[axis * stride] -= found[axis][bits];
+                }
+                own[3 * stride] += found[3][bits];
+            }
+        }
+    }
+
+    /// Cells of a layer, to the same.
+    fn cells_at_nodes(
+        &self,
+        cells: &[u32],
+        corners: Range<usize>,
+        numbers: &mut [f32],
+        (first, stride): (usize, usize),
+    ) {
         for number in cells {
             let (vector, lane) = (*number as usize / WIDEST, *number as usize % WIDEST);
             if self.out.cell_vectors[vector] != Found::Known {
                 continue;
             }
             let cell = &self.cells[*number as usize];
-            let rows = &self.out.cells[vector * CELL_SUMS * WIDEST..][..CELL_SUMS * WIDEST];
+            let rows = &self.out.cells[vector * CORNER_ROWS * WIDEST..][..CORNER_ROWS * WIDEST];
             let value = |row: usize| rows[row * WIDEST + lane];
-            let row = |row: usize| f64::from(value(CORNER_FORCES + row));
-            let vector = |first: usize| DVec3::new(row(first), row(first + 1), row(first + 2));
-            let bound = value(CELL_SUMS - 1);
-            if bound == 0.0 && row(6) == 0.0 {
-                continue;
-            }
-            if spans.last().is_none_or(|(span, _)| *span != cell.span) {
-                spans.push((cell.span, PointSums::default()));
-            }
-            let over_shaft = 1.0 / self.shaft;
-            if let Some((_, sums)) = spans.last_mut() {
-                sums.add(&PointSums {
-                    place: vector(0) * over_shaft,
-                    centre_rate: vector(3),
-                    radius: row(6) * over_shaft,
-                    radius_rate: row(7),
-                    energy: row(8),
-                    moment: vector(9),
-                    shape: row(12),
-                });
-            }
-            for bits in 0..SIGNS {
+            let bound = value(CORNER_ROWS - 1);
+            for bits in corners.clone() {
                 let at = cell.numbers[bits] as usize - first;
                 let own = &mut numbers[at..=at + 3 * stride];
                 for axis in 0..3 {
@@ -558,7 +494,6 @@ impl LaneOpening {
                 own[3 * stride] += bound;
             }
         }
-        spans
     }
 }
 
@@ -573,17 +508,10 @@ pub(in crate::cpu) struct OpeningInLanes<'a> {
 
 /// Part of what is added up.
 enum Gather<'a> {
-    Points(&'a mut Added),
-    Layer {
-        cells: &'a [u32],
-        numbers: &'a mut [f32],
-        /// The first of these numbers among all.
-        first: usize,
-    },
-    Stations {
-        first: usize,
-        sums: &'a mut [PointSums],
-    },
+    /// Those of stations and spans.
+    Sums,
+    /// A plane of nodes.
+    Plane { k: usize, numbers: &'a mut [f32] },
 }
 
 /// Part of a stage.
@@ -597,9 +525,9 @@ enum Part<'a> {
 struct Step<'a> {
     all: &'a LaneOpening,
     map: &'a OpeningMap,
-    stations: &'a [Station],
+    stations: &'a [Section],
     /// The path in cells.
-    spans: &'a [Station],
+    spans: &'a [Section],
     u: &'a [DVec3],
     measures: bool,
 }

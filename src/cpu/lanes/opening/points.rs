@@ -3,12 +3,12 @@
 // Adapters of iterators are not inlined into functions for a vector unit: each operation becomes a call.
 #![allow(clippy::needless_range_loop)]
 
-use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
+use super::sums::{ChunkSums, SUMS};
 use super::{
-    AtCorners, Found, Gathered, LAW, Lanes, Opened, POINT, POINT_SUMS, ROOM, RUN_SUMS, STRIDES, Step, law_in_lanes,
-    moment_of, opened,
+    AtCorners, Found, Gathered, LAW, Lanes, Opened, POINT, ROOM, RUN_SUMS, STRIDES, Step, law_in_lanes, moment_of,
+    opened,
 };
 use crate::cpu::lanes::WIDEST;
 use crate::cpu::lanes::corners::{HOURGLASS, SIGNS};
@@ -22,7 +22,7 @@ pub(super) struct SomePoints<'a> {
     pub found: &'a mut [Found],
     /// Of the runs of these vectors.
     pub runs: &'a mut [AtCorners],
-    pub sums: &'a mut [f32],
+    pub sums: ChunkSums<'a>,
 }
 
 impl WithSimd for SomePoints<'_> {
@@ -30,18 +30,30 @@ impl WithSimd for SomePoints<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let SomePoints { step, first, found, runs, sums } = self;
+        let SomePoints { step, first, found, runs, mut sums } = self;
         let map = step.map.in_radii(Lanes::splat(simd, 0.0));
         let all = step.all;
         let first_run = all.vectors[first].first_run;
-        let mut scratch =
-            Scratch { path: Gathered::new(), modes: [[[0.0; ROOM]; 3]; SIGNS], summed: [[0.0; ROOM]; RUN_SUMS] };
+        let mut scratch = Scratch {
+            path: Gathered::new(),
+            modes: [[[0.0; ROOM]; 3]; SIGNS],
+            summed: [[0.0; ROOM]; RUN_SUMS],
+            of_lanes: [[0.0; WIDEST]; SUMS],
+        };
+        if found.iter().any(|found| *found != Found::Closed) {
+            sums.clear();
+        }
         for i in 0..found.len() {
-            let sums = &mut sums[i * POINT_SUMS * WIDEST..(i + 1) * POINT_SUMS * WIDEST];
             let end =
                 if first + i + 1 < all.vectors.len() { all.vectors[first + i + 1].first_run } else { all.runs.len() };
             let runs = &mut runs[all.vectors[first + i].first_run - first_run..end - first_run];
-            found[i] = point_vector(simd, &step, &map, first + i, (found[i], sums), runs, &mut scratch);
+            found[i] = point_vector(simd, &step, &map, first + i, runs, &mut scratch);
+            if found[i] == Found::Known {
+                let vector = &all.vectors[first + i];
+                for lane in 0..vector.count {
+                    sums.add(usize::from(vector.stations[lane]), &scratch.of_lanes, lane);
+                }
+            }
         }
     }
 }
@@ -51,18 +63,18 @@ struct Scratch {
     path: Gathered,
     modes: [[[f32; ROOM]; 3]; SIGNS],
     summed: [[f32; ROOM]; RUN_SUMS],
+    of_lanes: [[f32; WIDEST]; SUMS],
 }
 
-/// Forces of a vector of points; `before`: what the last step found there.
+/// Forces of a vector of points.
 #[inline(always)]
 fn point_vector<S: Simd>(
     simd: S,
     step: &Step,
     map: &MapIn<Lanes<S>>,
     number: usize,
-    (before, out): (Found, &mut [f32]),
     at_corners: &mut [AtCorners],
-    Scratch { path, modes, summed }: &mut Scratch,
+    Scratch { path, modes, summed, of_lanes }: &mut Scratch,
 ) -> Found {
     let all = step.all;
     let vector = &all.vectors[number];
@@ -70,18 +82,14 @@ fn point_vector<S: Simd>(
     let over_shaft = 1.0 / all.shaft;
     let mut is_open = false;
     for lane in 0..vector.count {
-        is_open |= step.stations[usize::from(vector.stations[lane])].radius != 0.0;
+        is_open |= step.stations[usize::from(vector.stations[lane])].is_open;
     }
     if !is_open {
-        if before != Found::Closed {
-            out.fill(0.0);
-        }
         return Found::Closed;
     }
     if !vector.is_known {
         return Found::Unknown;
     }
-    // u = sum of modes times products of the place in the cell, by the bits of its factors; in radii.
     for lane in vector.count..WIDEST {
         path.close(lane);
     }
@@ -91,30 +99,32 @@ fn point_vector<S: Simd>(
             let station = &step.stations[usize::from(vector.stations[lane])];
             path.set(lane, station, run.origin + first, over_shaft);
         }
-        let mut of_run = [DVec3::ZERO; SIGNS];
-        for bits in 1..SIGNS {
-            of_run[bits] = (step.u[run.nodes[bits] as usize] - first) * over_shaft;
-        }
-        for bit in [1, 2, 4] {
-            for bits in 0..SIGNS {
-                if bits & bit != 0 {
-                    let low = of_run[bits ^ bit];
-                    of_run[bits] -= low;
-                }
-            }
-        }
         // The lanes behind the run are those of the next ones, which come later.
         for bits in 1..SIGNS {
-            let mode = of_run[bits];
-            for (axis, value) in [mode.x as f32, mode.y as f32, mode.z as f32].into_iter().enumerate() {
-                modes[bits][axis][run.lanes.start..run.lanes.start + WIDEST].copy_from_slice(&[value; WIDEST]);
+            let from_first = (step.u[run.nodes[bits] as usize] - first) * over_shaft;
+            for axis in 0..3 {
+                modes[bits][axis][run.lanes.start..run.lanes.start + WIDEST]
+                    .copy_from_slice(&[from_first[axis] as f32; WIDEST]);
+            }
+        }
+    }
+    // u = sum of modes times products of the place in the cell, by the bits of its factors; in radii. That of the first corner is none.
+    for bit in [1, 2, 4] {
+        for bits in 1..SIGNS {
+            if bits & bit != 0 && bits != bit {
+                for axis in 0..3 {
+                    let low = modes[bits ^ bit][axis];
+                    for lane in 0..WIDEST {
+                        modes[bits][axis][lane] -= low[lane];
+                    }
+                }
             }
         }
     }
     let points = &all.points[number * POINT * WIDEST..(number + 1) * POINT * WIDEST];
     let mut at = 0;
     while at < vector.count {
-        if !point_lanes(simd, step, map, (points, path, modes), at, (out, summed)) {
+        if !point_lanes(simd, step, map, (points, path, modes), at, (of_lanes, summed)) {
             return Found::Unknown;
         }
         at += Lanes::<S>::COUNT;
@@ -130,23 +140,26 @@ fn point_vector<S: Simd>(
         }
     }
     // Back to the corners.
-    for i in 0..runs.len() {
-        let first = runs[i].lanes.start;
-        let mut forces = [DVec3::ZERO; SIGNS];
+    for bit in [1, 2, 4] {
         for bits in 0..SIGNS {
-            let sums = [summed[3 * bits][first], summed[3 * bits + 1][first], summed[3 * bits + 2][first]];
-            forces[bits] = DVec3::new(f64::from(sums[0]), f64::from(sums[1]), f64::from(sums[2])) * over_shaft;
-        }
-        for bit in [1, 2, 4] {
-            for bits in 0..SIGNS {
-                if bits & bit != 0 {
-                    let high = forces[bits];
-                    forces[bits ^ bit] -= high;
+            if bits & bit != 0 {
+                for axis in 0..3 {
+                    let high = summed[3 * bits + axis];
+                    for lane in 0..WIDEST {
+                        summed[3 * (bits ^ bit) + axis][lane] -= high[lane];
+                    }
                 }
             }
         }
+    }
+    let over_shaft = over_shaft as f32;
+    for i in 0..runs.len() {
+        let (first, at_corners) = (runs[i].lanes.start, &mut at_corners[i]);
         for bits in 0..SIGNS {
-            at_corners[i][bits] = (forces[bits], f64::from(summed[3 * SIGNS + bits][first]));
+            for axis in 0..3 {
+                at_corners[axis][bits] = summed[3 * bits + axis][first] * over_shaft;
+            }
+            at_corners[3][bits] = summed[3 * SIGNS + bits][first];
         }
     }
     Found::Known
@@ -160,15 +173,15 @@ fn point_lanes<S: Simd>(
     map: &MapIn<Lanes<S>>,
     (points, path, modes): (&[f32], &Gathered, &[[[f32; ROOM]; 3]; SIGNS]),
     at: usize,
-    (out, summed): (&mut [f32], &mut [[f32; ROOM]; RUN_SUMS]),
+    (of_lanes, summed): (&mut [[f32; WIDEST]; SUMS], &mut [[f32; ROOM]; RUN_SUMS]),
 ) -> bool {
     let all = step.all;
     let zero = Lanes::splat(simd, 0.0);
     let over_shaft = Lanes::splat(simd, (1.0 / all.shaft) as f32);
     let row = |row: usize| Lanes::load(simd, points, row * WIDEST + at);
     let [x, y, z] = [row(0), row(1), row(2)];
-    let open = Lanes::load(simd, &path.open, at);
-    let volume = row(3) * Lanes::load(simd, &path.left, at);
+    let open = path.open(simd, at);
+    let volume = row(3) * path.left(simd, at);
     let edges = [row(4), row(5), row(6)];
     let one = Lanes::splat(simd, 1.0);
     let over_edges = [one.over(edges[0]), one.over(edges[1]), one.over(edges[2])];
@@ -214,16 +227,16 @@ fn point_lanes<S: Simd>(
         p.mul_add(zx, gx.mul_add(z, gz * x)).store(&mut summed[5 * 3 + axis], at);
         p.mul_add(yz, gy.mul_add(z, gz * y)).store(&mut summed[6 * 3 + axis], at);
         (p * xy).mul_add(z, gx.mul_add(yz, gy.mul_add(zx, gz * xy))).store(&mut summed[7 * 3 + axis], at);
-        (p * over_shaft).store(out, axis * WIDEST + at);
-        (d.centre_rate[axis] * volume).store(out, (3 + axis) * WIDEST + at);
+        (p * over_shaft).store(&mut of_lanes[axis], at);
+        (d.centre_rate[axis] * volume).store(&mut of_lanes[3 + axis], at);
     }
-    (d.radius * volume * over_shaft).store(out, 6 * WIDEST + at);
-    (d.radius_rate * volume).store(out, 7 * WIDEST + at);
-    (energy * volume).store(out, 8 * WIDEST + at);
+    (d.radius * volume * over_shaft).store(&mut of_lanes[6], at);
+    (d.radius_rate * volume).store(&mut of_lanes[7], at);
+    (energy * volume).store(&mut of_lanes[8], at);
     if all.turns {
         let moment = moment_of(&h, beside.offset, &d.gradient, d.place);
         for axis in 0..3 {
-            (moment[axis] * volume).store(out, (9 + axis) * WIDEST + at);
+            (moment[axis] * volume).store(&mut of_lanes[9 + axis], at);
         }
     }
     true
