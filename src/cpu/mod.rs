@@ -25,13 +25,13 @@ use rayon::prelude::*;
 
 use crate::effects::adhesion::Bond;
 use crate::effects::viscoelastic::SectionRelaxation;
-use crate::engine::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements};
+use crate::engine::elements::{CellForces, CellInput, CellMeasure, CellStates, Elements, Grown};
 use crate::engine::{
     ContactState, Engine, EngineImage, EngineInfo, FrameEnergies, FramePlan, FrameSums, LARGEST_DISPLACEMENT, State,
     StepInput, foreign_image,
 };
 use crate::error::{Error, Result};
-use crate::material_point::PointState;
+use crate::material_point::{PointState, Volumetric};
 use crate::model::Model;
 use crate::needle::ToolPose;
 use crate::needle::centre_line::CentreLine;
@@ -90,6 +90,9 @@ pub struct CpuEngine {
     measures: bool,
     /// Elastic energy that the scheme `opening` added in the last step [J].
     opening_elastic: f64,
+    /// Tetrahedra beside an opened path, and the averaged volumetric answer of all of them in f64, in the last step.
+    grown: Vec<Grown>,
+    averaged: Vec<Volumetric>,
     /// What the points have dissipated and earlier frames have told.
     booked: FrameEnergies,
     /// Centre-line of a flexible needle in the frame under way.
@@ -179,6 +182,8 @@ impl CpuEngine {
             advanced: [0.0; 2],
             measures: false,
             opening_elastic: 0.0,
+            grown: Vec::new(),
+            averaged: Vec::new(),
             booked: FrameEnergies::default(),
             centre_line: None,
             node_impulse: vec![DVec3::ZERO; model.contact_nodes.len()],
@@ -251,12 +256,16 @@ impl CpuEngine {
                 }
             }
         }
+        let opened = match (&model.puncture, input.pose) {
+            (Some(plan), Some(pose)) => self.open_path(plan, &pose, input.step),
+            _ => None,
+        };
         self.element_forces(input);
         self.cohesive_forces();
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             self.needle_contact(plan, &pose, input.step);
-            if let Some(opening) = &plan.opening {
-                self.opening(plan, opening, &pose, input.step);
+            if let (Some(opening), Some(opened)) = (&plan.opening, opened) {
+                self.opening(opening, &pose, &opened);
             }
         }
         if let (Some(_), Some(pose)) = (model.effects.indentation, input.pose) {
@@ -320,16 +329,18 @@ impl CpuEngine {
             let State { displacement, stiffness, .. } = &self.state;
             // An opened path softens nothing: to look at every cell for that is as long as a stage.
             let stiffness = if self.model.opening().is_some() { &[] } else { stiffness.as_slice() };
-            lanes.compute(&self.model, &self.elements, displacement, stiffness, Some((self.dt, input.step)));
+            let advance = Some((self.dt, input.step));
+            lanes.compute(&self.model, &self.elements, (displacement, &self.grown), stiffness, advance);
             return;
         }
         let (model, elements, dt) = (&self.model, &self.elements, self.dt);
         let State { displacement, stiffness, points, .. } = &mut self.state;
         let states = CellStates { points, stiffness };
-        let averaged = elements.averaged_volumetrics(model, displacement, states);
+        self.averaged = elements.averaged_volumetrics(model, displacement, states, &self.grown).unwrap_or_default();
+        let averaged = &self.averaged;
         let forces = |cell: usize, point: Option<&mut PointState>| {
             let remaining = stiffness.get(cell).copied().unwrap_or(1.0);
-            let averaged = averaged.as_ref().map(|a| a[cell]);
+            let averaged = averaged.get(cell).copied();
             let input = CellInput { averaged, remaining, point, advance: Some((dt, input.step)) };
             elements.corner_forces(model, cell, displacement, input)
         };
@@ -382,7 +393,7 @@ impl CpuEngine {
         let (model, elements, state) = (&self.model, &self.elements, &self.state);
         let states = CellStates { points: &state.points, stiffness: &state.stiffness };
         let in_f64 = || -> Vec<CellMeasure> {
-            let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
+            let averaged = elements.averaged_volumetrics(model, &state.displacement, states, &self.grown);
             let of = |cell: usize| averaged.as_ref().map(|a| a[cell]);
             let measure = |cell: usize| elements.measure(model, cell, &state.displacement, of(cell), states);
             (0..model.mesh.cell_count()).into_par_iter().map(measure).collect()
@@ -583,7 +594,8 @@ impl Engine for CpuEngine {
     fn internal_forces(&mut self) -> Result<Vec<DVec3>> {
         self.bring_to_lanes();
         if let Some(lanes) = &mut self.lanes {
-            lanes.compute(&self.model, &self.elements, &self.state.displacement, &self.state.stiffness, None);
+            let state = &self.state;
+            lanes.compute(&self.model, &self.elements, (&state.displacement, &[]), &state.stiffness, None);
             return Ok((0..self.model.mesh.node_count()).map(|node| -lanes.at(node).0).collect());
         }
         let states = CellStates { points: &self.state.points, stiffness: &self.state.stiffness };

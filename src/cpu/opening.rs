@@ -5,15 +5,15 @@ use super::CpuEngine;
 use super::lanes::opening::{OpeningInLanes, PointSums};
 use super::path_reactions::guide;
 use crate::engine::State;
-use crate::engine::elements::{CellForces, CellShape};
+use crate::engine::elements::{CellForces, CellShape, CellStates, Grown};
 use crate::material::TangentBound;
 use crate::material::kinematics::{J_CONTINUATION, cofactor, jacobian_minus_one, norm_squared};
 use crate::material_point::{Material, PointState, Volumetric};
-use crate::mesh::CORNERS;
-use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, PathPoint, VOLUME_PLACE, is_volume_place, mean_of};
+use crate::mesh::Mesh;
+use crate::model::opening::{NearCell, OpeningPlan, OpeningStation, PathPoint, mean_of};
 use crate::model::{Model, PuncturePlan};
 use crate::needle::centre_line::{Bend, CentreLine};
-use crate::needle::opening::{Derivatives, Opening, OpeningMap, Station, outer, squared_norm_bound};
+use crate::needle::opening::{Derivatives, Dilation, Opening, OpeningMap, Station, outer, squared_norm_bound};
 use crate::needle::{ToolPose, swing};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -89,6 +89,13 @@ pub(super) struct Now {
 pub(super) struct Axis {
     pub(super) slope: DVec3,
     pub(super) rate: DVec3,
+}
+
+/// Where the path is open in a step.
+pub(super) struct OpenPath {
+    now: Vec<Now>,
+    sections: Vec<Station>,
+    map: OpeningMap,
 }
 
 /// Differences of a quantity along the stations: weights of the neighbours before and behind station `i`.
@@ -173,31 +180,83 @@ impl CpuEngine {
         let mut engine = CpuEngine::new(model.clone(), 1.0);
         engine.state = state.clone();
         engine.measures = true;
-        let now = engine.stations_now(plan, opening, (pose, 0));
-        let sections: Vec<Station> = now.iter().map(|n| n.section).collect();
-        let (_, elastic) = engine.opened_in_f64(model, (opening, &opening.map(pose.direction)), &sections);
+        let Some(OpenPath { now, sections, map }) = engine.open_path(plan, pose, 0) else { return 0.0 };
+        let mut by_volume = [0.0; 2];
+        if let Mesh::Tets(_) = model.mesh {
+            for (sum, grown) in by_volume.iter_mut().zip([&[][..], &engine.grown]) {
+                let states = CellStates::default();
+                let averaged = engine.elements.averaged_volumetrics(model, &state.displacement, states, grown);
+                engine.averaged = averaged.unwrap_or_default();
+                let of_cells = engine.averaged.iter().enumerate();
+                *sum = of_cells.map(|(cell, v)| model.mesh.cell_volume(cell) * v.energy).sum::<f64>();
+            }
+        }
+        let (_, in_shape) = engine.opened_in_f64(model, (opening, &map), &sections);
+        let elastic = in_shape + by_volume[1] - by_volume[0];
         let stick = model.effects.friction.as_ref().map_or(0.0, |f| 0.5 * f.stiffness_ratio * opening.stick);
         let springs = now.iter().zip(&state.stations).map(|(n, s)| guide(opening, n, 0.0).stored + stick * s * s);
         elastic + springs.sum::<f64>()
     }
 
-    /// Stage `opening`: forces of points, near cells, the guide on the needle and friction.
-    pub(super) fn opening(&mut self, plan: &PuncturePlan, opening: &OpeningPlan, pose: &ToolPose, step: u64) {
-        let model = self.model.clone();
+    /// Where the path is open, which the averaged pressure of tetrahedra depends on. `None` in the other scheme.
+    pub(super) fn open_path(&mut self, plan: &PuncturePlan, pose: &ToolPose, step: u64) -> Option<OpenPath> {
+        let opening = plan.opening.as_ref()?;
         let now = self.stations_now(plan, opening, (pose, step));
         let sections: Vec<Station> = now.iter().map(|n| n.section).collect();
         let map = opening.map(pose.direction);
-        let (sums, elastic) = match self.opened_in_lanes(&model, (opening, &map), &sections) {
+        if let Mesh::Tets(_) = self.model.mesh {
+            self.grown = self.grown_beside(opening, &map, &sections);
+        }
+        Some(OpenPath { now, sections, map })
+    }
+
+    /// Tetrahedra that an opened path makes grow or shrink.
+    fn grown_beside(&self, opening: &OpeningPlan, map: &OpeningMap, sections: &[Station]) -> Vec<Grown> {
+        let (model, displacement) = (&self.model, &self.state.displacement);
+        let by = self.each(opening.cells.len(), |i| {
+            let (near, section) = (&opening.cells[i], within(sections, &opening.cells[i]));
+            if section.radius == 0.0 {
+                return 0.0;
+            }
+            let cell = CellNow::new(model, near.cell as usize, displacement);
+            dilations(model, map, (near, &section), &cell).1
+        });
+        let cells = opening.cells.iter().map(|near| near.cell).zip(by);
+        cells.filter(|(_, by)| *by != 0.0).map(|(cell, by)| Grown { cell, by }).collect()
+    }
+
+    /// Stage `opening`: forces of points, near cells, the guide on the needle and friction.
+    pub(super) fn opening(
+        &mut self,
+        opening: &OpeningPlan,
+        pose: &ToolPose,
+        OpenPath { now, sections, map }: &OpenPath,
+    ) {
+        let model = self.model.clone();
+        let (sums, elastic) = match self.opened_in_lanes(&model, (opening, map), sections) {
             Some(found) => found,
-            None => self.opened_in_f64(&model, (opening, &map), &sections),
+            None => self.opened_in_f64(&model, (opening, map), sections),
         };
         if self.measures {
             self.opening_elastic = elastic;
         }
-        self.station_reactions(opening, pose, &now, &sums);
+        self.station_reactions(opening, pose, now, &sums);
         if self.measures {
-            self.relax(&model, opening, &now, &sums);
+            self.relax(&model, opening, now, &sums);
         }
+    }
+
+    /// Averaged pressure of a tetrahedron in the last forces [Pa]; `None` for a hexahedron, which has its own.
+    fn averaged_pressure(&self, cell: usize) -> Option<f64> {
+        self.model.mesh.as_tets()?;
+        if let Some(lanes) = &self.lanes {
+            return Some(lanes.averaged_pressure(&self.model.mesh.cell_nodes(cell)));
+        }
+        // Without what a tetrahedron that is nearly flat has of its own.
+        let shape = CellShape::new(&self.model.mesh, cell);
+        let j = 1.0 + jacobian_minus_one(shape.displacement_gradient(&shape.gather(&self.state.displacement)));
+        let flat = (j - self.elements.flat_below()).min(0.0);
+        Some(self.averaged.get(cell)?.stress - self.model.material(cell).law.bulk_modulus * flat)
     }
 
     /// The stress beside every station relaxes, at the end of a frame whose energies are known.
@@ -237,7 +296,8 @@ impl CpuEngine {
         let displacement = &self.state.displacement;
         let cells = self.each(opening.cells.len(), |i| {
             let near = &opening.cells[i];
-            near_cell_forces(model, shape(near.cell), map, near, &within(sections, near), displacement)
+            let (section, pressure) = (within(sections, near), self.averaged_pressure(near.cell as usize));
+            near_cell_forces(model, shape(near.cell), map, (near, &section), displacement, pressure)
         });
         for (near, added) in opening.cells.iter().zip(cells) {
             let Some(found) = added else { continue };
@@ -297,7 +357,8 @@ impl CpuEngine {
         }
         for near in cells.into_iter().map(|i| &opening.cells[i]) {
             let section = within(sections, near);
-            let found = near_cell_forces(model, shape(near.cell), map, near, &section, &self.state.displacement);
+            let found =
+                near_cell_forces(model, shape(near.cell), map, (near, &section), &self.state.displacement, None);
             if let Some(found) = found {
                 elastic += self.add_near_cell(near, &found, &mut sums);
             }
@@ -422,91 +483,136 @@ fn moment_of(gradient: DMat3, offset: DVec3, by_gradient: DMat3, by_place: DVec3
     offset.cross(by_place) + of_columns[0] + of_columns[1] + of_columns[2]
 }
 
+/// A cell as it is, with the closed path.
+struct CellNow {
+    shape: CellShape,
+    /// Its middle [m].
+    middle: DVec3,
+    /// Displacement gradient.
+    h: DMat3,
+}
+
+impl CellNow {
+    fn new(model: &Model, cell: usize, displacement: &[DVec3]) -> Self {
+        let shape = CellShape::new(&model.mesh, cell);
+        let u = shape.gather(displacement);
+        let corners = shape.nodes.iter().zip(u).map(|(node, u)| model.mesh.rest_position(*node) + u);
+        let middle = corners.sum::<DVec3>() / shape.nodes.len() as f64;
+        CellNow { h: shape.displacement_gradient(&u), middle, shape }
+    }
+}
+
+/// By how much the volume of a cell around the path grows at four places (with their offsets from its middle [m]), and in all of it.
+fn dilations(
+    model: &Model,
+    map: &OpeningMap,
+    (near, section): (&NearCell, &Station),
+    cell: &CellNow,
+) -> ([(Dilation<f64>, DVec3); 4], f64) {
+    let gradient = DMat3::IDENTITY + cell.h;
+    let places = model.mesh.volume_places(near.cell as usize);
+    let found = places.map(|offset| (map.dilation(section, cell.middle + gradient * offset), offset));
+    let mean = found.iter().map(|(d, _)| d.less_one).sum::<f64>() / 4.0;
+    (found, mean + section.radius.powi(2) * near.growth[0])
+}
+
 /// Forces and bounds of a near cell, derivatives of its energy with their moment about the path, that energy, and what the shape of its part
 /// would hold without relaxation [J].
 type NearCellForces = (CellForces, (Derivatives<f64>, DVec3), [f64; 2]);
 
 /// What opening adds to a cell: forces, derivatives of its energy by the path, and that energy. The gradient of y is that of its centre,
-/// as elsewhere; the volume is taken at four places, the shape at one.
+/// as elsewhere; the volume is taken at four places, the shape at one. `averaged`: pressure of a tetrahedron, whose volume is that of the
+/// nodes around it with what opening adds, and whose energy by volume is booked there.
 fn near_cell_forces(
     model: &Model,
     shape_of: Shape,
     map: &OpeningMap,
-    near: &NearCell,
-    section: &Station,
+    (near, section): (&NearCell, &Station),
     displacement: &[DVec3],
+    averaged: Option<f64>,
 ) -> Option<NearCellForces> {
     if section.radius == 0.0 {
         return None;
     }
-    let cell = near.cell as usize;
-    let shape = CellShape::new(&model.mesh, cell);
-    let u = shape.gather(displacement);
-    let nodes = model.mesh.cell_nodes(cell);
-    let y: [DVec3; 8] = std::array::from_fn(|i| model.mesh.rest_position(nodes[i]) + u[i]);
-    let h = shape.displacement_gradient(&u);
+    let now = CellNow::new(model, near.cell as usize, displacement);
+    let CellNow { shape, middle, h } = &now;
+    let (middle, h) = (*middle, *h);
     let gradient = DMat3::IDENTITY + h;
     let material = shape_of.material;
     let (mut sum, mut energy, mut intact) = (Derivatives::none(0.0), 0.0, 0.0);
     let mut grown = 1.0f64;
     // y is linear in the cell, as its gradient is one: a force at a place is one on the middle and one on the gradient.
-    let middle = y.iter().copied().sum::<DVec3>() / 8.0;
-    let width = model.mesh.block().cell_size(cell);
     let add = |sum: &mut Derivatives<f64>, d: &Derivatives<f64>, offset: DVec3, by: f64| {
         sum.add(d, by);
         let by_offset = outer((DVec3::from(d.place) * by).to_array(), offset.to_array());
         sum.gradient =
             (DMat3::from_cols_array_2d(&sum.gradient) + DMat3::from_cols_array_2d(&by_offset)).to_cols_array_2d();
     };
-    let at_volume_places: Vec<_> = (0..8)
-        .filter(|corner| is_volume_place(*corner))
-        .map(|corner| {
-            let offset = DVec3::from(CORNERS[corner]) * (0.5 * VOLUME_PLACE) * width;
-            (map.dilation(section, middle + gradient * offset), offset)
-        })
-        .collect();
+    let (at_volume_places, less) = dilations(model, map, (near, section), &now);
     let tangent = material.tangent_bound(h, &PointState::default());
     let (mut straight, mut turned) = (tangent.straight, tangent.turned);
     let [grows, varies] = near.growth;
     let rc = section.radius;
-    let less = at_volume_places.iter().map(|(d, _)| d.less_one).sum::<f64>() / 4.0 + rc * rc * grows;
     // What keeps the shape, of what points do not carry.
     if near.share > 0.0 {
-        let offset = near.place * width;
-        let map = map.at(section, middle + gradient * offset, h);
+        let map = map.at(section, middle + gradient * near.place, h);
         let volume = near.share * shape.volume;
         let (d, w, tangent) = shape_of.opened(&map, h);
         let left = volume * section.left();
         intact = volume * w;
         energy += left * w;
-        add(&mut sum, &d, offset, left);
+        add(&mut sum, &d, near.place, left);
         let (by_gradient, by_place) = map.amplification();
         grown = grown.max(by_gradient + by_place * shape.edge());
         (straight, turned) = (straight.max(tangent.straight), turned.max(tangent.turned));
     }
-    // The volume is the cell's.
+    // The volume is the cell's, or that of the nodes around it.
     let (closed, cof) = (jacobian_minus_one(h), cofactor(gradient));
     let bulk = material.law.bulk_modulus;
     let open = closed + less + closed * less;
     let uneven = rc.powi(4) * varies;
-    energy += shape.volume * 0.5 * bulk * ((open - closed) * (open + closed) + (1.0 + closed).powi(2) * uneven);
-    let by_gradient = cof * (bulk * (less * (1.0 + closed + open) + (1.0 + closed) * uneven) * shape.volume);
-    sum.radius += 2.0 * bulk * shape.volume * rc * (1.0 + closed) * (open * grows + (1.0 + closed) * rc * rc * varies);
+    let beyond = bulk * (1.0 + closed) * uneven;
+    energy += shape.volume * 0.5 * (1.0 + closed) * beyond;
+    let (pressure, by_jacobian) = match averaged {
+        Some(pressure) => (pressure, pressure * less),
+        None => {
+            energy += shape.volume * 0.5 * bulk * (open - closed) * (open + closed);
+            (bulk * open, bulk * less * (1.0 + closed + open))
+        }
+    };
+    let by_gradient = cof * ((by_jacobian + beyond) * shape.volume);
+    let j = 1.0 + closed;
+    sum.radius += 2.0 * shape.volume * rc * j * (pressure * grows + bulk * j * rc * rc * varies);
     sum.gradient = (DMat3::from_cols_array_2d(&sum.gradient) + by_gradient).to_cols_array_2d();
     for (dilation, offset) in &at_volume_places {
-        let (place, radius) = dilation.pull_back(bulk * open * (1.0 + closed));
+        let (place, radius) = dilation.pull_back(pressure * (1.0 + closed));
         add(&mut sum, &Derivatives { place, radius, ..Derivatives::none(0.0) }, *offset, 0.25 * shape.volume);
     }
     // Bound of the stiffness beyond that of the closed cell, where open faces may meet (see Elements::stiffness_bound).
-    let b = 0.25 / width;
-    let b = b.length_squared();
-    let cof_b = squared_norm_bound(&cof.to_cols_array_2d()) * b;
-    let with = (bulk + turned) * cof_b * ((1.0 + less).max(1.0).powi(2) + uneven) + straight * grown * grown * b;
-    let without = (bulk + tangent.turned) * cof_b + tangent.straight * b;
-    let mut forces = CellForces { bound: [8.0 * shape.volume * (with - without).max(0.0); 8], ..CellForces::default() };
+    let widened = (1.0 + less).max(1.0).powi(2) + uneven;
+    let added = |cof_b: f64, b: f64| {
+        let with = (bulk + turned) * cof_b * widened + straight * grown * grown * b;
+        let without = (bulk + tangent.turned) * cof_b + tangent.straight * b;
+        shape.volume * (with - without).max(0.0)
+    };
+    let mut forces = CellForces::default();
+    match &model.mesh {
+        Mesh::Block(block) => {
+            let b = (0.25 / block.cell_size(near.cell as usize)).length_squared();
+            forces.bound = [8.0 * added(squared_norm_bound(&cof.to_cols_array_2d()) * b, b); 8];
+        }
+        Mesh::Tets(_) => {
+            let lengths = shape.gradients().iter().map(|b| ((cof * *b).length(), b.length()));
+            let (sum_cof, sum) = lengths.clone().fold((0.0, 0.0), |s, l| (s.0 + l.0, s.1 + l.1));
+            for (bound, (cof_b, b)) in forces.bound.iter_mut().zip(lengths) {
+                *bound = added(cof_b * sum_cof, b * sum);
+            }
+        }
+    }
     let (by_gradient, by_place) = (DMat3::from_cols_array_2d(&sum.gradient), DVec3::from(sum.place));
+    let part = 1.0 / shape.nodes.len() as f64;
     for (i, b) in shape.gradients().iter().enumerate() {
-        forces.force[i] = by_gradient * *b + by_place / 8.0;
+        forces.force[i] = by_gradient * *b + by_place * part;
     }
     let moment = moment_of(gradient, middle - section.centre, by_gradient, by_place);
     Some((forces, (sum, moment), [energy, intact]))

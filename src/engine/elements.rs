@@ -268,6 +268,14 @@ pub struct CellInput<'a> {
     pub advance: Option<(f64, u64)>,
 }
 
+/// A cell beside an opened path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grown {
+    pub cell: u32,
+    /// Part of its volume by which it grows as the path opens.
+    pub by: f64,
+}
+
 /// What one cell tells about itself.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CellMeasure {
@@ -414,11 +422,18 @@ impl Elements {
         0.5 * self.hourglass(model, cell) * shape.edge() * q2 * (1.0 + 0.5 * self.quartic * folding)
     }
 
-    /// Volumetric answers of tetrahedra by averaged nodal pressure; `None` for hexahedra, which have their own.
-    pub fn averaged_volumetrics(&self, model: &Model, u: &[DVec3], states: CellStates) -> Option<Vec<Volumetric>> {
+    /// Volumetric answers of tetrahedra by averaged nodal pressure; `None` for hexahedra, which have their own. `opened`: cells beside an opened
+    /// path, by what part of their volume that makes them grow.
+    pub fn averaged_volumetrics(
+        &self,
+        model: &Model,
+        u: &[DVec3],
+        states: CellStates,
+        opened: &[Grown],
+    ) -> Option<Vec<Volumetric>> {
         let tets = model.mesh.as_tets()?;
         // Volume share V_e/4, J - 1 and w K of every cell.
-        let cells: Vec<(f64, f64, f64)> = (0..tets.tets.len())
+        let mut cells: Vec<(f64, f64, f64)> = (0..tets.tets.len())
             .into_par_iter()
             .map(|cell| {
                 let shape = CellShape::new(&model.mesh, cell);
@@ -428,6 +443,11 @@ impl Elements {
                 (0.25 * shape.volume, dj, states.remaining(cell) * (1.0 - d) * material.law.bulk_modulus)
             })
             .collect();
+        let closed: Vec<f64> = cells.iter().map(|(_, dj, _)| *dj).collect();
+        for Grown { cell, by } in opened {
+            let dj = &mut cells[*cell as usize].1;
+            *dj += by * (1.0 + *dj);
+        }
         // Jbar - 1 and K_a of every node.
         let nodes: Vec<(f64, f64)> = (0..u.len())
             .into_par_iter()
@@ -443,8 +463,8 @@ impl Elements {
         let answer = |cell: usize| {
             let corners = tets.tets[cell].map(|n| nodes[n as usize]);
             let bulk = model.material(cell).law.bulk_modulus;
-            let (_, dj, left) = cells[cell];
-            let flat = (1.0 + dj - self.flat_below).min(0.0);
+            let (_, _, left) = cells[cell];
+            let flat = (1.0 + closed[cell] - self.flat_below).min(0.0);
             Volumetric {
                 stress: corners.iter().map(|(theta, k)| 0.25 * k * theta).sum::<f64>() + left * flat,
                 energy: corners.iter().map(|(theta, _)| 0.125 * bulk * theta * theta).sum::<f64>()
@@ -612,7 +632,7 @@ impl Elements {
 
     /// Internal nodal forces f_int [N] of a displacement field.
     pub fn internal_forces(&self, model: &Model, u: &[DVec3], states: CellStates) -> Vec<DVec3> {
-        let averaged = self.averaged_volumetrics(model, u, states);
+        let averaged = self.averaged_volumetrics(model, u, states, &[]);
         let cells: Vec<CellForces> = (0..model.mesh.cell_count())
             .into_par_iter()
             .map(|cell| {

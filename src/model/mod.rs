@@ -6,6 +6,7 @@ mod free_path;
 mod indentation;
 pub mod loads;
 pub mod opening;
+mod opening_places;
 mod puncture;
 pub mod rigid;
 mod slit;

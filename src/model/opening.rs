@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DMat3, DVec3};
 
+use super::opening_places::{Place, Places};
 use crate::effects::puncture::LEAST_TRAVELS;
-use crate::mesh::{BlockMesh, CORNERS, trilinear};
+use crate::mesh::{CORNERS, Mesh};
 use crate::needle::NeedleShape;
 use crate::needle::lateral_axes;
-use crate::needle::opening::{Growth, OpeningMap};
+use crate::needle::opening::{FADED, Growth, OpeningMap};
 use crate::needle::path_line::PathLine;
 
 /// Distance between stations, in needle radii.
@@ -125,7 +126,7 @@ pub struct Cluster {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearCell {
     pub cell: u32,
-    /// Part of its volume that points do not carry, and the middle of that part, from the middle of the cell in edges.
+    /// Part of its volume that points do not carry, and the middle of that part, from the middle of the cell [m].
     pub share: f64,
     pub place: DVec3,
     /// By how much its volume grows around an open path, over rc^2: mean [1/m^2] and variance [1/m^4] in the cell.
@@ -253,6 +254,8 @@ pub struct OpeningInput<'a> {
     pub deepest: f64,
     pub exit: f64,
     pub cell_size: f64,
+    /// How far the path leans over, against the surface: tangent of the angle with its normal.
+    pub tilt: f64,
     /// Shear modulus and p-wave modulus of the tissue [Pa].
     pub shear_modulus: f64,
     pub p_wave_modulus: f64,
@@ -279,40 +282,19 @@ impl Nodes {
     }
 }
 
-/// A rest position in the block: cell, corners, weights and gradients [1/m].
-struct Place {
-    cell: usize,
-    corners: [usize; 8],
-    weights: [f64; 8],
-    gradients: [DVec3; 8],
-    local: DVec3,
-    inside: bool,
-}
-
-/// Where a rest position lies; outside of the block as the nearest cell goes on.
-fn place_in(mesh: &BlockMesh, x: DVec3) -> Place {
-    let ([i, j, k], at) = mesh.locate(x);
-    let (corners, cell) = (mesh.cell_nodes(mesh.cell_index(i, j, k)), mesh.cell_index(i, j, k));
-    let width = mesh.cell_size(cell);
-    let exact = (x - mesh.rest_position(corners[0])) / width;
-    let inside = (exact - at).abs().max_element() < 1e-9;
-    let (weights, gradients) = trilinear(exact, width);
-    Place { cell, corners, weights, gradients, local: exact, inside }
-}
-
 impl OpeningPlan {
-    /// Stations, points and cells of a path through a block.
-    pub fn new(mesh: &BlockMesh, input: &OpeningInput) -> Self {
+    /// Stations, points and cells of a path through a mesh.
+    pub fn new(mesh: &Mesh, input: &OpeningInput) -> Self {
         let shaft = input.needle.radius;
         let spacing = SPACING * shaft;
         let near = (2.0 * input.cell_size).clamp(NEAR[0] * shaft, NEAR[1] * shaft);
-        let direction = input.line.piece(0.0).direction;
+        let places = &Places::new(mesh, input.line, FADED * shaft);
         // An oblique path reaches the surface at one side before its axis does.
-        let tilt = direction.truncate().length() / -direction.z;
-        let first = -(near * tilt / spacing).ceil() as i32;
+        let first = -(near * input.tilt / spacing).ceil() as i32;
         let end = (input.deepest + BEYOND * shaft).min(input.exit);
         let count = (end / spacing).floor().max(2.0) as i32;
-        let stations: Vec<OpeningStation> = (first..count).map(|i| station(mesh, input, i, spacing, near)).collect();
+        let stations: Vec<OpeningStation> =
+            (first..count).map(|i| station((mesh, places), input, i, spacing, near)).collect();
         // A volume at the wall of the hole grows by R^2 s0/a^4: by a thousandth.
         let least = 0.03 * stations.iter().map(|s| s.hole).fold(f64::INFINITY, f64::min).powi(2) / shaft;
         let average = (1.45 * shaft).max(1.5 * input.cell_size);
@@ -331,16 +313,23 @@ impl OpeningPlan {
             averaged: ((average / spacing).round() as usize).max(1) / 2,
             nodes_follow: NODES_FOLLOW * input.node_way,
         };
-        plan.cells = near_cells(mesh, input, &plan, near, f64::from(count) * spacing);
+        plan.cells = near_cells((mesh, places), input, &plan, near, f64::from(count) * spacing);
         plan.longest_span = plan.cells.iter().map(|near| near.count).max().unwrap_or(0);
         plan.nodes = plan.stations.iter().flat_map(|s| &s.nodes).copied().collect();
-        let corners = plan.cells.iter().flat_map(|near| mesh.cell_nodes(near.cell as usize));
-        plan.nodes.extend(corners.map(|n| n as u32));
+        for near in &plan.cells {
+            plan.nodes.extend(mesh.cell_nodes(near.cell as usize).iter().map(|n| *n as u32));
+        }
         plan
     }
 }
 
-fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, near: f64) -> OpeningStation {
+fn station(
+    (mesh, places): (&Mesh, &Places),
+    input: &OpeningInput,
+    number: i32,
+    spacing: f64,
+    near: f64,
+) -> OpeningStation {
     let depth = (f64::from(number) + 0.5) * spacing;
     let direction = input.line.piece(depth).direction;
     let (e1, e2) = lateral_axes(direction);
@@ -357,7 +346,7 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, ne
         let mut count = 0.0;
         for r in radii {
             for i in 0..directions {
-                let Place { corners, weights, .. } = place_in(mesh, at(*r, (i as f64 + 0.5) / directions as f64));
+                let Place { corners, weights, .. } = places.place(at(*r, (i as f64 + 0.5) / directions as f64));
                 count += 1.0;
                 for (node, w) in corners.iter().zip(weights) {
                     *sums.entry(nodes.place(*node)).or_default() += w;
@@ -374,7 +363,8 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, ne
     };
     let [centre_at_rest, disc_at_rest] = [at_rest(&centre), at_rest(&disc)];
     let long = (near / hole).ln();
-    let is_coarse = input.cell_size >= STATIONS_IN_CELL * spacing;
+    let edge = places.edge(input.cell_size);
+    let is_coarse = edge >= STATIONS_IN_CELL * spacing;
     let mut points = Vec::new();
     for (ring, (x, w)) in GAUSS.into_iter().enumerate() {
         let place = ring as i32 + number;
@@ -387,11 +377,11 @@ fn station(mesh: &BlockMesh, input: &OpeningInput, number: i32, spacing: f64, ne
         // Neighbours along and across are turned against each other, and none lies on a plane of the grid.
         let turn = if row.rem_euclid(2) == 0 { 0.25 } else { 0.75 };
         // About one in every cell that a ring runs through.
-        let angles = 4 * (std::f64::consts::TAU * r / input.cell_size / 4.0).ceil() as usize;
+        let angles = 4 * (std::f64::consts::TAU * r / edge / 4.0).ceil() as usize;
         let volume = 0.5 * long * w * r * r * std::f64::consts::TAU / angles as f64 * length;
         for i in 0..angles {
             let place = at(r, (i as f64 + turn) / angles as f64);
-            let Place { cell, corners, weights, gradients, local, inside } = place_in(mesh, place);
+            let Place { cell, corners, weights, gradients, local, inside } = places.place(place);
             if !inside {
                 continue;
             }
@@ -437,62 +427,54 @@ fn clusters_of(stations: &[OpeningStation]) -> Vec<Cluster> {
 }
 
 /// Cells that the map reaches, with the part of their volume outside of the zone of points.
-fn near_cells(mesh: &BlockMesh, input: &OpeningInput, plan: &OpeningPlan, near: f64, end: f64) -> Vec<NearCell> {
-    const SAMPLES: usize = 12;
-    let faded = crate::needle::opening::FADED * plan.shaft;
+fn near_cells(
+    (mesh, places): (&Mesh, &Places),
+    input: &OpeningInput,
+    plan: &OpeningPlan,
+    near: f64,
+    end: f64,
+) -> Vec<NearCell> {
+    let faded = FADED * plan.shaft;
     let last = plan.stations.len() - 1;
     let first = plan.stations[0].depth - 0.5 * plan.spacing;
     let coordinates = |x: DVec3| input.line.coordinates(x);
-    let mut cells: Vec<NearCell> = (0..mesh.cell_count())
-        .filter_map(|cell| {
-            let size = mesh.cell_size(cell);
-            let low = mesh.rest_position(mesh.cell_nodes(cell)[0]);
-            let (r, s) = coordinates(low + 0.5 * size);
-            let reach = 0.5 * size.length();
-            // No place of it is reached, where it is at rest.
-            if r > faded + VOLUME_PLACE * reach || s > end + reach {
-                return None;
-            }
-            let (share, place) = match r > near + reach {
-                true => (1.0, DVec3::ZERO),
-                false => {
-                    let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
-                    let samples = (0..SAMPLES.pow(3))
-                        .map(|n| DVec3::new(part(n % SAMPLES), part(n / SAMPLES % SAMPLES), part(n / SAMPLES.pow(2))));
-                    let outside = samples.filter(|at| {
-                        let (r0, s0) = coordinates(low + *at * size);
-                        r0 > near || s0 > end || s0 < first
-                    });
-                    let (count, sum) = outside.fold((0usize, DVec3::ZERO), |(n, sum), at| (n + 1, sum + (at - 0.5)));
-                    (count as f64 / SAMPLES.pow(3) as f64, sum / count.max(1) as f64)
-                }
-            };
-            // Half of its extent along the path, of a sphere where the path is oblique.
-            let t = input.line.piece(s).direction.abs();
-            let half = 0.5 * size.dot(t * t);
-            let index = |s: f64| (((s - first) / plan.spacing).round().max(0.0) as usize).min(last + 1);
-            let (from, to) = (index(s - half), index(s + half));
-            let nearest = (((s - first) / plan.spacing).max(0.0) as usize).min(last);
-            let (from, to) = if to > from { (from, to) } else { (nearest, nearest + 1) };
-            Some(NearCell {
-                cell: cell as u32,
-                share,
-                place,
-                growth: [0.0; 2],
-                first: from as u16,
-                count: (to - from) as u16,
-            })
+    let of_cell = |cell: usize| {
+        let (middle, reach) = places.middle(cell);
+        let (r, s) = coordinates(middle);
+        // No place of it is reached, where it is at rest.
+        if r > faded + VOLUME_PLACE * reach || s > end + reach {
+            return None;
+        }
+        let (share, place) = match r > near + reach {
+            true => (1.0, DVec3::ZERO),
+            false => places.part(cell, |x| {
+                let (r0, s0) = coordinates(x);
+                r0 > near || s0 > end || s0 < first
+            }),
+        };
+        let half = places.half_along(cell, input.line.piece(s).direction);
+        let index = |s: f64| (((s - first) / plan.spacing).round().max(0.0) as usize).min(last + 1);
+        let (from, to) = (index(s - half), index(s + half));
+        let nearest = (((s - first) / plan.spacing).max(0.0) as usize).min(last);
+        let (from, to) = if to > from { (from, to) } else { (nearest, nearest + 1) };
+        Some(NearCell {
+            cell: cell as u32,
+            share,
+            place,
+            growth: [0.0; 2],
+            first: from as u16,
+            count: (to - from) as u16,
         })
-        .collect();
+    };
+    let mut cells: Vec<NearCell> = places.cells().into_iter().filter_map(of_cell).collect();
     cells.sort_by_key(|near| (near.first, near.count));
     let grown = growth_in_cells(&plan.stations);
     for near in &mut cells {
         let station = &plan.stations[usize::from(near.first + near.count / 2)];
-        let (cell, size) = (near.cell as usize, mesh.cell_size(near.cell as usize));
-        let at = mesh.rest_position(mesh.cell_nodes(cell)[0]) + (near.place + 0.5) * size;
-        let rest = station.growth.rate(coordinates(at).0.powi(2));
+        let cell = near.cell as usize;
+        let rest = station.growth.rate(coordinates(places.middle(cell).0 + near.place).0.powi(2));
         let [first, second] = grown.get(&near.cell).copied().unwrap_or_default();
-        let volume = size.element_product();
+        let volume = mesh.cell_volume(cell);
         let mean = first / volume + near.share * rest;
         near.growth = [mean, (second / volume + near.share * rest * rest - mean * mean).max(0.0)];
     }

@@ -203,10 +203,10 @@ impl Model {
         let deepest = deepest.min(exit);
         let surfaces = self.separated_surfaces(&path);
         let anchors = match opening {
-            true if has_turned => {
-                disc_offsets(&path, &needle).map(|o| TipAnchor { surface: path.entry + o, axial_offset: 0.0 }).collect()
-            }
-            true => disc_offsets(&path, &needle).map(|o| anchor_beside(&path, o, case)).collect(),
+            true if has_turned => disc_offsets(path.direction, &needle)
+                .map(|o| TipAnchor { surface: path.entry + o, axial_offset: 0.0 })
+                .collect(),
+            true => disc_offsets(path.direction, &needle).map(|o| anchor_beside(&path, o, case)).collect(),
             false => tip_anchors(&path, &needle, self.effects.cohesive.is_some(), case),
         };
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the outermost anchor, and a path that is laid beside
@@ -248,7 +248,8 @@ impl Model {
         self.puncture =
             Some(self.puncture_plan(params, needle, path, Way { segments, anchors, lines: Vec::new(), exit, cells }));
         if opening {
-            self.plan_opening(&line, deepest);
+            let direction = line.piece(0.0).direction;
+            self.plan_opening(&line, deepest, direction.truncate().length() / -direction.z);
         }
     }
 
@@ -301,17 +302,19 @@ impl Model {
         }
     }
 
-    /// The scheme `opening` on the path along `line`, down to the material coordinate `deepest` [m].
-    fn plan_opening(&mut self, line: &PathLine, deepest: f64) {
-        let (Some(mesh), Some(plan)) = (self.mesh.as_block(), &self.puncture) else { return };
+    /// The scheme `opening` on the path along `line`, down to the material coordinate `deepest` [m]; `tilt`: of the path against the surface,
+    /// tangent of the angle with its normal.
+    pub(super) fn plan_opening(&mut self, line: &PathLine, deepest: f64, tilt: f64) {
+        let Some(plan) = &self.puncture else { return };
         let opening = OpeningPlan::new(
-            mesh,
+            &self.mesh,
             &OpeningInput {
                 line,
                 needle: &plan.needle,
                 deepest,
                 exit: plan.exit,
                 cell_size: self.scene.tissue.cell_size,
+                tilt,
                 shear_modulus: self.scene.material.law.shear_modulus(),
                 p_wave_modulus: self.scene.material.law.p_wave_modulus(),
                 node_way: self.speed_limit(1.0),
@@ -367,9 +370,17 @@ impl Model {
 
     /// Prony terms of the tissue in which a station lies.
     pub fn terms_at(&self, station: &OpeningStation) -> &[Term] {
-        let Mesh::Block(block) = &self.mesh else { return &[] };
-        let ([i, j, k], _) = block.locate(station.middle);
-        let material = self.material(block.cell_index(i, j, k));
+        let cell = match &self.mesh {
+            Mesh::Block(block) => {
+                let ([i, j, k], _) = block.locate(station.middle);
+                block.cell_index(i, j, k)
+            }
+            Mesh::Tets(tets) => match tets.locate(station.middle) {
+                Some((cell, _)) => cell,
+                None => return &[],
+            },
+        };
+        let material = self.material(cell);
         material.viscoelastic.as_ref().map_or(&[], |series| series.terms.as_slice())
     }
 
@@ -510,8 +521,8 @@ impl PlannedPath {
 
 /// Places across the path of the lines on which the tip acts in the scheme `opening`: each stands for the same part of a disc of the radius
 /// [`DISC`] R.
-fn disc_offsets(path: &PlannedPath, needle: &NeedleShape) -> impl Iterator<Item = DVec3> {
-    let (e1, e2) = lateral_axes(path.direction);
+pub fn disc_offsets(direction: DVec3, needle: &NeedleShape) -> impl Iterator<Item = DVec3> + use<> {
+    let (e1, e2) = lateral_axes(direction);
     let within = |ring: usize| (1 + 3 * ring * (ring + 1)) as f64;
     let radius_of_needle = needle.radius;
     (0..=RINGS).flat_map(move |ring| {

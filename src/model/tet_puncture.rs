@@ -4,10 +4,11 @@ use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
-use super::puncture::Way;
+use super::puncture::{Way, disc_offsets};
 use super::{ContactNode, Model, PathCell, PuncturePlan, TipAnchor};
-use crate::effects::puncture;
+use crate::effects::puncture::{self, SchemeWord};
 use crate::mesh::{Mesh, TetLine, TetMesh, TetPath};
+use crate::needle::path_line::PathLine;
 use crate::needle::{NeedleShape, PlannedPath, tip_lines};
 
 /// Points per edge of the cube that is folded into a tetrahedron to ask where the path passes; 816 of them differ.
@@ -22,7 +23,8 @@ impl Model {
     pub(super) fn plan_puncture_of_tets(&mut self, params: puncture::Params, needle: NeedleShape) {
         let Mesh::Tets(mesh) = &self.mesh else { return };
         let motion = &self.scene.motion;
-        let offsets = tip_lines(motion.direction, needle.radius, 0.0, true);
+        let opening = params.scheme == SchemeWord::Opening;
+        let offsets = lines_of_tip(motion.direction, &needle, params.scheme);
         let Ok(way) = TetPath::new(mesh, motion.entry, motion.direction, &offsets) else {
             // The needle passes by, and touches nothing.
             let effects = &mut self.effects;
@@ -60,6 +62,20 @@ impl Model {
         let plan = self.puncture_plan(params, needle, path, Way { segments, anchors, lines: way.lines, exit, cells });
         self.contact_nodes = contact_nodes;
         self.puncture = Some(plan);
+        if opening {
+            let into = -path.direction.dot(path.normal);
+            let tilt = (path.normal + path.direction * into).length() / into;
+            let line = PathLine::straight(path.entry, path.direction);
+            self.plan_opening(&line, deepest.min(exit), tilt);
+        }
+    }
+}
+
+/// Places across a path of the lines on which the tip acts, from its axis [m]: those of the scheme.
+pub fn lines_of_tip(direction: DVec3, needle: &NeedleShape, scheme: SchemeWord) -> Vec<DVec3> {
+    match scheme {
+        SchemeWord::Opening => disc_offsets(direction, needle).collect(),
+        SchemeWord::Ring => tip_lines(direction, needle.radius, 0.0, true),
     }
 }
 
@@ -130,7 +146,7 @@ fn path_cells(mesh: &TetMesh, path: &PlannedPath, params: &puncture::Params, dee
 
 /// Barycentric coordinates of points all over a tetrahedron, and the part of its volume that each stands for: the midpoints of small cubes
 /// with `u >= v >= w`, which is one of the six tetrahedra that a cube falls into; points on its faces belong to several of them.
-fn lattice() -> Vec<([f64; 4], f64)> {
+pub(super) fn lattice() -> Vec<([f64; 4], f64)> {
     let mut points = Vec::new();
     for i in 0..SAMPLES {
         for j in 0..=i {

@@ -120,7 +120,7 @@ pub fn snapshot(
     let targets = model.scene.targets.iter().zip(&model.targets);
     fields.targets = targets.map(|(target, point)| target.position + point.value(&state.displacement)).collect();
     let states = CellStates { points: &state.points, stiffness: &state.stiffness };
-    let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
+    let averaged = elements.averaged_volumetrics(model, &state.displacement, states, &[]);
     let fresh = PointState::default();
     for (cell, h) in gradients.into_iter().enumerate() {
         let f = DMat3::IDENTITY + h;

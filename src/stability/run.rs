@@ -158,7 +158,7 @@ fn prepared(mut scene: Scene, part: &Part, engine: EngineChoice) -> Result<(Simu
 fn energy(model: &Model, state: &State) -> f64 {
     let elements = Elements::new(model);
     let states = CellStates { points: &state.points, stiffness: &state.stiffness };
-    let averaged = elements.averaged_volumetrics(model, &state.displacement, states);
+    let averaged = elements.averaged_volumetrics(model, &state.displacement, states, &[]);
     let cell = |cell: usize| {
         let volumetric = averaged.as_ref().map(|a| a[cell]);
         let measure = elements.measure(model, cell, &state.displacement, volumetric, states);

@@ -126,7 +126,7 @@ fn nodal_forces_of_the_reference_tetrahedra() {
             at_most(&format!("{name}, {}", case["case"]), difference / scale, tolerance);
         }
         let elements = Elements::new(&model);
-        let averaged = elements.averaged_volumetrics(&model, &u, CellStates::default()).unwrap();
+        let averaged = elements.averaged_volumetrics(&model, &u, CellStates::default(), &[]).unwrap();
         let energy = elements.measure(&model, 0, &u, Some(averaged[0]), CellStates::default()).elastic;
         let expected = number(&case["energy_J"]);
         assert!((energy - expected).abs() <= 1e-9 * expected.abs() + 1e-18, "{}: {energy} {expected}", case["case"]);
@@ -209,7 +209,7 @@ fn forces_are_the_gradient_of_the_energy() {
         let mut cpu = CpuEngine::new(model.clone(), 1e-6);
         let elements = Elements::new(&model);
         let energy = |u: &[DVec3]| -> f64 {
-            let averaged = elements.averaged_volumetrics(&model, u, CellStates::default()).unwrap();
+            let averaged = elements.averaged_volumetrics(&model, u, CellStates::default(), &[]).unwrap();
             let cells = 0..model.mesh.cell_count();
             cells.map(|c| elements.measure(&model, c, u, Some(averaged[c]), CellStates::default()).elastic).sum()
         };

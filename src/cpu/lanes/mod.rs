@@ -24,7 +24,7 @@ use self::tets::LaneTets;
 use super::integrate_nodes::{NodeStep, NodeSums};
 use super::team::Team;
 use crate::effects::TissueMaterial;
-use crate::engine::elements::{CellForces, CellMeasure, CellStates, Elements};
+use crate::engine::elements::{CellForces, CellMeasure, CellStates, Elements, Grown};
 use crate::material::Isochoric;
 use crate::material::law::IsochoricLaw;
 use crate::material::regular::{Exponential, Polynomial};
@@ -97,19 +97,27 @@ impl LaneCells {
         }
     }
 
-    /// Forces and bounds of all cells at the nodes, for this displacement and the stiffness that a path left (empty: all of it). `advance`:
-    /// step [s] and number of the step that histories are brought forward to; `None`: they stay.
+    /// Forces and bounds of all cells at the nodes, for this displacement, the tetrahedra that grow beside an opened path and the stiffness that a
+    /// path left (empty: all of it). `advance`: step [s] and number of the step that histories are brought forward to; `None`: they stay.
     pub fn compute(
         &mut self,
         model: &Model,
         elements: &Elements,
-        displacement: &[DVec3],
+        (displacement, grown): (&[DVec3], &[Grown]),
         stiffness: &[f64],
         advance: Option<(f64, u64)>,
     ) {
         match self {
             LaneCells::Block(cells) => cells.compute(model, elements, displacement, stiffness, advance),
-            LaneCells::Tets(cells) => cells.compute(model, elements, displacement, stiffness, advance),
+            LaneCells::Tets(cells) => cells.compute(model, elements, (displacement, grown), stiffness, advance),
+        }
+    }
+
+    /// Averaged pressure of a tetrahedron in the last forces [Pa]; none of hexahedra, which have their own.
+    pub fn averaged_pressure(&self, nodes: &[usize]) -> f64 {
+        match self {
+            LaneCells::Block(_) => 0.0,
+            LaneCells::Tets(cells) => cells.averaged_pressure(nodes),
         }
     }
 

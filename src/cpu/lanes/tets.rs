@@ -15,7 +15,7 @@ use super::tet_vectors::{Deformed, Forces};
 use super::{LaneMaterial, WIDEST, materials_of, threads_for};
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
-use crate::engine::elements::{Elements, cells_of_nodes};
+use crate::engine::elements::{Elements, Grown, cells_of_nodes};
 use crate::material_point::PointState;
 use crate::mesh::TetMesh;
 use crate::model::Model;
@@ -146,6 +146,15 @@ impl TetShapes {
         &self.around[self.offsets[node] as usize..self.offsets[node + 1] as usize]
     }
 
+    /// Adds to the volume changes of all slots that of tetrahedra which grow beside an opened path.
+    fn grow(&self, grown: &[Grown], changes: &mut [f32]) {
+        for Grown { cell, by } in grown {
+            let slot = self.slots[*cell as usize] as usize;
+            let volume = self.constants[(slot / WIDEST * SHAPE + SHAPE - 1) * WIDEST + slot % WIDEST];
+            changes[slot] += *by as f32 * (0.25 * volume + changes[slot]);
+        }
+    }
+
     /// Pressure of the nodes from `first` on [Pa]: `K_a (Jbar_a - 1)`, from the volume changes `V_e/4 (J_e - 1)` of all slots.
     fn average(&self, changes: &[f32], first: usize, pressures: &mut [f32]) {
         for (i, pressure) in pressures.iter_mut().enumerate() {
@@ -250,7 +259,7 @@ impl LaneTets {
         &mut self,
         model: &Model,
         elements: &Elements,
-        displacement: &[DVec3],
+        (displacement, grown): (&[DVec3], &[Grown]),
         stiffness: &[f64],
         advance: Option<(f64, u64)>,
     ) {
@@ -264,6 +273,7 @@ impl LaneTets {
         let parts = gradients.chunks_mut(part * WIDEST * GRADIENT).zip(changes.chunks_mut(part * WIDEST));
         let deformed = Deformed { shapes, places, displacement, mesh: &model.mesh };
         team.map(parts.collect::<Vec<_>>(), |i, (gradients, changes)| deformed.compute(i * part, gradients, changes));
+        shapes.grow(grown, changes);
         let of_nodes = team.part(pressures.len());
         team.map(pressures.chunks_mut(of_nodes), |i, p| shapes.average(changes, i * of_nodes, p));
         let of_cells = Forces { shapes, gradients, pressures, model, elements, displacement, points, advance };
@@ -279,6 +289,11 @@ impl LaneTets {
         let line = super::nodes::NODE * LINE;
         let part = team.part(nodes.numbers.len() / line);
         team.map(nodes.numbers.chunks_mut(part * line), |i, numbers| shapes.gather(forces, i * part, numbers));
+    }
+
+    /// Mean pressure of the nodes of a tetrahedron in the last forces [Pa].
+    pub fn averaged_pressure(&self, nodes: &[usize]) -> f64 {
+        nodes.iter().map(|node| 0.25 * f64::from(self.pressures[*node])).sum()
     }
 
     /// Takes in what the points remember.

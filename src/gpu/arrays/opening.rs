@@ -324,15 +324,17 @@ fn slots(
     sum_slot += opening.cells.len() as u32;
     let run_of = |cell: usize| runs.partition_point(|run| run.1 <= cell) as u32;
     for (index, near) in opening.cells.iter().enumerate() {
-        let (place, middle, inverse) = cell_of(model, mesh, entry, near.cell as usize);
+        let (number, middle, inverse) = cell_of(model, mesh, entry, near.cell as usize);
         let area = opening.shaft * opening.shaft;
         let [mean, variance] = near.growth;
+        // In edges of the cell.
+        let place = near.place / mesh.cell_size(near.cell as usize);
         tables.cells.push(OpeningCell {
-            cell: place,
+            cell: number,
             stations: [run_of(index), 0, 0, 0],
             middle: [middle[0], middle[1], middle[2], (mean * area) as f32],
             inverse: [inverse[0], inverse[1], inverse[2], (variance * area * area) as f32],
-            place: [near.place.x as f32, near.place.y as f32, near.place.z as f32, near.share as f32],
+            place: [place.x as f32, place.y as f32, place.z as f32, near.share as f32],
         });
         let stations = &opening.stations[usize::from(near.first)..][..usize::from(near.count)];
         corners_of(near.cell as usize, slot, stations.iter().map(|s| s.depth.abs()).fold(f64::INFINITY, f64::min));

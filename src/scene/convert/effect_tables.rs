@@ -170,11 +170,11 @@ impl Check<'_> {
     }
 
     /// What the scheme `opening` does not carry yet.
-    pub(super) fn opening_limits(&mut self, effects: &EffectSet, tool: Option<&Tool>, tets: bool) {
+    pub(super) fn opening_limits(&mut self, effects: &EffectSet, tool: Option<&Tool>) {
         if effects.puncture.is_none_or(|p| p.scheme != SchemeWord::Opening) {
             return;
         }
-        let found = not_opened(effects, tool, tets);
+        let found = not_opened(effects, tool, false);
         if !found.is_empty() {
             self.problems.report(
                 "puncture.scheme",

@@ -183,7 +183,7 @@ impl Check<'_> {
         self.scheme_of_the_scene(file, &mut effects, tool.as_ref(), &material, &regions);
         self.cuttings(file, &tool, &effects, (&mut material, preset), (&mut regions, region_presets));
         let solver = self.solver(&file.solver, tool.is_some(), effects.puncture.is_some(), tissue.cell_size);
-        self.opening_limits(&effects, tool.as_ref(), mesh.is_some());
+        self.opening_limits(&effects, tool.as_ref());
         self.case_limits(&effects, &motion, case.is_some(), &regions);
         self.opening_toughness(&effects, tool.as_ref(), &material, &regions, file);
         let outputs = self.outputs(&file.outputs, &motion, tool.is_some(), solver.duration);

@@ -271,7 +271,7 @@ impl LaneOpening {
                 let (edges, nodes) = (block.cell_size(cell), nodes_of(cell));
                 let quarter = 0.25 / edges;
                 layers[layer_of(cell)].cells.push(number as u32);
-                let [width, place] = [edges / shaft, near.place * edges / shaft];
+                let [width, place] = [edges / shaft, near.place / shaft];
                 let values = [
                     width.x,
                     width.y,
