@@ -2,7 +2,7 @@
 #import shared/opening_cluster
 
 struct OpeningCell {
-    // Cell, w: index of its material.
+    // Cell, of tetrahedra its number; w: index of its material.
     cell: vec4<u32>,
     // Run of cells that it is of; the others unused.
     stations: vec4<u32>,
@@ -15,9 +15,37 @@ struct OpeningCell {
 
 @group(1) @binding(23) var<storage, read> near_cells: array<OpeningCell>;
 
-// Places of Gauss' rule of two points per axis, four of eight, no two on one edge: as good to second order, and all four across a path along
-// an edge.
-fn volume_place(i: u32) -> vec3<f32> {
-    let signs = vec3<f32>(vec3<u32>(i & 1u, i >> 1u, (i ^ (i >> 1u)) & 1u)) * 2.0 - 1.0;
-    return signs * 0.28867513;
+// What an opened path makes of the volume of a cell, over that with the closed path, less one; derivatives by place and radius, and the moment of
+// the former about the middle of the cell, in edges.
+struct Dilated {
+    less_one: f32,
+    rates: vec4<f32>,
+    moments: mat3x3<f32>,
+}
+
+// `middle`: of the cell from that of the path, across it [R]; `lateral`: by what that changes along the edges of the cell [R].
+fn dilated_cell(cell: OpeningCell, section: PathSection, middle: vec3<f32>, lateral: mat3x3<f32>) -> Dilated {
+    var out: Dilated;
+    for (var i = 0u; i < 4u; i++) {
+        let p = volume_place(cell.cell.xyz, i);
+        let eta = middle + lateral * p;
+        let d = dilation(section, dot(eta, eta));
+        let by_place = eta * (2.0 * d.y);
+        out.less_one += 0.25 * (d.x - 1.0);
+        out.rates += vec4<f32>(by_place, d.z);
+        out.moments += outer(by_place, p);
+    }
+    // What grows near the path.
+    out.less_one += section.radius * section.radius * cell.middle.w;
+    return out;
+}
+
+// By what a place across the path changes along the edges of a cell [R].
+fn lateral_edges(gradient: mat3x3<f32>, width: vec3<f32>) -> mat3x3<f32> {
+    let scale = 1.0 / opening.direction.w;
+    return mat3x3<f32>(
+        across(gradient[0]) * (width.x * scale),
+        across(gradient[1]) * (width.y * scale),
+        across(gradient[2]) * (width.z * scale),
+    );
 }

@@ -3,17 +3,17 @@
 #import shared/displacement
 
 struct OpeningCluster {
-    // Cell, w: index of its material.
+    // Cell, of tetrahedra its number; w: index of its material.
     cell: vec4<u32>,
     // First point, end; zw unused.
     points: vec4<u32>,
-    // Middle of the cell from the entry of the path [m]; one over its edges [1/m]. w unused.
+    // Middle of the cell from the entry of the path [m]; one over its edges, of a tetrahedron those of the cube of its volume [1/m]. w unused.
     middle: vec4<f32>,
     inverse: vec4<f32>,
 }
 
 struct OpeningPoint {
-    // Place in the cell from its middle, -1/2..1/2; w: rest volume [m^3].
+    // Place in the cell from its middle in edges; w: rest volume [m^3].
     place: vec4<f32>,
     // Station; the sum that its derivatives go into, and 1 at the last point of that sum. w unused.
     numbers: vec4<u32>,
@@ -25,8 +25,14 @@ struct OpeningPoint {
 @group(3) @binding(20) var<storage, read> path_stations: array<OpeningStation>;
 @group(2) @binding(0) var<storage, read> node_displacement: array<vec4<i32>>;
 
+#ifdef TETRAHEDRA
+#import shared/opening_tetrahedron
+#else
+#import shared/opening_hexahedron
+#endif
+
 // Displacement in a cell as `mean + p.x x + p.y y + p.z z + p.x p.y xy + p.y p.z yz + p.z p.x zx + p.x p.y p.z xyz`, with the place p from
-// the middle, -1/2..1/2; forces on the same.
+// the middle in edges; forces on the same. A tetrahedron has the first four.
 struct CellModes {
     mean: vec3<f32>,
     x: vec3<f32>,
@@ -36,29 +42,6 @@ struct CellModes {
     yz: vec3<f32>,
     zx: vec3<f32>,
     xyz: vec3<f32>,
-}
-
-fn cell_modes(cell: vec3<u32>) -> CellModes {
-    // In integers: differences stay exact.
-    let first = (cell.z * NODES_Y + cell.y) * NODES_X + cell.x;
-    let origin = node_displacement[first].xyz;
-    var m: CellModes;
-    for (var corner = 0u; corner < 8u; corner++) {
-        let bit = vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u);
-        let node = first + (bit.z * NODES_Y + bit.y) * NODES_X + bit.x;
-        let u = vec3<f32>(node_displacement[node].xyz - origin) * DISPLACEMENT_UNIT;
-        let s = vec3<f32>(bit) * 2.0 - 1.0;
-        m.mean += u * 0.125;
-        m.x += u * (0.25 * s.x);
-        m.y += u * (0.25 * s.y);
-        m.z += u * (0.25 * s.z);
-        m.xy += u * (0.5 * s.x * s.y);
-        m.yz += u * (0.5 * s.y * s.z);
-        m.zx += u * (0.5 * s.z * s.x);
-        m.xyz += u * (s.x * s.y * s.z);
-    }
-    m.mean += vec3<f32>(origin) * DISPLACEMENT_UNIT;
-    return m;
 }
 
 // End of points first and end of a cluster that are opened: none where the first is not cut.
@@ -78,11 +61,4 @@ fn strain_at(m: CellModes, p: vec3<f32>, inverse: vec3<f32>) -> mat3x3<f32> {
         (m.y + m.yz * p.z + m.xy * p.x + m.xyz * (p.z * p.x)) * inverse.y,
         (m.z + m.zx * p.x + m.yz * p.y + m.xyz * (p.x * p.y)) * inverse.z,
     );
-}
-
-// Force on a corner from those on the modes.
-fn force_on_corner(m: CellModes, corner: u32) -> vec3<f32> {
-    let s = vec3<f32>(vec3<u32>(corner & 1u, (corner >> 1u) & 1u, corner >> 2u)) * 2.0 - 1.0;
-    return m.mean * 0.125 + (m.x * s.x + m.y * s.y + m.z * s.z) * 0.25
-        + (m.xy * (s.x * s.y) + m.yz * (s.y * s.z) + m.zx * (s.z * s.x)) * 0.5 + m.xyz * (s.x * s.y * s.z);
 }

@@ -37,17 +37,18 @@ fn measure_opening(@builtin(global_invocation_id) id: vec3<u32>) {
             let width = 1.0 / cell.inverse.xyz;
             let volume = width.x * width.y * width.z;
             let middle = cell.middle.xyz + modes.mean - mean.centre.xyz;
-            var dilated = 0.0;
-            for (var i = 0u; i < 4u; i++) {
-                let eta = across(middle + gradient * (volume_place(i) * width)) * scale;
-                dilated += 0.25 * (dilation(section, dot(eta, eta)).x - 1.0);
-            }
+            let lateral = lateral_edges(gradient, width);
+            let dilated = dilated_cell(cell, section, across(middle) * scale, lateral).less_one;
             let area = section.radius * section.radius;
-            dilated += area * cell.middle.w;
             let dj = jacobian_minus_one(H);
-            let open = dj + (1.0 + dj) * dilated;
-            energy += 0.5 * materials[cell.cell.w].bulk_modulus * volume
-                * (open * open - dj * dj + (1.0 + dj) * (1.0 + dj) * area * area * cell.inverse.w);
+            let J = 1.0 + dj;
+            var by_volume = J * J * area * area * cell.inverse.w;
+#ifndef TETRAHEDRA
+            // That of tetrahedra is in the averaged dilatation.
+            let open = dj + J * dilated;
+            by_volume += open * open - dj * dj;
+#endif
+            energy += 0.5 * materials[cell.cell.w].bulk_modulus * volume * by_volume;
             energy += section.left * energy_of_shape(cell, mean, modes, H);
         }
     }

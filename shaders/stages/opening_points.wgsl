@@ -11,7 +11,7 @@ var<workgroup> shares: array<vec4<f32>, 512>;
 var<workgroup> totals: array<vec4<f32>, 64>;
 #endif
 
-// f_int on the eight corners of a slot [N]; w: bound of the stiffness there [N/m].
+// f_int on the corners of a slot [N]; w: bound of the stiffness there [N/m].
 @group(3) @binding(21) var<storage, read_write> opening_corners: array<vec4<f32>>;
 @group(3) @binding(22) var<storage, read_write> opening_sums: array<OpeningSum>;
 
@@ -39,9 +39,17 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
     let inverse = cluster.inverse.xyz;
     let scale = 1.0 / opening.direction.w;
     var f: CellModes;
-    // Of the corners below, and of those above.
+#ifdef TETRAHEDRA
+    let lengths = gradient_lengths(cluster.cell.xyz);
+    let all_lengths = dot(lengths, vec4<f32>(1.0));
+    // Bounds at all corners.
+    var lower = vec4<f32>(0.0);
+    let upper = vec4<f32>(0.0);
+#else
+    // Bounds at the corners below, and at those above.
     var lower = vec4<f32>(0.0);
     var upper = vec4<f32>(0.0);
+#endif
     var sum = OpeningSum();
     let modes = cell_modes(cluster.cell.xyz);
     for (var i = first; i < end; i++) {
@@ -72,6 +80,9 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let grown = growth.x + growth.y * length(place.eta) * opening.direction.w;
         let stiffness = intact * (now.tangent * grown * grown
             + now.turned_tangent * squared_norm_bound(cofactor(deformation_gradient(H))));
+#ifdef TETRAHEDRA
+        lower += lengths * (all_lengths * stiffness);
+#else
         let nx = vec4<f32>(0.5 - p.x, 0.5 + p.x, 0.5 - p.x, 0.5 + p.x);
         let ny = vec4<f32>(0.5 - p.y, 0.5 - p.y, 0.5 + p.y, 0.5 + p.y);
         let flat = (nx * nx) * (inverse.y * inverse.y) + (ny * ny) * (inverse.x * inverse.x);
@@ -81,6 +92,7 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         let all = stiffness * dot(below + above, vec4<f32>(1.0));
         lower += below * all;
         upper += above * all;
+#endif
         sum.by_centre += vec4<f32>(-now.derivatives.place, now.derivatives.radius) * volume;
         sum.by_rate += vec4<f32>(now.derivatives.centre_rate, now.derivatives.radius_rate) * volume;
 #ifdef LAID
@@ -115,13 +127,15 @@ fn opening_points(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wor
         totals[own].xyz, totals[own + 1u].xyz, totals[own + 2u].xyz, totals[own + 3u].xyz,
         totals[own + 4u].xyz, totals[own + 5u].xyz, totals[own + 6u].xyz, totals[own + 7u].xyz,
     );
-    if (thread / PIECES == index) {
-        opening_corners[8u * index + piece] = vec4<f32>(force_on_corner(f, piece), total.w);
+    if (thread / PIECES == index && piece < CORNERS) {
+        opening_corners[CORNERS * index + piece] = vec4<f32>(force_on_corner(f, cluster.cell.xyz, piece), total.w);
     }
 #else
     for (var c = 0u; c < 4u; c++) {
-        opening_corners[8u * index + c] = vec4<f32>(force_on_corner(f, c), lower[c]);
-        opening_corners[8u * index + c + 4u] = vec4<f32>(force_on_corner(f, c + 4u), upper[c]);
+        opening_corners[CORNERS * index + c] = vec4<f32>(force_on_corner(f, cluster.cell.xyz, c), lower[c]);
+#ifndef TETRAHEDRA
+        opening_corners[CORNERS * index + c + 4u] = vec4<f32>(force_on_corner(f, cluster.cell.xyz, c + 4u), upper[c]);
+#endif
     }
 #endif
 }

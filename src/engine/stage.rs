@@ -15,6 +15,8 @@ pub enum Stage {
     SoftenFreePath,
     /// J and volumetric stiffness of every tetrahedron.
     MeasureDilatation,
+    /// By how much an opened path makes the tetrahedra around it grow.
+    OpeningDilatation,
     /// Dilatation and pressure of every node of a tetrahedral mesh.
     AveragePressure,
     /// Stress and stiffness bound of every tetrahedron, as forces on its corners.
@@ -63,13 +65,14 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 28] = [
+    pub const ALL: [Stage; 29] = [
         Stage::PathMeans,
         Stage::AdvanceTip,
         Stage::SoftenPath,
         Stage::AdvanceFreeTip,
         Stage::SoftenFreePath,
         Stage::MeasureDilatation,
+        Stage::OpeningDilatation,
         Stage::AveragePressure,
         Stage::TetrahedronForces,
         Stage::ElementForces,
@@ -104,6 +107,7 @@ impl Stage {
             Stage::AdvanceFreeTip => "advance_free_tip",
             Stage::SoftenFreePath => "soften_free_path",
             Stage::MeasureDilatation => "measure_dilatation",
+            Stage::OpeningDilatation => "opening_dilatation",
             Stage::AveragePressure => "average_pressure",
             Stage::TetrahedronForces => "tetrahedron_forces",
             Stage::ElementForces => "element_forces",
@@ -136,7 +140,7 @@ impl Stage {
 
     /// True for the stages that average the pressure of tetrahedra. A frame without a step has them all the same: its energies need them.
     pub fn averages(self) -> bool {
-        matches!(self, Stage::MeasureDilatation | Stage::AveragePressure)
+        matches!(self, Stage::MeasureDilatation | Stage::OpeningDilatation | Stage::AveragePressure)
     }
 
     /// True for the stages that give a window what it draws.

@@ -95,7 +95,7 @@ pub fn defines(effects: &EffectSet, features: &Features) -> Defines {
     define("TURNS", (features.free_path || features.laid) && effects.puncture.is_some() && !features.tetrahedra);
     define("FREE_PATH", features.free_path && effects.puncture.is_some() && !features.tetrahedra);
     define("WIDE", features.wide);
-    define("OPENING", features.opening && effects.puncture.is_some() && !features.tetrahedra);
+    define("OPENING", features.opening && effects.puncture.is_some());
     // The bulk stiffness of a cell is not that of all others.
     let weakens = effects.damage.is_some() || effects.puncture.is_some();
     define("VARYING_STIFFNESS", features.tetrahedra && (features.regions || weakens));
@@ -119,7 +119,7 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
     let puncture = effects.puncture.is_some();
     let indentation = effects.indentation.is_some();
     let cohesive = block && effects.cohesive.is_some();
-    let (free_path, opening) = (block && features.free_path, block && features.opening);
+    let (free_path, opening) = (block && features.free_path, features.opening);
     let wanted = |stage: &Stage| match stage {
         // Where faces separate no cell is softened, but a core is severed.
         Stage::SoftenPath => puncture && !opening && (!cohesive || features.bore) && !free_path,
@@ -137,6 +137,7 @@ pub fn stages(effects: &EffectSet, features: &Features) -> Vec<Stage> {
         Stage::IndenterContact => indentation,
         Stage::MeasureContact => puncture || indentation,
         Stage::MeasureDilatation | Stage::AveragePressure | Stage::TetrahedronForces => tetrahedra,
+        Stage::OpeningDilatation => tetrahedra && puncture && opening,
         Stage::ElementForces => block,
         Stage::MeasureFaces => features.driven_faces,
         Stage::CellFields | Stage::NodeFields => features.drawn,
@@ -161,7 +162,7 @@ pub fn threads(stage: Stage, model: &Model, layout: &Layout, grain: Grain) -> u3
         Stage::AveragePressure => model.mesh.node_count() as u32,
         Stage::ElementForces => layout.strips().busy_count(),
         Stage::OpeningPoints => opening_counts(model)[0] * grain.pieces() as u32,
-        Stage::OpeningCells => opening_counts(model)[1],
+        Stage::OpeningCells | Stage::OpeningDilatation => opening_counts(model)[1],
         Stage::OpeningNodes => opening_counts(model)[2] * grain.pieces() as u32,
         // A workgroup for each of what they sum.
         Stage::PathMeans => 64 * section_counts(model)[0],

@@ -13,7 +13,7 @@ use super::{Array, Source, Sums, bytes_of, read_all, to_bytes, vec4, vector, zer
 use crate::effects::viscoelastic::SectionRelaxation;
 use crate::gpu::grain::Grain;
 use crate::gpu::layout::Layout;
-use crate::mesh::{BlockMesh, CORNERS};
+use crate::mesh::{CORNERS, Mesh};
 use crate::model::Model;
 use crate::model::opening::{Cluster, NearCell, OpeningPlan};
 use crate::needle::opening::{Growth, GrowthIn, Station};
@@ -50,7 +50,7 @@ pub(super) const ARRAYS: &[Array] = &[
             to_bytes(&not_empty(&stations))
         },
     ),
-    Array::state("opening_corners", |s| zeros(8 * slot_count(s.model).max(1), 16)),
+    Array::state("opening_corners", |s| zeros(corner_count(s.model) * slot_count(s.model).max(1), 16)),
     Array::state("opening_sums", |s| zeros(sum_count(s.model, s.grain).max(1), size_of::<OpeningSum>())),
     Array::state("opening_record", |_| zeros(1, size_of::<OpeningRecord>())).exchanged(
         |bytes, _, state| {
@@ -153,6 +153,11 @@ fn sum_count(model: &Model, grain: Grain) -> u64 {
     model.opening().map_or(0, |o| count(o) as u64)
 }
 
+/// Corners of a cell.
+fn corner_count(model: &Model) -> u64 {
+    if model.mesh.as_block().is_some() { 8 } else { 4 }
+}
+
 /// Numbers of clusters and cells: slots of forces on corners.
 fn slot_count(model: &Model) -> u64 {
     model.opening().map_or(0, |o| (o.clusters.len() + o.cells.len()) as u64)
@@ -218,11 +223,28 @@ pub fn section_counts(model: &Model) -> [u32; 2] {
     model.opening().map_or([0; 2], |o| [o.stations.len(), runs_of(model).len()].map(|n| n as u32))
 }
 
-/// Place of a cell in the grid with its material, its middle from the entry of the path, one over its edges.
-fn cell_of(model: &Model, mesh: &BlockMesh, entry: DVec3, cell: usize) -> ([u32; 4], [f32; 4], [f32; 4]) {
-    let [i, j, k] = mesh.cell_coordinates(cell).map(|c| c as u32);
+/// Place of a cell in the grid (of a tetrahedron its number) with its material, its middle from the entry of the path, one over its edges.
+fn cell_of(model: &Model, entry: DVec3, cell: usize) -> ([u32; 4], [f32; 4], [f32; 4]) {
     let middle = model.mesh.cell_centre(cell) - entry;
-    ([i, j, k, model.material_index(cell) as u32], vec4(middle), vec4(1.0 / mesh.cell_size(cell)))
+    let [i, j, k] = match &model.mesh {
+        Mesh::Block(block) => block.cell_coordinates(cell).map(|c| c as u32),
+        Mesh::Tets(_) => [cell as u32, 0, 0],
+    };
+    ([i, j, k, model.material_index(cell) as u32], vec4(middle), vec4(1.0 / edges_of(&model.mesh, cell)))
+}
+
+/// Edges of a hexahedron; of a tetrahedron those of the cube of its volume [m].
+fn edges_of(mesh: &Mesh, cell: usize) -> DVec3 {
+    match mesh {
+        Mesh::Block(block) => block.cell_size(cell),
+        Mesh::Tets(tets) => DVec3::splat(tets.volume(cell).cbrt()),
+    }
+}
+
+/// Nodes of a cell, and its corners as the shaders count them.
+fn corners_of(mesh: &Mesh, cell: usize) -> impl Iterator<Item = (u32, usize)> {
+    let (nodes, is_block) = (mesh.cell_nodes(cell), mesh.as_block().is_some());
+    (0..nodes.len()).map(move |i| (nodes[i] as u32, if is_block { bits(CORNERS[i]) } else { i }))
 }
 
 /// What the slots tell: those of a station with their weights, and the corners of a node.
@@ -235,14 +257,14 @@ struct Told {
 
 pub(super) fn tables_of(model: &Model, layout: &Layout, grain: Grain) -> Tables {
     let mut tables = Tables::default();
-    let (Some(opening), Some(plan), Some(mesh)) = (model.opening(), &model.puncture, model.mesh.as_block()) else {
+    let (Some(opening), Some(plan)) = (model.opening(), &model.puncture) else {
         return tables;
     };
     let runs = runs_of(model);
     // First, so that a run has the place of its number.
     tables.entries = runs.iter().map(|run| run_entry(point_sums(opening, grain), *run)).collect();
-    let told = slots(&mut tables, model, opening, mesh, (plan.path.entry, &runs), grain);
-    lists(&mut tables, model, opening, mesh, layout, (plan.path.entry, &told));
+    let told = slots(&mut tables, model, opening, (plan.path.entry, &runs), grain);
+    lists(&mut tables, model, opening, layout, (plan.path.entry, &told));
     // Behind the stations, the means of those in a run of cells.
     tables.stations.extend(runs.iter().map(|(first, _)| {
         let NearCell { first, count, .. } = opening.cells[*first];
@@ -283,7 +305,6 @@ fn slots(
     tables: &mut Tables,
     model: &Model,
     opening: &OpeningPlan,
-    mesh: &BlockMesh,
     (entry, runs): (DVec3, &[(usize, usize)]),
     grain: Grain,
 ) -> Told {
@@ -291,21 +312,26 @@ fn slots(
     let mut corners: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     let mut cut_from: BTreeMap<u32, f64> = BTreeMap::new();
     let mut slot = 0u32;
-    let mut corners_of = |cell: usize, slot: u32, depth: f64| {
-        for (node, signs) in mesh.cell_nodes(cell).iter().zip(CORNERS) {
-            let first = cut_from.entry(*node as u32).or_insert(depth);
+    let count = corner_count(model) as u32;
+    let mut tell_corners = |cell: usize, slot: u32, depth: f64| {
+        for (node, corner) in corners_of(&model.mesh, cell) {
+            let first = cut_from.entry(node).or_insert(depth);
             *first = first.min(depth);
-            corners.entry(*node as u32).or_default().push(8 * slot + bits(signs) as u32);
+            corners.entry(node).or_default().push(count * slot + corner as u32);
         }
     };
     let mut sum_slot = 0u32;
     for cluster in &opening.clusters {
         let Cluster { cell, points } = cluster;
-        let (place, middle, inverse) = cell_of(model, mesh, entry, *cell as usize);
+        let (place, middle, inverse) = cell_of(model, entry, *cell as usize);
         let first = tables.points.len() as u32;
         for (i, (station, index)) in points.iter().enumerate() {
             let point = &opening.stations[*station].points[*index];
-            let local = point.local - 0.5;
+            let edges = edges_of(&model.mesh, *cell as usize);
+            let local = match &model.mesh {
+                Mesh::Block(_) => point.local - 0.5,
+                Mesh::Tets(_) => (point.place - model.mesh.cell_centre(*cell as usize)) / edges,
+            };
             let ends = sum_ends(cluster, i, grain);
             tables.points.push(OpeningPoint {
                 place: [local.x as f32, local.y as f32, local.z as f32, point.volume as f32],
@@ -318,17 +344,17 @@ fn slots(
         }
         let end = tables.points.len() as u32;
         tables.clusters.push(OpeningCluster { cell: place, points: [first, end, 0, 0], middle, inverse });
-        corners_of(*cell as usize, slot, opening.stations[points[0].0].depth.abs());
+        tell_corners(*cell as usize, slot, opening.stations[points[0].0].depth.abs());
         slot += 1;
     }
     sum_slot += opening.cells.len() as u32;
     let run_of = |cell: usize| runs.partition_point(|run| run.1 <= cell) as u32;
     for (index, near) in opening.cells.iter().enumerate() {
-        let (number, middle, inverse) = cell_of(model, mesh, entry, near.cell as usize);
+        let (number, middle, inverse) = cell_of(model, entry, near.cell as usize);
         let area = opening.shaft * opening.shaft;
         let [mean, variance] = near.growth;
         // In edges of the cell.
-        let place = near.place / mesh.cell_size(near.cell as usize);
+        let place = near.place / edges_of(&model.mesh, near.cell as usize);
         tables.cells.push(OpeningCell {
             cell: number,
             stations: [run_of(index), 0, 0, 0],
@@ -337,7 +363,7 @@ fn slots(
             place: [place.x as f32, place.y as f32, place.z as f32, near.share as f32],
         });
         let stations = &opening.stations[usize::from(near.first)..][..usize::from(near.count)];
-        corners_of(near.cell as usize, slot, stations.iter().map(|s| s.depth.abs()).fold(f64::INFINITY, f64::min));
+        tell_corners(near.cell as usize, slot, stations.iter().map(|s| s.depth.abs()).fold(f64::INFINITY, f64::min));
         slot += 1;
     }
     for (first, _) in runs {
@@ -361,7 +387,6 @@ fn lists(
     tables: &mut Tables,
     model: &Model,
     opening: &OpeningPlan,
-    mesh: &BlockMesh,
     layout: &Layout,
     (entry, told): (DVec3, &Told),
 ) {
@@ -403,8 +428,10 @@ fn lists(
         tables.stations.push(with_growth(own, &station.growth, opening.shaft));
     }
     for node in opening.nodes.iter().copied() {
-        let grid = mesh.node_coordinates(node as usize);
-        let owned = layout.strips().owned_slot(grid, mesh.cells());
+        let owned = match &model.mesh {
+            Mesh::Block(block) => layout.strips().owned_slot(block.node_coordinates(node as usize), block.cells()),
+            Mesh::Tets(_) => 4 * layout.fours().first[node as usize],
+        };
         let first = tables.corners.len() as u32;
         tables.corners.extend(told.corners.get(&node).into_iter().flatten());
         let corners_end = tables.corners.len() as u32;
