@@ -276,9 +276,10 @@ fn stage_text(stage: Stage) -> [&'static str; 2] {
             "`puncture`, free path",
         ],
         Stage::MeasureDilatation => ["J and volumetric stiffness of every tetrahedron", "tetrahedra"],
-        Stage::OpeningDilatation => {
-            ["what an opened path adds to the volume of the tetrahedra around it", "`puncture`, scheme opening; tetrahedra"]
-        }
+        Stage::OpeningDilatation => [
+            "what an opened path adds to the volume of the tetrahedra around it",
+            "`puncture`, scheme opening; tetrahedra",
+        ],
         Stage::AveragePressure => ["dilatation and pressure of every node from the tetrahedra around it", "tetrahedra"],
         Stage::TetrahedronForces => ["stress and stiffness bound of every tetrahedron", "tetrahedra"],
         Stage::ElementForces => ["stress, hourglass force and stiffness bound of every hexahedron", "block"],

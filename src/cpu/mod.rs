@@ -21,6 +21,7 @@ use glam::{DMat3, DVec3};
 use lanes::LaneCells;
 pub use lanes::unknown_to_lanes;
 use needle_contact::{NearNodes, NodeLoads};
+use opening::OpenPath;
 use rayon::prelude::*;
 
 use crate::effects::adhesion::Bond;
@@ -90,7 +91,8 @@ pub struct CpuEngine {
     measures: bool,
     /// Elastic energy that the scheme `opening` added in the last step [J].
     opening_elastic: f64,
-    /// Tetrahedra beside an opened path, and the averaged volumetric answer of all of them in f64, in the last step.
+    /// Tetrahedra that grow beside an opened path, and the averaged volumetric answer of all of them in f64, in the last step; in lanes in the last
+    /// step of a frame.
     grown: Vec<Grown>,
     averaged: Vec<Volumetric>,
     /// What the points have dissipated and earlier frames have told.
@@ -260,7 +262,7 @@ impl CpuEngine {
             (Some(plan), Some(pose)) => self.open_path(plan, &pose, input.step),
             _ => None,
         };
-        self.element_forces(input);
+        self.element_forces(input, opened.as_ref());
         self.cohesive_forces();
         if let (Some(plan), Some(pose)) = (&model.puncture, input.pose) {
             self.needle_contact(plan, &pose, input.step);
@@ -324,13 +326,14 @@ impl CpuEngine {
     }
 
     /// Stage `element_forces`; tetrahedra get their averaged pressure first.
-    fn element_forces(&mut self, input: &StepInput) {
+    fn element_forces(&mut self, input: &StepInput, opened: Option<&OpenPath>) {
         if let Some(lanes) = &mut self.lanes {
             let State { displacement, stiffness, .. } = &self.state;
             // An opened path softens nothing: to look at every cell for that is as long as a stage.
             let stiffness = if self.model.opening().is_some() { &[] } else { stiffness.as_slice() };
             let advance = Some((self.dt, input.step));
-            lanes.compute(&self.model, &self.elements, (displacement, &self.grown), stiffness, advance);
+            let opened = opened.map(OpenPath::opened);
+            lanes.compute(&self.model, &self.elements, (displacement, opened), stiffness, advance);
             return;
         }
         let (model, elements, dt) = (&self.model, &self.elements, self.dt);
@@ -595,7 +598,7 @@ impl Engine for CpuEngine {
         self.bring_to_lanes();
         if let Some(lanes) = &mut self.lanes {
             let state = &self.state;
-            lanes.compute(&self.model, &self.elements, (&state.displacement, &[]), &state.stiffness, None);
+            lanes.compute(&self.model, &self.elements, (&state.displacement, None), &state.stiffness, None);
             return Ok((0..self.model.mesh.node_count()).map(|node| -lanes.at(node).0).collect());
         }
         let states = CellStates { points: &self.state.points, stiffness: &self.state.stiffness };

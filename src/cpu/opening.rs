@@ -2,7 +2,8 @@
 //! src/needle/opening.rs.
 
 use super::CpuEngine;
-use super::lanes::opening::{OpeningInLanes, PointSums};
+use super::lanes::Opened;
+use super::lanes::opening::PointSums;
 use super::path_reactions::guide;
 use crate::engine::State;
 use crate::engine::elements::{CellForces, CellShape, CellStates, Grown};
@@ -96,6 +97,13 @@ pub(super) struct OpenPath {
     now: Vec<Now>,
     sections: Vec<Station>,
     map: OpeningMap,
+}
+
+impl OpenPath {
+    /// Map and sections.
+    pub fn opened(&self) -> Opened<'_> {
+        (&self.map, &self.sections)
+    }
 }
 
 /// Differences of a quantity along the stations: weights of the neighbours before and behind station `i`.
@@ -204,7 +212,9 @@ impl CpuEngine {
         let now = self.stations_now(plan, opening, (pose, step));
         let sections: Vec<Station> = now.iter().map(|n| n.section).collect();
         let map = opening.map(pose.direction);
-        if let Mesh::Tets(_) = self.model.mesh {
+        // Lanes know by themselves, but for the measures.
+        let is_asked = self.measures || !self.lanes.as_mut().is_some_and(|lanes| lanes.opening().is_some());
+        if self.model.mesh.as_tets().is_some() && is_asked {
             self.grown = self.grown_beside(opening, &map, &sections);
         }
         Some(OpenPath { now, sections, map })
@@ -327,10 +337,10 @@ impl CpuEngine {
         let measures = self.measures;
         let shape = |cell: u32| Shape { material: model.material(cell as usize), measures };
         let CpuEngine { lanes, state, added, .. } = self;
-        let OpeningInLanes { opening: lanes, team, numbers, stride } = lanes.as_mut()?.opening()?;
+        let mut lanes = lanes.as_mut()?.opening()?;
         let displacement = &state.displacement;
-        let [vectors, cells] = lanes.compute(team, map, sections, displacement, measures);
-        let (mut points, cells_of_spans) = lanes.gather(team, sections, (numbers, stride));
+        let [vectors, cells] = lanes.compute(map, sections, displacement, measures);
+        let (mut points, cells_of_spans) = lanes.gather(sections);
         // What lanes do not know, in f64.
         for (station, index) in vectors.into_iter().flat_map(|number| lanes.points_of(number)).copied() {
             let (section, station_now) = (&sections[station], &opening.stations[station]);

@@ -10,7 +10,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::nodes::{Moved, NODE, NodeLines};
 use super::number::{HalfWide, half_wide};
-use super::opening::{LaneOpening, OpeningInLanes};
+use super::opening::{Carrier, LaneOpening, OpeningInLanes};
 use super::points::Points;
 use super::rows::{CellRows, gather_plane};
 use super::shapes::BentColumns;
@@ -182,7 +182,7 @@ impl LaneBlock {
     pub fn opening(&mut self) -> Option<OpeningInLanes<'_>> {
         let LaneBlock { opening, team, nodes, .. } = self;
         opening.as_mut().map(|opening| OpeningInLanes {
-            opening,
+            opening: Carrier::Block(opening),
             team,
             stride: nodes.stride(),
             numbers: &mut nodes.numbers,

@@ -24,7 +24,7 @@ use self::tets::LaneTets;
 use super::integrate_nodes::{NodeStep, NodeSums};
 use super::team::Team;
 use crate::effects::TissueMaterial;
-use crate::engine::elements::{CellForces, CellMeasure, CellStates, Elements, Grown};
+use crate::engine::elements::{CellForces, CellMeasure, CellStates, Elements};
 use crate::material::Isochoric;
 use crate::material::law::IsochoricLaw;
 use crate::material::regular::{Exponential, Polynomial};
@@ -32,6 +32,7 @@ use crate::material::stretches::Powers;
 use crate::material_point::{Material, PointState};
 use crate::mesh::Mesh;
 use crate::model::Model;
+use crate::needle::opening::{OpeningMap, Station};
 use crate::scene::Scene;
 
 /// Most values of a vector.
@@ -56,6 +57,9 @@ impl LaneMaterial {
         (self.powers.is_none() && self.exponential.is_none() && !self.has_fibres).then_some(self.law)
     }
 }
+
+/// An opened path: its map and its sections.
+pub(super) type Opened<'a> = (&'a OpeningMap, &'a [Station]);
 
 /// The cells of a model in lanes.
 pub(super) enum LaneCells {
@@ -85,7 +89,7 @@ impl LaneCells {
     pub fn opening(&mut self) -> Option<OpeningInLanes<'_>> {
         match self {
             LaneCells::Block(cells) => cells.opening(),
-            LaneCells::Tets(_) => None,
+            LaneCells::Tets(cells) => cells.opening(),
         }
     }
 
@@ -97,19 +101,19 @@ impl LaneCells {
         }
     }
 
-    /// Forces and bounds of all cells at the nodes, for this displacement, the tetrahedra that grow beside an opened path and the stiffness that a
-    /// path left (empty: all of it). `advance`: step [s] and number of the step that histories are brought forward to; `None`: they stay.
+    /// Forces and bounds of all cells at the nodes, for this displacement (tetrahedra grow beside an opened path) and the stiffness that a path
+    /// left (empty: all of it). `advance`: step [s] and number of the step that histories are brought forward to; `None`: they stay.
     pub fn compute(
         &mut self,
         model: &Model,
         elements: &Elements,
-        (displacement, grown): (&[DVec3], &[Grown]),
+        (displacement, opened): (&[DVec3], Option<Opened>),
         stiffness: &[f64],
         advance: Option<(f64, u64)>,
     ) {
         match self {
             LaneCells::Block(cells) => cells.compute(model, elements, displacement, stiffness, advance),
-            LaneCells::Tets(cells) => cells.compute(model, elements, (displacement, grown), stiffness, advance),
+            LaneCells::Tets(cells) => cells.compute(model, elements, (displacement, opened), stiffness, advance),
         }
     }
 

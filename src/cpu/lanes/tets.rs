@@ -10,12 +10,13 @@ use glam::DVec3;
 use pulp::Arch;
 
 use super::nodes::{Moved, NodeLines};
+use super::opening::{Carrier, OpeningInLanes, TetOpening, TetsNow};
 use super::points::Points;
 use super::tet_vectors::{Deformed, Forces};
-use super::{LaneMaterial, WIDEST, materials_of, threads_for};
+use super::{LaneMaterial, Opened, WIDEST, materials_of, threads_for};
 use crate::cpu::integrate_nodes::{NodeStep, NodeSums};
 use crate::cpu::team::Team;
-use crate::engine::elements::{Elements, Grown, cells_of_nodes};
+use crate::engine::elements::{Elements, cells_of_nodes};
 use crate::material_point::PointState;
 use crate::mesh::TetMesh;
 use crate::model::Model;
@@ -146,15 +147,6 @@ impl TetShapes {
         &self.around[self.offsets[node] as usize..self.offsets[node + 1] as usize]
     }
 
-    /// Adds to the volume changes of all slots that of tetrahedra which grow beside an opened path.
-    fn grow(&self, grown: &[Grown], changes: &mut [f32]) {
-        for Grown { cell, by } in grown {
-            let slot = self.slots[*cell as usize] as usize;
-            let volume = self.constants[(slot / WIDEST * SHAPE + SHAPE - 1) * WIDEST + slot % WIDEST];
-            changes[slot] += *by as f32 * (0.25 * volume + changes[slot]);
-        }
-    }
-
     /// Pressure of the nodes from `first` on [Pa]: `K_a (Jbar_a - 1)`, from the volume changes `V_e/4 (J_e - 1)` of all slots.
     fn average(&self, changes: &[f32], first: usize, pressures: &mut [f32]) {
         for (i, pressure) in pressures.iter_mut().enumerate() {
@@ -205,6 +197,7 @@ pub struct LaneTets {
     /// Material points that do more than the elastic law, and what they remember, in a row per group.
     points: Option<Points>,
     histories: Vec<f32>,
+    opening: Option<Box<TetOpening>>,
 }
 
 impl LaneTets {
@@ -212,7 +205,14 @@ impl LaneTets {
         let shapes = TetShapes::new(model, mesh, materials_of(model, elements)?);
         let (slots, nodes) = (shapes.cells.len(), mesh.positions.len());
         let points = Points::new(&model.materials, WIDEST);
+        let node_lines = NodeLines::new(model, LINE, LINE);
+        let opening = model.opening().map(|plan| {
+            let (slot_of, first) = (|cell: usize| shapes.slots[cell] as usize, |node| node_lines.first_number(node));
+            let line = super::nodes::NODE * LINE;
+            Box::new(TetOpening::new(model, mesh, plan, &shapes.materials, slot_of, (first, line)))
+        });
         Ok(LaneTets {
+            opening,
             histories: vec![0.0; points.as_ref().map_or(0, Points::row_length) * slots / WIDEST],
             points,
             team: Team::new(threads_for(mesh.tets.len())),
@@ -221,7 +221,7 @@ impl LaneTets {
             changes: vec![0.0; slots],
             pressures: vec![0.0; nodes],
             forces: vec![[0.0; 4]; 4 * slots],
-            nodes: NodeLines::new(model, LINE, LINE),
+            nodes: node_lines,
             shapes,
         })
     }
@@ -229,6 +229,17 @@ impl LaneTets {
     /// The threads that its stages share.
     pub fn team(&self) -> &Team {
         &self.team
+    }
+
+    /// What carries tissue beside an opened path.
+    pub fn opening(&mut self) -> Option<OpeningInLanes<'_>> {
+        let LaneTets { opening, team, nodes, gradients, pressures, .. } = self;
+        opening.as_mut().map(|opening| OpeningInLanes {
+            opening: Carrier::Tets(opening, TetsNow { gradients, pressures }),
+            team,
+            stride: nodes.stride(),
+            numbers: &mut nodes.numbers,
+        })
     }
 
     /// Numbers of the nodes.
@@ -250,6 +261,7 @@ impl LaneTets {
         let changing = self.gradients.len() + self.changes.len() + self.pressures.len() + 4 * self.forces.len();
         4 * (words + around.len() + stiffness.len() + changing + self.histories.len())
             + size_of_val(self.places.as_slice())
+            + self.opening.as_ref().map_or(0, |opening| opening.bytes())
             + self.nodes.bytes()
     }
 
@@ -259,12 +271,13 @@ impl LaneTets {
         &mut self,
         model: &Model,
         elements: &Elements,
-        (displacement, grown): (&[DVec3], &[Grown]),
+        (displacement, opened): (&[DVec3], Option<Opened>),
         stiffness: &[f64],
         advance: Option<(f64, u64)>,
     ) {
         self.shapes.weaken(model, stiffness);
-        let LaneTets { shapes, team, places, gradients, changes, pressures, forces, nodes, points, histories } = self;
+        let LaneTets { shapes, team, places, gradients, changes, pressures, forces, nodes, points, histories, opening } =
+            self;
         if let Some(points) = points {
             points.prepare(&model.materials, advance);
         }
@@ -273,7 +286,9 @@ impl LaneTets {
         let parts = gradients.chunks_mut(part * WIDEST * GRADIENT).zip(changes.chunks_mut(part * WIDEST));
         let deformed = Deformed { shapes, places, displacement, mesh: &model.mesh };
         team.map(parts.collect::<Vec<_>>(), |i, (gradients, changes)| deformed.compute(i * part, gradients, changes));
-        shapes.grow(grown, changes);
+        if let (Some(opening), Some(opened)) = (opening, opened) {
+            opening.grow(team, opened, displacement, gradients, changes);
+        }
         let of_nodes = team.part(pressures.len());
         team.map(pressures.chunks_mut(of_nodes), |i, p| shapes.average(changes, i * of_nodes, p));
         let of_cells = Forces { shapes, gradients, pressures, model, elements, displacement, points, advance };

@@ -383,13 +383,7 @@ fn slots(
 }
 
 /// Stations and nodes, with the lists of what they are made of.
-fn lists(
-    tables: &mut Tables,
-    model: &Model,
-    opening: &OpeningPlan,
-    layout: &Layout,
-    (entry, told): (DVec3, &Told),
-) {
+fn lists(tables: &mut Tables, model: &Model, opening: &OpeningPlan, layout: &Layout, (entry, told): (DVec3, &Told)) {
     let mut sections: BTreeMap<u32, Vec<(u32, f32, f32)>> = BTreeMap::new();
     for (index, station) in opening.stations.iter().enumerate() {
         let mut weights: BTreeMap<u32, (f32, f32)> = BTreeMap::new();

@@ -6,7 +6,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::sums::{ChunkSums, SUMS};
-use super::{CELL, CORNER_ROWS, Found, Gathered, Lanes, Step, law_in_lanes, moment_of, opened};
+use super::{CELL, CORNER_ROWS, Found, Gathered, Lanes, Step, moment_of, opened};
 use crate::cpu::lanes::WIDEST;
 use crate::cpu::lanes::corners::SIGNS;
 use crate::mesh::CORNERS;
@@ -113,7 +113,7 @@ fn cell_vector<S: Simd>(
 
 /// Adds what acts at the place `offset` from the middle of a cell.
 #[inline(always)]
-fn add_at<N: Number>(sum: &mut Derivatives<N>, place: [N; 3], offset: [N; 3]) {
+pub(super) fn add_at<N: Number>(sum: &mut Derivatives<N>, place: [N; 3], offset: [N; 3]) {
     let by_offset = outer(place, offset);
     for a in 0..3 {
         sum.place[a] = sum.place[a] + place[a];
@@ -139,7 +139,7 @@ fn cell_lanes<S: Simd>(
     let open_lanes = path.open(simd, at);
     let [width, place] = [[row(0), row(1), row(2)], [row(3), row(4), row(5)]];
     let (volume, share, edge, b_squared) = (row(6) * open_lanes, row(7), row(8), row(9));
-    let law = law_in_lanes(simd, all, constants, 10, at);
+    let law = all.laws.in_lanes(simd, constants, 10, at);
     let bulk = row(14);
     let quarters = [row(17), row(18), row(19)];
     let (over_shaft, eighth) = (Lanes::splat(simd, (1.0 / all.shaft) as f32), Lanes::splat(simd, 0.125));

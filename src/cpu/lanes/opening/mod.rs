@@ -11,6 +11,8 @@ mod cells;
 mod gathered;
 mod points;
 mod sums;
+mod tet_vectors;
+mod tets;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -23,6 +25,7 @@ use self::gathered::{Gathered, Section};
 use self::points::SomePoints;
 use self::sums::{Chunk, Rows, SomeSums};
 pub(in crate::cpu) use self::sums::{OfSpan, PointSums};
+pub(in crate::cpu) use self::tets::{TetOpening, TetsNow};
 use super::corners::SIGNS;
 use super::number::Lanes;
 use super::{LaneMaterial, WIDEST};
@@ -68,6 +71,71 @@ struct Vector {
     points: Vec<(usize, usize)>,
 }
 
+impl Vector {
+    /// Of points by cell, station and place in it.
+    fn new(group: &[(u32, usize, usize)], first_run: usize, is_known: impl Fn(u32) -> bool) -> Self {
+        let same_run = |stride: usize| {
+            let is_same = |lane: usize| group.get(lane + stride).is_some_and(|other| other.0 == group[lane].0);
+            std::array::from_fn(|lane| if is_same(lane) { 1.0 } else { 0.0 })
+        };
+        let shorter = |stride: &usize| group.windows(stride + 1).any(|run| run[0].0 == run[*stride].0);
+        Vector {
+            count: group.len(),
+            first_run,
+            is_known: group.iter().all(|(cell, ..)| is_known(*cell)),
+            stations: std::array::from_fn(|lane| group.get(lane).map_or(0, |(_, station, _)| *station as u16)),
+            same_run: STRIDES.into_iter().filter(shorter).map(same_run).collect(),
+            points: group.iter().map(|(_, station, index)| (*station, *index)).collect(),
+        }
+    }
+}
+
+/// All points by cell, station and place in it: cell by cell in the order in which they are cut, so that what is open stands together.
+fn in_order_of_cells(plan: &OpeningPlan) -> Vec<(u32, usize, usize)> {
+    let mut ordered: Vec<(u32, usize, usize)> = Vec::new();
+    for (station, points) in plan.stations.iter().enumerate() {
+        ordered.extend(points.points.iter().enumerate().map(|(index, point)| (point.cell, station, index)));
+    }
+    let mut first_station: BTreeMap<u32, usize> = BTreeMap::new();
+    for (cell, station, _) in &ordered {
+        first_station.entry(*cell).or_insert(*station);
+    }
+    ordered.sort_by_key(|(cell, station, index)| (first_station[cell], *cell, *station, *index));
+    ordered
+}
+
+/// Stations of some vectors.
+fn stations_of(vectors: &[Vector]) -> Vec<usize> {
+    let stations = vectors.iter().flat_map(|v| &v.stations[..v.count]);
+    stations.map(|station| usize::from(*station)).collect()
+}
+
+/// Vectors of points, and cells, that lanes did not know.
+fn unknown(points: &[Found], cells: &[Found], count: usize) -> [Vec<usize>; 2] {
+    let of = |found: &[Found]| -> Vec<usize> {
+        found.iter().enumerate().filter(|(_, found)| **found == Found::Unknown).map(|(i, _)| i).collect()
+    };
+    let in_vector = |i: &usize| i * WIDEST..((i + 1) * WIDEST).min(count);
+    [of(points), of(cells).iter().flat_map(in_vector).collect()]
+}
+
+/// Sums of stations, chunk by chunk.
+fn station_sums(chunks: &[Chunk], rows: &[Rows], stations: &[Station]) -> Vec<PointSums> {
+    let mut points = vec![PointSums::default(); stations.len()];
+    Chunk::add(chunks, rows, |station, rows| points[station].add_rows(rows));
+    for (sums, station) in points.iter_mut().zip(stations).filter(|(_, station)| station.radius > 0.0) {
+        sums.shape = sums.energy / station.left();
+    }
+    points
+}
+
+/// Sums of spans, chunk by chunk.
+fn span_sums(spans: &[(u16, u16)], chunks: &[Chunk], rows: &[Rows]) -> Vec<OfSpan> {
+    let mut spans: Vec<OfSpan> = spans.iter().map(|span| (*span, PointSums::default())).collect();
+    Chunk::add(chunks, rows, |span, rows| spans[span].1.add_rows(rows));
+    spans
+}
+
 /// Points of a vector that share a cell.
 struct Run {
     lanes: Range<usize>,
@@ -109,8 +177,7 @@ impl Layer {
 pub(in crate::cpu) struct LaneOpening {
     arch: Arch,
     shaft: f64,
-    is_linear: bool,
-    has_c01: bool,
+    laws: Laws,
     /// The needle may turn: moments are wanted.
     turns: bool,
     vectors: Vec<Vector>,
@@ -190,16 +257,7 @@ impl LaneOpening {
             [law.c1, law.c2, law.c3, law.c01, material.bulk_modulus]
         };
         let is_polynomial = |cell: u32| materials[model.material_index(cell as usize)].polynomial().is_some();
-        // Cell by cell in the order in which they are cut, so that what is open stands together.
-        let mut ordered: Vec<(u32, usize, usize)> = Vec::new();
-        for (station, points) in plan.stations.iter().enumerate() {
-            ordered.extend(points.points.iter().enumerate().map(|(index, point)| (point.cell, station, index)));
-        }
-        let mut first_station: BTreeMap<u32, usize> = BTreeMap::new();
-        for (cell, station, _) in &ordered {
-            first_station.entry(*cell).or_insert(*station);
-        }
-        ordered.sort_by_key(|(cell, station, index)| (first_station[cell], *cell, *station, *index));
+        let ordered = in_order_of_cells(plan);
         let vector_count = ordered.len().div_ceil(WIDEST);
         let mut points = vec![0.0; vector_count * POINT * WIDEST];
         let numbers_of = |nodes: [u32; SIGNS]| nodes.map(|n| first_number(n as usize) as u32);
@@ -207,26 +265,9 @@ impl LaneOpening {
         let layer_of = |cell: usize| block.cell_coordinates(cell)[2];
         let (mut vectors, mut runs) = (Vec::with_capacity(vector_count), Vec::<Run>::new());
         for (number, (group, rows)) in ordered.chunks(WIDEST).zip(points.chunks_exact_mut(POINT * WIDEST)).enumerate() {
-            let mut vector = Vector {
-                count: group.len(),
-                first_run: runs.len(),
-                is_known: true,
-                stations: [0; WIDEST],
-                same_run: STRIDES
-                    .into_iter()
-                    .filter(|stride| group.windows(stride + 1).any(|run| run[0].0 == run[*stride].0))
-                    .map(|stride| {
-                        let is_same =
-                            |lane: usize| group.get(lane + stride).is_some_and(|other| other.0 == group[lane].0);
-                        std::array::from_fn(|lane| if is_same(lane) { 1.0 } else { 0.0 })
-                    })
-                    .collect(),
-                points: group.iter().map(|(_, station, index)| (*station, *index)).collect(),
-            };
+            let vector = Vector::new(group, runs.len(), is_polynomial);
             for (lane, (cell, station, index)) in group.iter().enumerate() {
                 let (cell, point) = (*cell as usize, &plan.stations[*station].points[*index]);
-                vector.is_known &= is_polynomial(cell as u32);
-                vector.stations[lane] = *station as u16;
                 let is_next = lane > 0 && group[lane - 1].0 as usize == cell;
                 match runs.last_mut().filter(|_| is_next) {
                     Some(run) => run.lanes.end = lane + 1,
@@ -299,18 +340,13 @@ impl LaneOpening {
                 }
             })
             .collect();
-        let stations_of = |vectors: &[Vector]| {
-            let stations = vectors.iter().flat_map(|v| &v.stations[..v.count]);
-            stations.map(|station| usize::from(*station)).collect::<Vec<_>>()
-        };
         let point_chunks = Chunk::all(vectors.chunks(CHUNK).map(stations_of));
         let spans_of = |cells: &[Cell]| cells.iter().map(|cell| usize::from(cell.span)).collect::<Vec<_>>();
         let cell_chunks = Chunk::all(cells.chunks(CHUNK * WIDEST).map(spans_of));
         LaneOpening {
             arch: Arch::new(),
             shaft,
-            is_linear: materials.iter().all(|m| m.law.is_linear()),
-            has_c01: materials.iter().any(|m| m.law.c01 != 0.0),
+            laws: Laws::of(materials),
             turns: model.laid.is_some(),
             out: Out {
                 vectors: vec![Found::Closed; vectors.len()],
@@ -385,13 +421,9 @@ impl LaneOpening {
             Part::Points(points) => self.arch.dispatch(points),
             Part::Cells(cells) => self.arch.dispatch(cells),
         });
-        let unknown = |found: &[Found]| -> Vec<usize> {
-            found.iter().enumerate().filter(|(_, found)| **found == Found::Unknown).map(|(i, _)| i).collect()
-        };
-        let (points, cells) = (unknown(&out.vectors), unknown(&out.cell_vectors));
-        let cells = cells.iter().flat_map(|i| i * WIDEST..((i + 1) * WIDEST).min(self.cells.len())).collect();
+        let found = unknown(&out.vectors, &out.cell_vectors, self.cells.len());
         self.out = out;
-        [points, cells]
+        found
     }
 
     /// Stations of the plan, and places in them, of the points of a vector.
@@ -413,7 +445,10 @@ impl LaneOpening {
         let planes = planes.filter(|(k, _)| self.layers_at(*k).any(|(layer, _)| !layer.is_empty()));
         let planes = planes.map(|(k, numbers)| Gather::Plane { k, numbers });
         let found = team.map([Gather::Sums].into_iter().chain(planes), |_, part| match part {
-            Gather::Sums => Some(self.sums(stations)),
+            Gather::Sums => Some((
+                station_sums(&self.point_chunks, &self.out.of_stations, stations),
+                span_sums(&self.spans, &self.cell_chunks, &self.out.of_spans),
+            )),
             Gather::Plane { k, numbers } => {
                 for (layer, corners) in self.layers_at(k) {
                     self.runs_at_nodes(&layer.runs, corners.clone(), numbers, (k * self.plane, stride));
@@ -430,18 +465,6 @@ impl LaneOpening {
         let below = k.checked_sub(1).and_then(|below| self.layers.get(below));
         let above = self.layers.get(k);
         below.map(|layer| (layer, SIGNS / 2..SIGNS)).into_iter().chain(above.map(|layer| (layer, 0..SIGNS / 2)))
-    }
-
-    /// Sums of stations and of spans, chunk by chunk.
-    fn sums(&self, stations: &[Station]) -> (Vec<PointSums>, Vec<OfSpan>) {
-        let mut points = vec![PointSums::default(); stations.len()];
-        Chunk::add(&self.point_chunks, &self.out.of_stations, |station, rows| points[station].add_rows(rows));
-        for (sums, station) in points.iter_mut().zip(stations).filter(|(_, station)| station.radius > 0.0) {
-            sums.shape = sums.energy / station.left();
-        }
-        let mut spans: Vec<_> = self.spans.iter().map(|span| (*span, PointSums::default())).collect();
-        Chunk::add(&self.cell_chunks, &self.out.of_spans, |span, rows| spans[span].1.add_rows(rows));
-        (points, spans)
     }
 
     /// Runs of a layer, to numbers of nodes from `first` on, which lie `stride` apart.
@@ -497,13 +520,48 @@ impl LaneOpening {
     }
 }
 
+/// What carries tissue beside an opened path.
+pub(in crate::cpu) enum Carrier<'a> {
+    Block(&'a mut LaneOpening),
+    Tets(&'a mut TetOpening, TetsNow<'a>),
+}
+
 /// Tissue beside an opened path, and what its cells add to.
 pub(in crate::cpu) struct OpeningInLanes<'a> {
-    pub opening: &'a mut LaneOpening,
+    pub opening: Carrier<'a>,
     pub team: &'a Team,
     /// Numbers of the nodes, and f32 of a row of them.
     pub numbers: &'a mut [f32],
     pub stride: usize,
+}
+
+impl OpeningInLanes<'_> {
+    /// Computes all points and cells, for a map, stations and a displacement; `measures`: with energies. Returns the vectors of points and the cells
+    /// that the caller has to compute.
+    pub fn compute(&mut self, map: &OpeningMap, stations: &[Station], u: &[DVec3], measures: bool) -> [Vec<usize>; 2] {
+        match &mut self.opening {
+            Carrier::Block(opening) => opening.compute(self.team, map, stations, u, measures),
+            Carrier::Tets(opening, tets) => opening.compute(self.team, (map, stations), u, *tets, measures),
+        }
+    }
+
+    /// Adds forces and bounds to the numbers of the nodes; sums of the points of every station that is open, with energies, and of the cells
+    /// per pair of stations. What the caller has to compute is left out of these.
+    pub fn gather(&mut self, stations: &[Station]) -> (Vec<PointSums>, Vec<OfSpan>) {
+        let numbers = (&mut *self.numbers, self.stride);
+        match &self.opening {
+            Carrier::Block(opening) => opening.gather(self.team, stations, numbers),
+            Carrier::Tets(opening, _) => opening.gather(self.team, stations, numbers),
+        }
+    }
+
+    /// Stations of the plan, and places in them, of the points of a vector.
+    pub fn points_of(&self, vector: usize) -> &[(usize, usize)] {
+        match &self.opening {
+            Carrier::Block(opening) => opening.points_of(vector),
+            Carrier::Tets(opening, _) => opening.points_of(vector),
+        }
+    }
 }
 
 /// Part of what is added up.
@@ -532,16 +590,32 @@ struct Step<'a> {
     measures: bool,
 }
 
-/// Constants of the laws of a vector, from their first row on.
-#[inline(always)]
-fn law_in_lanes<S: Simd>(simd: S, all: &LaneOpening, rows: &[f32], first: usize, at: usize) -> Constants<Lanes<S>> {
-    Constants {
-        c1: Lanes::load(simd, rows, first * WIDEST + at),
-        c2: Lanes::load(simd, rows, (first + 1) * WIDEST + at),
-        c3: Lanes::load(simd, rows, (first + 2) * WIDEST + at),
-        c01: Lanes::load(simd, rows, (first + 3) * WIDEST + at),
-        is_linear: all.is_linear,
-        has_c01: all.has_c01,
+/// What all laws have in common.
+#[derive(Clone, Copy)]
+struct Laws {
+    is_linear: bool,
+    has_c01: bool,
+}
+
+impl Laws {
+    fn of(materials: &[LaneMaterial]) -> Self {
+        Laws {
+            is_linear: materials.iter().all(|m| m.law.is_linear()),
+            has_c01: materials.iter().any(|m| m.law.c01 != 0.0),
+        }
+    }
+
+    /// Constants of the laws of a vector, from their first row on.
+    #[inline(always)]
+    fn in_lanes<S: Simd>(&self, simd: S, rows: &[f32], first: usize, at: usize) -> Constants<Lanes<S>> {
+        Constants {
+            c1: Lanes::load(simd, rows, first * WIDEST + at),
+            c2: Lanes::load(simd, rows, (first + 1) * WIDEST + at),
+            c3: Lanes::load(simd, rows, (first + 2) * WIDEST + at),
+            c01: Lanes::load(simd, rows, (first + 3) * WIDEST + at),
+            is_linear: self.is_linear,
+            has_c01: self.has_c01,
+        }
     }
 }
 

@@ -6,10 +6,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::sums::{ChunkSums, SUMS};
-use super::{
-    AtCorners, Found, Gathered, LAW, Lanes, Opened, POINT, ROOM, RUN_SUMS, STRIDES, Step, law_in_lanes, moment_of,
-    opened,
-};
+use super::{AtCorners, Found, Gathered, LAW, Lanes, Opened, POINT, ROOM, RUN_SUMS, STRIDES, Step, moment_of, opened};
 use crate::cpu::lanes::WIDEST;
 use crate::cpu::lanes::corners::{HOURGLASS, SIGNS};
 use crate::needle::opening::{MapIn, squared_norm_bound};
@@ -185,7 +182,7 @@ fn point_lanes<S: Simd>(
     let edges = [row(4), row(5), row(6)];
     let one = Lanes::splat(simd, 1.0);
     let over_edges = [one.over(edges[0]), one.over(edges[1]), one.over(edges[2])];
-    let law = law_in_lanes(simd, all, points, 7, at);
+    let law = all.laws.in_lanes(simd, points, 7, at);
     let bulk = row(11);
     let [yz, zx, xy] = [y * z, z * x, x * y];
     let mut beside = path.beside(simd, at);
