@@ -367,8 +367,8 @@ impl CpuEngine {
         }
         for near in cells.into_iter().map(|i| &opening.cells[i]) {
             let section = within(sections, near);
-            let found =
-                near_cell_forces(model, shape(near.cell), map, (near, &section), &self.state.displacement, None);
+            let (u, pressure) = (&self.state.displacement, self.averaged_pressure(near.cell as usize));
+            let found = near_cell_forces(model, shape(near.cell), map, (near, &section), u, pressure);
             if let Some(found) = found {
                 elastic += self.add_near_cell(near, &found, &mut sums);
             }
