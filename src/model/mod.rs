@@ -18,9 +18,11 @@ use glam::DVec3;
 pub use composition::Composition;
 pub use contact::{ContactNode, ContactSurface};
 pub use free_path::{FreePlan, Skin};
+pub use opening_places::NearTets;
 pub use puncture::{
     ANCHOR_COUNT, LARGEST_ANCHOR_COUNT, LARGEST_SEGMENT_COUNT, PathCell, PathSegment, PuncturePlan, TipAnchor,
 };
+pub use tet_puncture::{lattice, lines_of_tip};
 
 use crate::effects::puncture::SchemeWord;
 use crate::effects::{EffectSet, cohesive};

@@ -12,6 +12,9 @@ use super::tet_puncture::lattice;
 /// Places per edge of a hexahedron at which it is asked what part of it lies near the path.
 const SAMPLES: usize = 12;
 
+/// Points per edge of the cube that is folded into a tetrahedron to ask the same; 816 of them differ.
+const TET_SAMPLES: usize = 16;
+
 /// Places of Gauss' rule in a tetrahedron lie on the way from its middle to its corners, this part of it: 1/sqrt 5.
 const TETRAHEDRON_PLACE: f64 = 0.447_213_595_499_957_9;
 
@@ -27,17 +30,51 @@ pub(super) struct Place {
     pub inside: bool,
 }
 
-/// A tetrahedron near a path, with its bounding box [m].
-pub(super) struct NearTet {
-    cell: u32,
-    low: DVec3,
-    high: DVec3,
+/// Tetrahedra near a path, with their bounding boxes [m].
+#[derive(Debug, Clone)]
+pub struct NearTets(Vec<(u32, DVec3, DVec3)>);
+
+impl NearTets {
+    /// Those within `reach` of the straight line [m].
+    pub fn new(mesh: &TetMesh, line: &PathLine, reach: f64) -> Self {
+        let piece = line.piece(0.0);
+        let with_box = |cell: u32| {
+            let [a, b, c, d] = mesh.corners(cell as usize);
+            (cell, a.min(b).min(c.min(d)), a.max(b).max(c.max(d)))
+        };
+        NearTets(mesh.near_line(piece.origin, piece.direction, reach).into_iter().map(with_box).collect())
+    }
+
+    /// Their numbers.
+    pub fn cells(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().map(|(cell, ..)| *cell as usize)
+    }
+
+    /// The tetrahedron that holds a rest position, its barycentric coordinates there, and true where it holds it; of a place in none of them the
+    /// nearest. `None`: there are no tetrahedra.
+    pub fn find(&self, mesh: &TetMesh, x: DVec3) -> Option<(usize, [f64; 4], bool)> {
+        /// How far beyond a face rounding may carry a point that lies on it, in barycentric coordinates.
+        const BESIDE: f64 = 1e-9;
+        let least = |weights: &[f64; 4]| weights.iter().fold(f64::INFINITY, |least: f64, w| least.min(*w));
+        let with_weights = |cell: u32| (cell as usize, mesh.barycentric(cell as usize, x));
+        let held = self.0.iter().filter(|(_, low, high)| x.cmpge(*low).all() && x.cmple(*high).all());
+        let mut held = held.map(|(cell, ..)| with_weights(*cell));
+        if let Some((cell, weights)) = held.find(|(_, weights)| least(weights) >= -BESIDE) {
+            return Some((cell, weights, true));
+        }
+        // How far it lies beside the box of a tetrahedron says which is the nearest.
+        let beside = |low: &DVec3, high: &DVec3| (x - x.clamp(*low, *high)).length_squared();
+        let nearest = self.0.iter().map(|(_, low, high)| beside(low, high)).fold(f64::INFINITY, f64::min);
+        let candidates = self.0.iter().filter(|(_, low, high)| beside(low, high) <= nearest);
+        let with_least = candidates.map(|(cell, ..)| with_weights(*cell)).map(|(cell, w)| (cell, w, least(&w)));
+        with_least.max_by(|a, b| a.2.total_cmp(&b.2)).map(|(cell, weights, _)| (cell, weights, false))
+    }
 }
 
 /// The cells around a path.
 pub(super) enum Places<'a> {
     Block(&'a BlockMesh),
-    Tets { mesh: &'a TetMesh, near: Vec<NearTet>, samples: Vec<([f64; 4], f64)> },
+    Tets { mesh: &'a TetMesh, near: NearTets, samples: Vec<([f64; 4], f64)> },
 }
 
 impl<'a> Places<'a> {
@@ -47,13 +84,7 @@ impl<'a> Places<'a> {
             Mesh::Block(block) => return Places::Block(block),
             Mesh::Tets(tets) => tets,
         };
-        let piece = line.piece(0.0);
-        let with_box = |cell: u32| {
-            let [a, b, c, d] = tets.corners(cell as usize);
-            NearTet { cell, low: a.min(b).min(c.min(d)), high: a.max(b).max(c.max(d)) }
-        };
-        let near = tets.near_line(piece.origin, piece.direction, reach).into_iter().map(with_box).collect();
-        Places::Tets { mesh: tets, near, samples: lattice() }
+        Places::Tets { mesh: tets, near: NearTets::new(tets, line, reach), samples: lattice(TET_SAMPLES) }
     }
 
     /// Where a rest position lies; outside of the tissue as the nearest cell goes on.
@@ -69,22 +100,7 @@ impl<'a> Places<'a> {
                 Place { cell, corners, weights, gradients, local: exact, inside }
             }
             Places::Tets { mesh, near, .. } => {
-                /// How far beyond a face rounding may carry a point that lies on it, in barycentric coordinates.
-                const BESIDE: f64 = 1e-9;
-                let least = |weights: &[f64; 4]| weights.iter().fold(f64::INFINITY, |least: f64, w| least.min(*w));
-                let with_weights = |tet: &NearTet| {
-                    let weights = mesh.barycentric(tet.cell as usize, x);
-                    (tet.cell as usize, weights, least(&weights))
-                };
-                let held = near.iter().filter(|tet| x.cmpge(tet.low).all() && x.cmple(tet.high).all());
-                let found = held.map(with_weights).find(|(.., least)| *least >= -BESIDE).or_else(|| {
-                    // How far it lies beside the box of a tetrahedron says which is the nearest.
-                    let beside = |tet: &&NearTet| (x - x.clamp(tet.low, tet.high)).length_squared();
-                    let nearest = near.iter().map(|tet| beside(&tet)).fold(f64::INFINITY, f64::min);
-                    let candidates = near.iter().filter(|tet| beside(tet) <= nearest).map(with_weights);
-                    candidates.max_by(|a, b| a.2.total_cmp(&b.2))
-                });
-                let (cell, w, least) = found.expect("a path lies in the mesh");
+                let (cell, w, inside) = near.find(mesh, x).expect("a path lies in the mesh");
                 let (nodes, b) = (mesh.tets[cell].map(|n| n as usize), mesh.gradients(cell));
                 let corner = |i: usize| nodes[if i < 4 { i } else { 0 }];
                 Place {
@@ -93,7 +109,7 @@ impl<'a> Places<'a> {
                     weights: std::array::from_fn(|i| w.get(i).copied().unwrap_or(0.0)),
                     gradients: std::array::from_fn(|i| b.get(i).copied().unwrap_or(DVec3::ZERO)),
                     local: DVec3::ZERO,
-                    inside: least >= -BESIDE,
+                    inside,
                 }
             }
         }
@@ -103,7 +119,7 @@ impl<'a> Places<'a> {
     pub fn cells(&self) -> Vec<usize> {
         match self {
             Places::Block(mesh) => (0..mesh.cell_count()).collect(),
-            Places::Tets { near, .. } => near.iter().map(|tet| tet.cell as usize).collect(),
+            Places::Tets { near, .. } => near.cells().collect(),
         }
     }
 
@@ -112,8 +128,8 @@ impl<'a> Places<'a> {
         match self {
             Places::Block(_) => cell_size,
             Places::Tets { mesh, near, .. } => {
-                let volume: f64 = near.iter().map(|tet| mesh.volume(tet.cell as usize)).sum();
-                (volume / near.len().max(1) as f64).cbrt()
+                let (volume, count) = near.cells().fold((0.0, 0), |(v, n), cell| (v + mesh.volume(cell), n + 1));
+                (volume / f64::from(count.max(1))).cbrt()
             }
         }
     }

@@ -120,7 +120,7 @@ pub(super) fn largest_spring_share(plan: &PuncturePlan, h: f64) -> f64 {
 /// Tetrahedra that lie partly within a0 of the path, with the volume fraction found from sample points.
 fn path_cells(mesh: &TetMesh, path: &PlannedPath, params: &puncture::Params, deepest: f64) -> Vec<PathCell> {
     let radius = params.softened_radius;
-    let lattice = lattice();
+    let lattice = lattice(SAMPLES);
     let near = mesh.near_line(path.entry, path.direction, radius);
     let passed = near.into_iter().filter_map(|cell| {
         let corners = mesh.corners(cell as usize);
@@ -144,20 +144,21 @@ fn path_cells(mesh: &TetMesh, path: &PlannedPath, params: &puncture::Params, dee
     passed.collect()
 }
 
-/// Barycentric coordinates of points all over a tetrahedron, and the part of its volume that each stands for: the midpoints of small cubes
-/// with `u >= v >= w`, which is one of the six tetrahedra that a cube falls into; points on its faces belong to several of them.
-pub(super) fn lattice() -> Vec<([f64; 4], f64)> {
+/// Barycentric coordinates of points all over a tetrahedron, and the part of its volume that each stands for: the midpoints of small cubes,
+/// `samples` per edge, with `u >= v >= w`, which is one of the six tetrahedra that a cube falls into; points on its faces belong to several of
+/// them.
+pub fn lattice(samples: usize) -> Vec<([f64; 4], f64)> {
     let mut points = Vec::new();
-    for i in 0..SAMPLES {
+    for i in 0..samples {
         for j in 0..=i {
             for k in 0..=j {
-                let [u, v, w] = [i, j, k].map(|n| (n as f64 + 0.5) / SAMPLES as f64);
+                let [u, v, w] = [i, j, k].map(|n| (n as f64 + 0.5) / samples as f64);
                 let orders = match (i == j, j == k) {
                     (false, false) => 6,
                     (true, true) => 1,
                     _ => 3,
                 };
-                points.push(([1.0 - u, u - v, v - w, w], f64::from(orders) / SAMPLES.pow(3) as f64));
+                points.push(([1.0 - u, u - v, v - w, w], f64::from(orders) / samples.pow(3) as f64));
             }
         }
     }
@@ -170,7 +171,7 @@ mod tests {
 
     #[test]
     fn the_lattice_fills_a_tetrahedron_evenly() {
-        let lattice = lattice();
+        let lattice = lattice(SAMPLES);
         assert_eq!(lattice.len(), 816);
         assert!((lattice.iter().map(|p| p.1).sum::<f64>() - 1.0).abs() < 1e-12);
         for corner in 0..4 {

@@ -11,9 +11,9 @@ use crate::engine::elements::CellShape;
 use crate::material::kinematics::jacobian_minus_one;
 use crate::material::von_mises;
 use crate::material_point::{PointState, Volumetric};
-use crate::mesh::{CORNERS, trilinear};
-use crate::model::Model;
-use crate::model::opening::{NearCell, VOLUME_PLACE, is_volume_place};
+use crate::mesh::{Mesh, trilinear};
+use crate::model::opening::NearCell;
+use crate::model::{Model, NearTets, lattice};
 use crate::needle::lateral_axes;
 use crate::needle::opening::{FADED, OpeningMap, Station};
 use crate::needle::path_line::PathLine;
@@ -41,6 +41,8 @@ pub struct OpenedPath {
     first: f64,
     spacing: f64,
     sections: Vec<Station>,
+    /// Tetrahedra that the map reaches; none of a block, whose cells are found by their place.
+    near: Option<NearTets>,
     /// Gradient of the displacement at the nodes that the map reaches: mean of the cells around each, by their volumes.
     gradients: BTreeMap<usize, DMat3>,
     /// Von Mises stress of the cells, of the places where their nodes are seen [Pa]; NaN in those that the path runs through.
@@ -115,6 +117,7 @@ impl OpenedPath {
             first: opening.stations[0].depth,
             spacing: opening.spacing,
             sections,
+            near: model.mesh.as_tets().map(|mesh| NearTets::new(mesh, &model.path_line(), FADED * opening.shaft)),
             gradients: sums.into_iter().filter_map(mean).collect(),
             model: model.clone(),
             coarse: closed.to_vec(),
@@ -230,12 +233,19 @@ impl OpenedPath {
 
     /// The smoothed gradient at a rest position, and the cell there.
     fn gradient_at(&self, rest: DVec3) -> Option<(DMat3, usize)> {
-        let block = self.model.mesh.as_block()?;
-        let ([i, j, k], at) = block.locate(rest);
-        let cell = block.cell_index(i, j, k);
-        let (weights, _) = trilinear(at, block.cell_size(cell));
+        let (cell, weights) = match &self.model.mesh {
+            Mesh::Block(block) => {
+                let ([i, j, k], at) = block.locate(rest);
+                let cell = block.cell_index(i, j, k);
+                (cell, trilinear(at, block.cell_size(cell)).0)
+            }
+            Mesh::Tets(mesh) => {
+                let (cell, weights, _) = self.near.as_ref()?.find(mesh, rest)?;
+                (cell, std::array::from_fn(|i| weights.get(i).copied().unwrap_or(0.0)))
+            }
+        };
         let (mut sum, mut total) = (DMat3::ZERO, 0.0);
-        for (node, weight) in block.cell_nodes(cell).iter().zip(weights) {
+        for (node, weight) in self.model.mesh.cell_nodes(cell).iter().zip(weights) {
             if let Some(h) = self.gradients.get(node) {
                 sum += *h * weight;
                 total += weight;
@@ -293,37 +303,48 @@ impl OpenedPath {
 
     /// Cells that the map reaches; `u`: displacement of every node, `closed`: von Mises stress of every cell, both with the closed path [m, Pa].
     pub fn cells(&self, u: &[DVec3], closed: &[f64]) -> Vec<OpenedCell> {
-        let Some((opening, block)) = self.model.opening().zip(self.model.mesh.as_block()) else { return Vec::new() };
+        let (Some(opening), mesh) = (self.model.opening(), &self.model.mesh) else { return Vec::new() };
+        // Places in a cell by the weights of its corners, with their parts of its volume.
         let part = |n: usize| (n as f64 + 0.5) / PLACES as f64;
+        let in_cube = |n: usize| DVec3::new(part(n % PLACES), part(n / PLACES % PLACES), part(n / PLACES / PLACES));
+        let places: Vec<([f64; 8], f64)> = match mesh {
+            Mesh::Block(_) => {
+                let count = PLACES.pow(3);
+                (0..count).map(|n| (trilinear(in_cube(n), DVec3::ONE).0, 1.0 / count as f64)).collect()
+            }
+            Mesh::Tets(_) => {
+                let of_eight = |w: [f64; 4]| std::array::from_fn(|i| w.get(i).copied().unwrap_or(0.0));
+                lattice(PLACES).into_iter().map(|(weights, part)| (of_eight(weights), part)).collect()
+            }
+        };
         let of_cell = |near: &NearCell| {
             let cell = near.cell as usize;
-            let (nodes, size) = (block.cell_nodes(cell), block.cell_size(cell));
-            let at = |local: DVec3| {
-                let (weights, _) = trilinear(local, size);
-                let corners = nodes.iter().zip(weights);
-                corners.fold([DVec3::ZERO; 2], |[rest, moved], (node, weight)| {
-                    [rest + block.rest_position(*node) * weight, moved + u[*node] * weight]
+            let nodes = mesh.cell_nodes(cell);
+            let at = |weights: &[f64; 8]| {
+                nodes.iter().zip(weights).fold([DVec3::ZERO; 2], |[rest, moved], (node, weight)| {
+                    [rest + mesh.rest_position(*node) * *weight, moved + u[*node] * *weight]
                 })
             };
-            let stress = |n: usize| {
-                let [rest, moved] =
-                    at(DVec3::new(part(n % PLACES), part(n / PLACES % PLACES), part(n / PLACES / PLACES)));
+            let stress = |weights: &[f64; 8]| {
+                let [rest, moved] = at(weights);
                 // Ahead of the tip cells that the path runs through further up are those of the closed path.
                 let coarse = if self.coarse[cell].is_nan() { closed[cell] } else { self.coarse[cell] };
                 self.at(rest, rest + moved).map_or(coarse, |at| coarse + at.weight * (at.von_mises - coarse))
             };
-            let von_mises = (0..PLACES.pow(3)).map(stress).sum::<f64>() / PLACES.pow(3) as f64;
+            let von_mises = places.iter().map(|(weights, part)| part * stress(weights)).sum();
             // As the engines take the volume: what fading does at four places, what tissue grows by in the whole cell.
             let stations = &self.sections[usize::from(near.first)..][..usize::from(near.count)];
             let section = Station::mean(stations);
             if section.radius == 0.0 {
                 return OpenedCell { cell, von_mises, grown: 0.0 };
             }
-            let fades = (0..8).filter(|corner| is_volume_place(*corner)).map(|corner| {
-                let [rest, moved] = at(DVec3::splat(0.5) + DVec3::from(CORNERS[corner]) * (0.5 * VOLUME_PLACE));
-                self.map.dilation(&section, rest + moved).less_one / 4.0
-            });
-            OpenedCell { cell, von_mises, grown: fades.sum::<f64>() + section.radius.powi(2) * near.growth[0] }
+            let shape = CellShape::new(mesh, cell);
+            let gradient = DMat3::IDENTITY + shape.displacement_gradient(&shape.gather(u));
+            let middle =
+                nodes.iter().map(|node| mesh.rest_position(*node) + u[*node]).sum::<DVec3>() / nodes.len() as f64;
+            let dilation = |offset: DVec3| self.map.dilation(&section, middle + gradient * offset).less_one;
+            let fades = mesh.volume_places(cell).map(dilation).iter().sum::<f64>() / 4.0;
+            OpenedCell { cell, von_mises, grown: fades + section.radius.powi(2) * near.growth[0] }
         };
         opening.cells.iter().map(of_cell).collect()
     }

@@ -2,6 +2,8 @@
 //! alone. Each bound has a reason of its own; random scenes that keep all of them are the reasonable ones
 //! ([`crate::stability::random`]).
 
+use std::collections::BTreeSet;
+
 use glam::DVec3;
 
 use crate::effects::TissueMaterial;
@@ -66,12 +68,16 @@ fn unfit_cells(model: &Model) -> Option<String> {
     let edge = match &model.mesh {
         Mesh::Block(_) => model.scene.tissue.cell_size,
         Mesh::Tets(mesh) => {
-            let volume: f64 = plan.cells.iter().map(|path| mesh.volume(path.cell as usize)).sum();
-            (6.0 * std::f64::consts::SQRT_2 * volume / plan.cells.len().max(1) as f64).cbrt()
+            let on_path: BTreeSet<u32> = match &plan.opening {
+                Some(opening) => opening.clusters.iter().map(|cluster| cluster.cell).collect(),
+                None => plan.cells.iter().map(|path| path.cell).collect(),
+            };
+            let volume: f64 = on_path.iter().map(|cell| mesh.volume(*cell as usize)).sum();
+            (6.0 * std::f64::consts::SQRT_2 * volume / on_path.len().max(1) as f64).cbrt()
         }
     };
     let across = edge / (2.0 * plan.needle.radius);
-    if across < FINEST_TETRAHEDRA && model.mesh.as_tets().is_some() {
+    if across < FINEST_TETRAHEDRA && model.mesh.as_tets().is_some() && plan.opening.is_none() {
         return Some(format!(
             "tetrahedra of {across:.2} needle diameters on the path: under a tip so fine ones turn inside out, since its springs pull at \
              single nodes; a mesh with edges of {FINEST_TETRAHEDRA} to {COARSEST} diameters there is advised"

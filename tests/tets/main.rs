@@ -2,6 +2,7 @@
 
 mod loads;
 mod needle;
+mod opening;
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -327,9 +327,9 @@ fn what_a_mesh_refuses_of_a_needle() {
             &["found while the tip moves acts on the block only"],
         ),
         (
-            entry,
+            "[motion]\nentry_point_mm = [1.5, 5, 10]\n",
             format!("{INSERT}[puncture]\nscheme = \"opening\"\n"),
-            &["opening does not carry a mesh of tetrahedra"],
+            &["presses on the surface within 2.477 mm", "(1.500, 5.000, 10.000) mm", "puncture.scheme = \"ring\""],
         ),
         (
             entry,

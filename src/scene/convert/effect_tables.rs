@@ -135,7 +135,7 @@ impl Check<'_> {
     ) {
         let is_named = file.puncture.as_ref().is_some_and(|t| t.scheme.is_some());
         let (Some(Tool::Needle(needle)), false) = (tool, is_named) else { return };
-        let without = not_opened(effects, tool, file.tissue.mesh.is_some());
+        let without = not_opened(effects, tool);
         let unknown = || {
             all_materials(own, regions)
                 .filter(|(_, material)| !material.rigid)
@@ -174,7 +174,7 @@ impl Check<'_> {
         if effects.puncture.is_none_or(|p| p.scheme != SchemeWord::Opening) {
             return;
         }
-        let found = not_opened(effects, tool, false);
+        let found = not_opened(effects, tool);
         if !found.is_empty() {
             self.problems.report(
                 "puncture.scheme",
@@ -425,10 +425,9 @@ impl Check<'_> {
 }
 
 /// What of a scene the scheme `opening` does not carry yet.
-fn not_opened(effects: &EffectSet, tool: Option<&Tool>, tets: bool) -> Vec<&'static str> {
+fn not_opened(effects: &EffectSet, tool: Option<&Tool>) -> Vec<&'static str> {
     let is_hollow = matches!(tool, Some(Tool::Needle(needle)) if needle.bore.is_some());
     let without = [
-        (tets, "a mesh of tetrahedra"),
         (effects.cohesive.is_some(), "the effect cohesive"),
         (effects.plasticity.is_some(), "the effect plasticity"),
         (effects.damage.is_some(), "the effect damage"),

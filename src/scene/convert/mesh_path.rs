@@ -4,9 +4,12 @@ use glam::DVec3;
 
 use super::super::file::{MotionTable, SceneFile};
 use super::{Check, MM, PATH_MARGIN};
+use crate::effects::puncture::SchemeWord;
 use crate::mesh::tet_path::{NoPath, TetPath};
 use crate::mesh::{TetMesh, Tissue};
-use crate::needle::{Motion, Phase, Tool, tip_lines};
+use crate::model::lines_of_tip;
+use crate::needle::tip_contact::DISC;
+use crate::needle::{Motion, Phase, Tool};
 use crate::scene::{FaceCondition, Target};
 use crate::units::four_digits;
 
@@ -27,10 +30,10 @@ pub(super) struct Entry {
     pub direction: DVec3,
 }
 
-/// Lines around the axis of a tool that must lie in the tissue.
-fn lines_of(tool: Option<&Tool>, direction: DVec3) -> Vec<DVec3> {
+/// Lines around the axis of a tool that must lie in the tissue; in the scheme `opening` they lie farther from the axis than the needle is thick.
+fn lines_of(tool: Option<&Tool>, direction: DVec3, scheme: SchemeWord) -> Vec<DVec3> {
     match tool {
-        Some(Tool::Needle(needle)) => tip_lines(direction, needle.radius, 0.0, true),
+        Some(Tool::Needle(needle)) => lines_of_tip(direction, needle, scheme),
         _ => Vec::new(),
     }
 }
@@ -119,7 +122,7 @@ impl Check<'_> {
             return None;
         }
         let Some(mesh) = mesh else { return Some(Entry { entry: near, direction }) };
-        let way = match TetPath::new(mesh, near, direction, &lines_of(tool, direction)) {
+        let way = match TetPath::new(mesh, near, direction, &lines_of(tool, direction, SchemeWord::Ring)) {
             Ok(way) => way,
             Err(why) => {
                 self.no_path(why, near, direction, mesh);
@@ -230,15 +233,15 @@ impl Check<'_> {
         &mut self,
         mesh: &TetMesh,
         tool: Option<&Tool>,
-        motion: &Motion,
+        (motion, scheme): (&Motion, SchemeWord),
         faces: &[FaceCondition; 6],
     ) {
-        self.path_in_mesh(mesh, tool, motion);
+        self.path_in_mesh(mesh, tool, motion, scheme);
         self.loads_on_mesh(faces, mesh);
     }
 
     /// The path stays in the mesh to its end, with room around it.
-    fn path_in_mesh(&mut self, mesh: &TetMesh, tool: Option<&Tool>, motion: &Motion) {
+    fn path_in_mesh(&mut self, mesh: &TetMesh, tool: Option<&Tool>, motion: &Motion, scheme: SchemeWord) {
         if let Some(Tool::Sphere { radius } | Tool::FlatPunch { radius, .. }) = tool {
             let (_, edge) = super::mesh::extent(mesh);
             if *radius < NARROW * edge {
@@ -250,10 +253,22 @@ impl Check<'_> {
                 ));
             }
         }
-        let Some(Tool::Needle(_)) = tool else { return };
-        let Ok(way) = TetPath::new(mesh, motion.entry, motion.direction, &lines_of(tool, motion.direction)) else {
-            return;
-        };
+        let Some(Tool::Needle(needle)) = tool else { return };
+        let lines = |scheme: SchemeWord| lines_of(tool, motion.direction, scheme);
+        let Ok(way) = TetPath::new(mesh, motion.entry, motion.direction, &lines(SchemeWord::Ring)) else { return };
+        if TetPath::new(mesh, motion.entry, motion.direction, &lines(scheme)).is_err() {
+            self.problems.report(
+                "motion.entry_point_mm",
+                format!(
+                    "the scheme opening presses on the surface within {} mm of the axis before the puncture, and there the surface is \
+                     narrower or more bent than that at {} mm",
+                    four_digits(DISC * needle.radius / MM),
+                    shown(motion.entry)
+                ),
+                "at the rim of the mesh",
+                "choose another entry point or direction, a thinner needle, or puncture.scheme = \"ring\"",
+            );
+        }
         let most = way.end().min(way.axis.end - PATH_MARGIN);
         let depth = |phase: &Phase| match *phase {
             Phase::Insert { depth, .. } => depth,

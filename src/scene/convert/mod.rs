@@ -43,6 +43,7 @@ use crate::effects::SELF_CONTAINED;
 use crate::effects::mass_scaling::Loading;
 use crate::effects::own::OwnEffect;
 use crate::effects::parameters::Table;
+use crate::effects::puncture::SchemeWord;
 use crate::mesh::{BlockMesh, Mesh, TetMesh};
 use crate::needle::Phase;
 use crate::reading::{self, Unread};
@@ -198,7 +199,8 @@ impl Check<'_> {
         }
         self.cohesive_openings(file, &material, tissue.cell_size, &effects);
         if let Some(mesh) = &mesh {
-            self.geometry_of_mesh(mesh, tool.as_ref(), &motion, &faces);
+            let scheme = effects.puncture.map_or(SchemeWord::Ring, |p| p.scheme);
+            self.geometry_of_mesh(mesh, tool.as_ref(), (&motion, scheme), &faces);
         } else {
             let open_bottom = faces[Face::ZMin as usize].fixed == [false; 3] && effects.cohesive.is_none();
             self.geometry(&tissue, tool.as_ref(), &motion, open_bottom);
