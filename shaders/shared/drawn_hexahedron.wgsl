@@ -40,16 +40,8 @@ fn seen_strain(cell: vec3<u32>, H: mat3x3<f32>) -> mat3x3<f32> {
             slope_y(shape, gradient[0], gradient[1]),
             gradient[2] * layer_edge(cell.z).quarter_inverse,
         );
-    } else if (beside.w > 0.0) {
-        let away = beside.xyz / max(distance, 1e-9);
-        let rho = max(distance, 0.5 * shaft);
-        let g = sqrt(1.0 + beside.w * beside.w / (rho * rho));
-        let t = drawn_needle.direction.xyz;
-        for (var a = 0u; a < 3u; a++) {
-            var column = H[a];
-            column[a] += 1.0;
-            out[a] += (column - t * dot(t, column)) * (g - 1.0) + away * (dot(away, column) * (1.0 / g - g));
-        }
+    } else {
+        out = strain_on_path(drawn_needle, H, beside);
     }
     return out;
 }

@@ -9,6 +9,8 @@ struct DrawnNeedle {
     opened: vec4<f32>,
     // Where the middle of a section lies aside of the axis for its bevel, over its radius.
     bevel: vec4<f32>,
+    // Middle of the box around a mesh of tetrahedra, from which its nodes are told [m].
+    middle: vec4<f32>,
     // How the axis bends, from the tip on [m].
     bend: array<vec4<f32>, 32>,
 }
@@ -33,4 +35,22 @@ fn pushed_aside(needle: DrawnNeedle, beside: vec4<f32>) -> vec3<f32> {
     let left = 1.0 - x * x * x * (10.0 - x * (15.0 - 6.0 * x));
     let least = 1e-3 * shaft;
     return beside.xyz * (sqrt(1.0 + beside.w * beside.w * left / (square + least * least)) - 1.0);
+}
+
+// F - I of a cell that the path runs through, by the map at its middle; `beside`: of beside_axis there.
+fn strain_on_path(needle: DrawnNeedle, H: mat3x3<f32>, beside: vec4<f32>) -> mat3x3<f32> {
+    var out = H;
+    if (beside.w > 0.0) {
+        let distance = length(beside.xyz);
+        let away = beside.xyz / max(distance, 1e-9);
+        let rho = max(distance, 0.5 * needle.tip.w);
+        let g = sqrt(1.0 + beside.w * beside.w / (rho * rho));
+        let t = needle.direction.xyz;
+        for (var a = 0u; a < 3u; a++) {
+            var column = H[a];
+            column[a] += 1.0;
+            out[a] += (column - t * dot(t, column)) * (g - 1.0) + away * (dot(away, column) * (1.0 / g - g));
+        }
+    }
+    return out;
 }

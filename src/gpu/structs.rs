@@ -45,6 +45,7 @@ shared_structs! {
         direction: [f32; 4],
         opened: [f32; 4],
         bevel: [f32; 4],
+        middle: [f32; 4],
         bend: [[f32; 4]; 32],
     }
     /// shaders/shared/point_history.wgsl

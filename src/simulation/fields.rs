@@ -47,11 +47,13 @@ impl Simulation {
             let vector = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
             let mean = opened.iter().sum::<f64>() / opened.len().max(1) as f64;
             let line = self.centre_line();
+            let (low, high) = self.model.mesh.bounds();
             Some(DrawnNeedle {
                 tip: vector(pose.tip, opening.shaft),
                 direction: vector(pose.direction, opening.tip_length),
                 opened: [mean as f32, line.map_or(0.0, |line| 1.0 / line.spacing) as f32, 0.0, 0.0],
                 bevel: vector(swing(plan.reference, pose.direction, plan.profile.shift), 0.0),
+                middle: vector(0.5 * (low + high), 0.0),
                 bend: line.map_or_else(Default::default, |line| line.offset.map(|offset| vector(offset, 0.0))),
             })
         };

@@ -248,9 +248,9 @@ impl FlexibleNeedle {
                 continue;
             }
             let last = n == count - 1;
-            // What goes on as it went meets no inertia; half of it, for the same reason as above.
+            // What goes on as it went meets no inertia: with half of it 2.1 % of the work were missing beside a bevel that drifts, with all 1.6 %.
             let aside = (self.end.nodes[n] - self.start.nodes[n]).reject_from_normalized(axis);
-            let drift = aside * (0.5 * 1.5 * dynamic / stiffness);
+            let drift = aside * (1.5 * dynamic / stiffness);
             let k = stiffness * if last { 0.5 * h } else { h };
             let mut spring = NodeSpring::lateral(k, axis, mean + axis * ahead + drift);
             if last {

@@ -170,3 +170,61 @@ fn the_engines_agree_on_fibres_and_relaxation_beside_the_path() {
         }
     }
 }
+
+/// A mesh of a generator with five tissues: the path opens in all of them, on all engines alike, and what is drawn of it lies beside the needle.
+#[test]
+fn the_path_opens_in_all_tissues_of_the_forearm() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/forearm_needle.toml");
+    let fast = ["motion.phase.0.speed_mm_s=10.0", "motion.phase.0.depth_mm=9.5", "outputs.pictures_at_depth_mm=[]"];
+    let fast = fast.map(String::from);
+    let scene = Scene::load(&path, &fast).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(scene.notices, Vec::<String>::new());
+    let mut engines = vec![EngineChoice::Cpu64, EngineChoice::Cpu];
+    engines.extend(gpu().map(|_| EngineChoice::Gpu));
+    let mut runs: Vec<Vec<FrameRecord>> = Vec::new();
+    for engine in engines {
+        let mesh = scene.mesh.clone().unwrap();
+        let all = frames(&format!("forearm, {engine:?}"), Simulation::with_mesh(scene.clone(), mesh, engine).unwrap());
+        assert!(
+            all.last().unwrap().tip_coordinate > 8.5e-3,
+            "the tip stands at {} m",
+            all.last().unwrap().tip_coordinate
+        );
+        if let Some(exact) = runs.first() {
+            at_most(&format!("{engine:?}: difference of the force over its peak"), apart(exact, &all), 1e-3);
+        }
+        runs.push(all);
+    }
+    let mesh = scene.mesh.clone().unwrap();
+    let mut simulation = Simulation::with_mesh(scene, mesh, EngineChoice::Cpu).unwrap();
+    simulation.stop_after(56);
+    let record = loop {
+        let record = simulation.next_frame().unwrap().unwrap();
+        if record.frame == 56 {
+            break record;
+        }
+    };
+    let snapshot = simulation.snapshot(&record).unwrap();
+    let (model, opened) = (simulation.model.clone(), snapshot.opened.as_ref().unwrap());
+    let (tip, direction) = snapshot.tool_pose.unwrap();
+    let radius = model.scene.needle().unwrap().radius;
+    let mut beside = 0;
+    for node in &model.opening().unwrap().nodes {
+        let lever = model.mesh.rest_position(*node as usize) + opened.displacement[*node as usize] - tip;
+        let behind = -lever.dot(direction);
+        let from_axis = (lever + direction * behind).length();
+        if behind > 5e-3 && behind < record.depth - 2e-3 {
+            assert!(
+                from_axis > 0.93 * radius,
+                "node {node} at {:.3} radii, {:.2} mm behind the tip",
+                from_axis / radius,
+                behind * 1e3
+            );
+            beside += usize::from(from_axis < 2.5 * radius);
+        }
+    }
+    assert!(beside > 3, "{beside} nodes beside the shaft");
+    // The wall bears more than the cells say of a path of no width.
+    let largest = |fields: &[f64]| fields.iter().copied().fold(0.0, f64::max);
+    assert!(largest(&snapshot.von_mises) > 15e3, "{} Pa", largest(&snapshot.von_mises));
+}
