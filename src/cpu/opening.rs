@@ -213,7 +213,7 @@ impl CpuEngine {
         let sections: Vec<Station> = now.iter().map(|n| n.section).collect();
         let map = opening.map(pose.direction);
         // Lanes know by themselves, but for the measures.
-        let is_asked = self.measures || !self.lanes.as_mut().is_some_and(|lanes| lanes.opening().is_some());
+        let is_asked = self.measures || self.lanes.as_mut().is_none_or(|lanes| lanes.opening().is_none());
         if self.model.mesh.as_tets().is_some() && is_asked {
             self.grown = self.grown_beside(opening, &map, &sections);
         }

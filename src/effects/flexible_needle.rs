@@ -11,7 +11,7 @@
 //! along the axis the line goes on with the hub, and the tip adds its springs in series with the tissue around a disc, `16 mu R`)
 //! give x_(n+2). With a tissue of stiffness k, damping c and mass m per length, force -(k x + c x' + m x''), and a needle that
 //! is soft against it, the roots of the recursion lie in the unit circle where the spring is at least `k/2` about the mean line,
-//! and at least `0.8 c/T` and `1.6 m/T^2`, T the frame, about a line that goes on with its drift. Scaled mass counts more
+//! and at least `0.5 c/T` and `m/T^2`, T the frame, about a line that goes on with its drift. Scaled mass counts more
 //! than stiffness. So
 //! ```text
 //! k_r = k + 2 c/T + 3 m/T^2                                                                [N/m^2]

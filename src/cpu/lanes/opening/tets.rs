@@ -13,7 +13,7 @@ use pulp::Arch;
 use super::gathered::Section;
 use super::sums::{Chunk, OfSpan, PointSums, Rows, SomeSums};
 use super::tet_vectors::{SomeCells, SomeDilations, SomePoints};
-use super::{CHUNK, Found, Laws, STRIDES, Vector, span_sums, station_sums, unknown};
+use super::{CHUNK, Found, Laws, Vector, span_sums, station_sums, unknown};
 use crate::cpu::lanes::tets::GRADIENT;
 use crate::cpu::lanes::{LaneMaterial, WIDEST};
 use crate::cpu::team::Team;
@@ -163,8 +163,7 @@ impl TetOpening {
         let mut points = vec![0.0; ordered.len().div_ceil(WIDEST) * POINT * WIDEST];
         let (mut vectors, mut runs) = (Vec::new(), Vec::<Run>::new());
         for (group, rows) in ordered.chunks(WIDEST).zip(points.chunks_exact_mut(POINT * WIDEST)) {
-            let mut vector = Vector::new(group, runs.len(), |cell| is_polynomial(cell));
-            vector.same_run.truncate(STRIDES.len());
+            let vector = Vector::new(group, runs.len(), is_polynomial);
             for (lane, (cell, station, index)) in group.iter().enumerate() {
                 let (number, point) = (*cell as usize, &plan.stations[*station].points[*index]);
                 let is_next = lane > 0 && group[lane - 1].0 == *cell;
