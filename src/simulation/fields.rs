@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::Simulation;
 use crate::cpu::CpuEngine;
 use crate::engine::State;
-use crate::engine::elements::{CellShape, CellStates, Elements};
+use crate::engine::elements::{CellShape, CellStates, Elements, Grown};
 use crate::error::Result;
 use crate::gpu::structs::DrawnNeedle;
 use crate::material::von_mises;
@@ -75,10 +75,24 @@ fn pose_of(kinematics: &Kinematics, record: &FrameRecord) -> ToolPose {
 
 /// Adds what an opened path does to the fields of cells and nodes, which are those of the closed one.
 fn open(model: &Model, path: OpenedPath, fields: &mut FieldSnapshot) {
-    for OpenedCell { cell, von_mises, grown } in path.cells(&fields.displacement, &fields.von_mises) {
+    let cells = path.cells(&fields.displacement, &fields.von_mises);
+    if model.mesh.as_tets().is_some() {
+        // Nodes average what opening adds to the volume, and neighbours feel it.
+        let elements = Elements::new(model);
+        let grown: Vec<Grown> = cells.iter().map(|c| Grown { cell: c.cell as u32, by: c.grown }).collect();
+        let averaged = |grown: &[Grown]| {
+            elements.averaged_volumetrics(model, &fields.displacement, CellStates::default(), grown).unwrap_or_default()
+        };
+        let (closed, opened) = (averaged(&[]), averaged(&grown));
+        for (pressure, (closed, opened)) in fields.pressure.iter_mut().zip(closed.iter().zip(&opened)) {
+            *pressure -= opened.stress - closed.stress;
+        }
+    }
+    for OpenedCell { cell, von_mises, grown } in cells {
         fields.von_mises[cell] = von_mises;
-        let bulk_modulus = model.material(cell).law.bulk_modulus;
-        fields.pressure[cell] -= bulk_modulus * fields.jacobian[cell] * grown;
+        if model.mesh.as_block().is_some() {
+            fields.pressure[cell] -= model.material(cell).law.bulk_modulus * fields.jacobian[cell] * grown;
+        }
         fields.jacobian[cell] *= 1.0 + grown;
     }
     fields.opened_displacement.clone_from(&path.displacement);
