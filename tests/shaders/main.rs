@@ -59,6 +59,9 @@ fn scenes() -> Vec<Features> {
     scenes.push(Features { free_path: true, regions: true, ..scene(true, true) });
     scenes.extend([tetrahedra(false, false), tetrahedra(true, false), tetrahedra(false, true)]);
     scenes.push(Features { loaded_faces: true, ..tetrahedra(true, true) });
+    scenes.push(Features { opening: true, ..tetrahedra(false, false) });
+    scenes.push(Features { opening: true, wide: true, ..tetrahedra(false, true) });
+    scenes.push(Features { opening: true, loaded_faces: true, ..tetrahedra(true, true) });
     scenes
 }
 
@@ -375,6 +378,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "OwnPoint",
         "OwnStress",
         "TornContact",
+        "Dilated",
     ];
     for name in shader.keys().filter(|n| !local.contains(&n.as_str())) {
         assert!(host.contains(name.as_str()), "struct {name} of the shaders is unknown to the host");
