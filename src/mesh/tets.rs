@@ -172,3 +172,47 @@ impl TetMesh {
         self.positions.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
     }
 }
+
+/// Barycentric coordinates of points all over a tetrahedron, and the part of its volume that each stands for: the midpoints of small cubes,
+/// `samples` per edge, with `u >= v >= w`, which is one of the six tetrahedra that a cube falls into; points on its faces belong to several of
+/// them.
+pub fn lattice(samples: usize) -> Vec<([f64; 4], f64)> {
+    let mut points = Vec::new();
+    for i in 0..samples {
+        for j in 0..=i {
+            for k in 0..=j {
+                let [u, v, w] = [i, j, k].map(|n| (n as f64 + 0.5) / samples as f64);
+                let orders = match (i == j, j == k) {
+                    (false, false) => 6,
+                    (true, true) => 1,
+                    _ => 3,
+                };
+                points.push(([1.0 - u, u - v, v - w, w], f64::from(orders) / samples.pow(3) as f64));
+            }
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lattice_fills_a_tetrahedron_evenly() {
+        let lattice = lattice(16);
+        assert_eq!(lattice.len(), 816);
+        assert!((lattice.iter().map(|p| p.1).sum::<f64>() - 1.0).abs() < 1e-12);
+        for corner in 0..4 {
+            let mean: f64 = lattice.iter().map(|(w, part)| w[corner] * part).sum();
+            assert!((mean - 0.25).abs() < 2e-3, "{mean}");
+            // Half of the way to the opposite face an eighth of the volume is cut off; points on the cut are half beyond it.
+            let beyond = |weight: f64| 0.5 * (f64::from(weight > 0.5 + 1e-9) + f64::from(weight > 0.5 - 1e-9));
+            let part: f64 = lattice.iter().map(|(w, part)| beyond(w[corner]) * part).sum();
+            assert!((part - 0.125).abs() < 0.02, "{part}");
+        }
+        assert!(
+            lattice.iter().all(|(w, _)| (w.iter().sum::<f64>() - 1.0).abs() < 1e-12 && w.iter().all(|w| *w >= 0.0))
+        );
+    }
+}

@@ -22,7 +22,6 @@ pub use opening_places::NearTets;
 pub use puncture::{
     ANCHOR_COUNT, LARGEST_ANCHOR_COUNT, LARGEST_SEGMENT_COUNT, PathCell, PathSegment, PuncturePlan, TipAnchor,
 };
-pub use tet_puncture::{lattice, lines_of_tip};
 
 use crate::effects::puncture::SchemeWord;
 use crate::effects::{EffectSet, cohesive};

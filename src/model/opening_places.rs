@@ -3,11 +3,11 @@
 
 use glam::DVec3;
 
+use crate::mesh::tets::lattice;
 use crate::mesh::{BlockMesh, CORNERS, Mesh, TetMesh, trilinear};
 use crate::needle::path_line::PathLine;
 
 use super::opening::{VOLUME_PLACE, is_volume_place};
-use super::tet_puncture::lattice;
 
 /// Places per edge of a hexahedron at which it is asked what part of it lies near the path.
 const SAMPLES: usize = 12;

@@ -17,7 +17,7 @@ use crate::needle::opening::Growth;
 use crate::needle::path_line::PathLine;
 use crate::needle::slit::REFERENCE_EDGE;
 use crate::needle::tip_contact::{DISC, TipContact};
-use crate::needle::{NeedleShape, PlannedPath, Tool, lateral_axes, ring_around, tip_lines};
+use crate::needle::{DISC_RINGS, NeedleShape, PlannedPath, Tool, disc_lines, ring_around, tip_lines};
 use crate::penetration::surface::Surface;
 
 /// Most stretches of one path.
@@ -26,11 +26,8 @@ pub const LARGEST_SEGMENT_COUNT: usize = 16;
 /// Number of tip springs of a solid needle on a path without a slit: one on the axis, 6 at R/2, 12 at R.
 pub const ANCHOR_COUNT: usize = 19;
 
-/// Rings of anchors around the one on the axis, in the scheme `opening`: each has six more than the one within it.
-const RINGS: usize = 4;
-
 /// Most anchors: those of the scheme `opening`.
-pub const LARGEST_ANCHOR_COUNT: usize = 1 + 3 * RINGS * (RINGS + 1);
+pub const LARGEST_ANCHOR_COUNT: usize = 1 + 3 * DISC_RINGS * (DISC_RINGS + 1);
 
 /// Rest radius of the hole over that of the needle in a material of unknown toughness: scene files are refused for it, a program that
 /// builds its scene is not.
@@ -203,10 +200,10 @@ impl Model {
         let deepest = deepest.min(exit);
         let surfaces = self.separated_surfaces(&path);
         let anchors = match opening {
-            true if has_turned => disc_offsets(path.direction, &needle)
+            true if has_turned => disc_lines(path.direction, needle.radius)
                 .map(|o| TipAnchor { surface: path.entry + o, axial_offset: 0.0 })
                 .collect(),
-            true => disc_offsets(path.direction, &needle).map(|o| anchor_beside(&path, o, case)).collect(),
+            true => disc_lines(path.direction, needle.radius).map(|o| anchor_beside(&path, o, case)).collect(),
             false => tip_anchors(&path, &needle, self.effects.cohesive.is_some(), case),
         };
         // Tip springs act on the corners of the cell that an anchor is in: one cell beyond the outermost anchor, and a path that is laid beside
@@ -517,26 +514,6 @@ impl PlannedPath {
     pub(crate) fn length_of(&self, edges: DVec3) -> f64 {
         edges.dot(self.normal.abs()) / self.direction.dot(self.normal).abs()
     }
-}
-
-/// Places across the path of the lines on which the tip acts in the scheme `opening`: each stands for the same part of a disc of the radius
-/// [`DISC`] R.
-pub fn disc_offsets(direction: DVec3, needle: &NeedleShape) -> impl Iterator<Item = DVec3> + use<> {
-    let (e1, e2) = lateral_axes(direction);
-    let within = |ring: usize| (1 + 3 * ring * (ring + 1)) as f64;
-    let radius_of_needle = needle.radius;
-    (0..=RINGS).flat_map(move |ring| {
-        // Half of the area of the ring lies within this radius.
-        let radius = match ring {
-            0 => 0.0,
-            _ => DISC * radius_of_needle * (0.5 * (within(ring - 1) + within(ring)) / within(RINGS)).sqrt(),
-        };
-        let count = (6 * ring).max(1);
-        (0..count).map(move |i| {
-            let angle = std::f64::consts::TAU * i as f64 / count as f64;
-            (e1 * angle.cos() + e2 * angle.sin()) * radius
-        })
-    })
 }
 
 /// The anchor whose line runs at `offset` [m] from the path.

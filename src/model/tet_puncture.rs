@@ -4,12 +4,13 @@ use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
-use super::puncture::{Way, disc_offsets};
+use super::puncture::Way;
 use super::{ContactNode, Model, PathCell, PuncturePlan, TipAnchor};
 use crate::effects::puncture::{self, SchemeWord};
+use crate::mesh::tets::lattice;
 use crate::mesh::{Mesh, TetLine, TetMesh, TetPath};
 use crate::needle::path_line::PathLine;
-use crate::needle::{NeedleShape, PlannedPath, tip_lines};
+use crate::needle::{NeedleShape, PlannedPath, disc_lines, tip_lines};
 
 /// Points per edge of the cube that is folded into a tetrahedron to ask where the path passes; 816 of them differ.
 const SAMPLES: usize = 16;
@@ -24,7 +25,10 @@ impl Model {
         let Mesh::Tets(mesh) = &self.mesh else { return };
         let motion = &self.scene.motion;
         let opening = params.scheme == SchemeWord::Opening;
-        let offsets = lines_of_tip(motion.direction, &needle, params.scheme);
+        let offsets: Vec<DVec3> = match params.scheme {
+            SchemeWord::Opening => disc_lines(motion.direction, needle.radius).collect(),
+            SchemeWord::Ring => tip_lines(motion.direction, needle.radius, 0.0, true),
+        };
         let Ok(way) = TetPath::new(mesh, motion.entry, motion.direction, &offsets) else {
             // The needle passes by, and touches nothing.
             let effects = &mut self.effects;
@@ -68,14 +72,6 @@ impl Model {
             let line = PathLine::straight(path.entry, path.direction);
             self.plan_opening(&line, deepest.min(exit), tilt);
         }
-    }
-}
-
-/// Places across a path of the lines on which the tip acts, from its axis [m]: those of the scheme.
-pub fn lines_of_tip(direction: DVec3, needle: &NeedleShape, scheme: SchemeWord) -> Vec<DVec3> {
-    match scheme {
-        SchemeWord::Opening => disc_offsets(direction, needle).collect(),
-        SchemeWord::Ring => tip_lines(direction, needle.radius, 0.0, true),
     }
 }
 
@@ -142,48 +138,4 @@ fn path_cells(mesh: &TetMesh, path: &PlannedPath, params: &puncture::Params, dee
         })
     });
     passed.collect()
-}
-
-/// Barycentric coordinates of points all over a tetrahedron, and the part of its volume that each stands for: the midpoints of small cubes,
-/// `samples` per edge, with `u >= v >= w`, which is one of the six tetrahedra that a cube falls into; points on its faces belong to several of
-/// them.
-pub fn lattice(samples: usize) -> Vec<([f64; 4], f64)> {
-    let mut points = Vec::new();
-    for i in 0..samples {
-        for j in 0..=i {
-            for k in 0..=j {
-                let [u, v, w] = [i, j, k].map(|n| (n as f64 + 0.5) / samples as f64);
-                let orders = match (i == j, j == k) {
-                    (false, false) => 6,
-                    (true, true) => 1,
-                    _ => 3,
-                };
-                points.push(([1.0 - u, u - v, v - w, w], f64::from(orders) / samples.pow(3) as f64));
-            }
-        }
-    }
-    points
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_lattice_fills_a_tetrahedron_evenly() {
-        let lattice = lattice(SAMPLES);
-        assert_eq!(lattice.len(), 816);
-        assert!((lattice.iter().map(|p| p.1).sum::<f64>() - 1.0).abs() < 1e-12);
-        for corner in 0..4 {
-            let mean: f64 = lattice.iter().map(|(w, part)| w[corner] * part).sum();
-            assert!((mean - 0.25).abs() < 2e-3, "{mean}");
-            // Half of the way to the opposite face an eighth of the volume is cut off; points on the cut are half beyond it.
-            let beyond = |weight: f64| 0.5 * (f64::from(weight > 0.5 + 1e-9) + f64::from(weight > 0.5 - 1e-9));
-            let part: f64 = lattice.iter().map(|(w, part)| beyond(w[corner]) * part).sum();
-            assert!((part - 0.125).abs() < 0.02, "{part}");
-        }
-        assert!(
-            lattice.iter().all(|(w, _)| (w.iter().sum::<f64>() - 1.0).abs() < 1e-12 && w.iter().all(|w| *w >= 0.0))
-        );
-    }
 }

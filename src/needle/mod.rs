@@ -263,6 +263,21 @@ pub fn ring_around(direction: DVec3, count: usize, radius: f64, turn: f64) -> im
     })
 }
 
+/// Rings of lines around the one on the axis in [`disc_lines`]: each has six more than the one within it.
+pub const DISC_RINGS: usize = 4;
+
+/// Vectors from the axis to the lines on which the tip of a needle of the radius `radius` [m] acts in the scheme `opening`: each stands for the
+/// same part of a disc of the radius [`DISC`](tip_contact::DISC) R.
+pub fn disc_lines(direction: DVec3, radius: f64) -> impl Iterator<Item = DVec3> {
+    let within = |ring: usize| (1 + 3 * ring * (ring + 1)) as f64;
+    (0..=DISC_RINGS).flat_map(move |ring| {
+        // Half of the area of the ring lies within this distance.
+        let part = 0.5 * (within(ring.max(1) - 1) + within(ring)) / within(DISC_RINGS);
+        let from_axis = if ring == 0 { 0.0 } else { tip_contact::DISC * radius * part.sqrt() };
+        ring_around(direction, (6 * ring).max(1), from_axis, 0.0)
+    })
+}
+
 /// Vectors from the axis to the lines on which the tip springs of a solid needle of the radius `radius` [m] are anchored: 6 at R/2,
 /// 12 at R, turned by `turn` [rad]; before them the axis itself where `centre` is true.
 pub fn tip_lines(direction: DVec3, radius: f64, turn: f64, centre: bool) -> Vec<DVec3> {

@@ -7,9 +7,10 @@
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
+use super::corners::GRADIENT;
 use super::number::Lanes;
 use super::points::{Around, Points, VectorPoints};
-use super::tets::{GRADIENT, NO_CELL, Place, SHAPE, TetShapes};
+use super::tets::{NO_CELL, Place, SHAPE, TetShapes};
 use super::{LaneMaterial, WIDEST};
 use crate::engine::elements::{CellInput, CellShape, Elements};
 use crate::material::kinematics::jacobian_minus_one;

@@ -9,6 +9,7 @@
 use glam::DVec3;
 use pulp::Arch;
 
+use super::corners::GRADIENT;
 use super::nodes::{Moved, NodeLines};
 use super::opening::{Carrier, OpeningInLanes, TetOpening, TetsNow};
 use super::points::Points;
@@ -23,8 +24,6 @@ use crate::model::Model;
 
 /// f32 per cell in [`TetShapes::constants`]: `B_i` of the last three corners, length of all four, volume.
 pub(super) const SHAPE: usize = 14;
-/// f32 per cell in [`LaneTets::gradients`].
-pub(super) const GRADIENT: usize = 9;
 /// Nodes of a line, which one call moves.
 const LINE: usize = 64;
 /// In [`TetShapes::cells`]: no cell.

@@ -7,9 +7,8 @@ use super::{Check, MM, PATH_MARGIN};
 use crate::effects::puncture::SchemeWord;
 use crate::mesh::tet_path::{NoPath, TetPath};
 use crate::mesh::{TetMesh, Tissue};
-use crate::model::lines_of_tip;
 use crate::needle::tip_contact::DISC;
-use crate::needle::{Motion, Phase, Tool};
+use crate::needle::{Motion, Phase, Tool, disc_lines, tip_lines};
 use crate::scene::{FaceCondition, Target};
 use crate::units::four_digits;
 
@@ -32,8 +31,9 @@ pub(super) struct Entry {
 
 /// Lines around the axis of a tool that must lie in the tissue; in the scheme `opening` they lie farther from the axis than the needle is thick.
 fn lines_of(tool: Option<&Tool>, direction: DVec3, scheme: SchemeWord) -> Vec<DVec3> {
-    match tool {
-        Some(Tool::Needle(needle)) => lines_of_tip(direction, needle, scheme),
+    match (tool, scheme) {
+        (Some(Tool::Needle(needle)), SchemeWord::Opening) => disc_lines(direction, needle.radius).collect(),
+        (Some(Tool::Needle(needle)), SchemeWord::Ring) => tip_lines(direction, needle.radius, 0.0, true),
         _ => Vec::new(),
     }
 }

@@ -10,7 +10,7 @@ use super::sums::{ChunkSums, SUMS};
 use super::tets::{AtCorners, CELL, CORNER_ROWS, POINT, RUN_SUMS, Step, Tet};
 use super::{Found, Gathered, Lanes, ROOM, STRIDES, opened};
 use crate::cpu::lanes::WIDEST;
-use crate::cpu::lanes::tets::GRADIENT;
+use crate::cpu::lanes::corners::GRADIENT;
 use crate::needle::opening::{Beside, Derivatives, MapIn, squared_norm_bound};
 use crate::number::{Number, Tensor};
 

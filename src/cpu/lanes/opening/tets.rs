@@ -14,7 +14,7 @@ use super::gathered::Section;
 use super::sums::{Chunk, OfSpan, PointSums, Rows, SomeSums};
 use super::tet_vectors::{SomeCells, SomeDilations, SomePoints};
 use super::{CHUNK, Found, Laws, Vector, span_sums, station_sums, unknown};
-use crate::cpu::lanes::tets::GRADIENT;
+use crate::cpu::lanes::corners::GRADIENT;
 use crate::cpu::lanes::{LaneMaterial, WIDEST};
 use crate::cpu::team::Team;
 use crate::mesh::TetMesh;
