@@ -1253,7 +1253,11 @@ fn wrong_regions() {
         &["16 regions", "the GPU holds 16 materials", "keep at most 15"],
     );
     let notices = |text: &str| load_block("", &region(text)).unwrap().notices.join(" ");
-    assert!(notices("layer_mm = [0, 1.5]\nmaterial = { preset = \"fat\" }").contains("less than one cell of 2 mm"));
+    // A face too close to the top for a grid line, one that has its line, and a flat box.
+    assert!(notices("layer_mm = [0, 1.2]\nmaterial = { preset = \"fat\" }").contains("lies within cells of 2 mm"));
+    assert_eq!(notices("layer_mm = [0, 1.5]\nmaterial = { preset = \"fat\" }"), "");
+    let flat = "box_mm = { low = [-4, -4, -1.5], high = [4, 4, 0] }\nmaterial = { preset = \"fat\" }";
+    assert!(notices(flat).contains("less than one cell of 2 mm"), "{}", notices(flat));
     assert!(notices("layer_mm = [0, 0.5]\nmaterial = { preset = \"fat\" }").contains("only its tip forces act"));
     // The snap-back of a region stands at its own table.
     let text = region("layer_mm = [0, 2]\nmaterial = { preset = \"fat\" }\ndamage = { failure_displacement_mm = 0.5 }");

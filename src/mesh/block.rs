@@ -3,7 +3,8 @@
 //! In x and y the fine zone is the bounding box of the planned straight path, widened by `fine_radius` and rounded
 //! to whole cells of edge `h`; the entry point lies `axis_offset_cells` of a cell above a grid line. Outside it the
 //! edges form a geometric series whose ratio is fitted so that the block face is met exactly. In z the cells are
-//! uniform down to 4 mm below the deepest point and grow further below. Without a tool all cells are uniform.
+//! uniform down to 4 mm below the deepest point and grow further below. Without a tool all cells are uniform. Faces of layers
+//! lie on lines (`BlockMesh::lay_on_faces`), or layers would be as thick as whole cells happen to be.
 //!
 //! Surfaces that may separate are grid lines that occur twice: between the two lies a sheet of flat cells without volume
 //! (`is_gap`), whose corners are the two copies of each node. Copies that may not part are tied (see `separation`). Around
@@ -305,6 +306,9 @@ const FITTED_OVER_WANTED_GROWTH: f64 = 1.12;
 /// Smallest edge of a graded cell over the fine edge; a smaller one would cut the stable time step.
 const SMALLEST_EDGE: f64 = 0.7;
 
+/// What passes for a place on a line, in edges.
+const ON_LINE: f64 = 1e-6;
+
 /// Uniform depth kept below the deepest point of the path [m].
 const FINE_BELOW_PATH: f64 = 4.0e-3;
 
@@ -328,6 +332,55 @@ impl BlockMesh {
             lines[i] = at;
             lines.insert(i, at);
         }
+    }
+
+    /// Lays a line of an axis on each of the planes `faces` [m] but where that leaves an edge below 0.7 of those around it, of two faces
+    /// the one that is written first; the lines between two faces keep their number and their grading.
+    pub fn lay_on_faces(&mut self, axis: usize, faces: &[f64]) {
+        let old = &self.lines[axis];
+        let last = old.len() - 1;
+        // A place among the lines, whole on a line.
+        let index = |x: f64| {
+            let i = old.partition_point(|line| *line <= x).clamp(1, last) - 1;
+            let i = i as f64 + (x - old[i]) / (old[i + 1] - old[i]);
+            if (i - i.round()).abs() < ON_LINE { i.round() } else { i }
+        };
+        let mut held: Vec<(f64, f64)> = vec![(0.0, old[0]), (last as f64, old[last])];
+        for face in faces.iter().filter(|face| **face > old[0] && **face < old[last]) {
+            let at = index(*face);
+            if held.iter().all(|(other, _)| (at - other).abs() >= SMALLEST_EDGE) {
+                held.push((at, if at.fract() == 0.0 { old[at as usize] } else { *face }));
+            }
+        }
+        held.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let between = |i: f64| {
+            let line = (i as usize).min(last - 1);
+            if i.fract() == 0.0 { old[i as usize] } else { old[line] + i.fract() * (old[line + 1] - old[line]) }
+        };
+        let mut lines = Vec::with_capacity(old.len());
+        for pair in held.windows(2) {
+            let [(from, x), (to, _)] = [pair[0], pair[1]];
+            let count = (to - from).round().max(1.0);
+            lines.push(x);
+            lines.extend((1..count as usize).map(|k| between(from + (to - from) * k as f64 / count)));
+        }
+        lines.push(old[last]);
+        self.lines[axis] = lines;
+    }
+
+    /// Whether a plane across an axis lies on a line, or outside the block.
+    pub fn has_line(&self, axis: usize, at: f64) -> bool {
+        let lines = &self.lines[axis];
+        let near = |line: &f64| (line - at).abs() <= ON_LINE * self.smallest_edge_along(axis);
+        at < lines[0] || at > lines[lines.len() - 1] || lines.iter().any(near)
+    }
+
+    fn smallest_edge_along(&self, axis: usize) -> f64 {
+        self.lines[axis]
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .filter(|edge| *edge > 0.0)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// The grid of a block, fine around the path of `motion`; `None`: uniform cells.
@@ -603,6 +656,36 @@ mod tests {
         let mesh = BlockMesh::for_tissue(&tissue, Some(&motion([0.0, 0.0], DVec3::NEG_Z, 10.0)));
         assert_shape(&mesh, &tissue);
         assert!(mesh.cells()[2] < 40);
+    }
+
+    #[test]
+    fn faces_of_layers_lie_on_lines() {
+        let tissue = tissue([20.0, 20.0, 16.0], 0.65, 1.45);
+        let plain = BlockMesh::for_tissue(&tissue, Some(&motion([0.0, 0.0], DVec3::NEG_Z, 6.3)));
+        let mut mesh = plain.clone();
+        let faces = [0.0, -1.0, -4.0, -5.0, -7.0, -8.0].map(|z| z * 1e-3);
+        mesh.lay_on_faces(2, &faces);
+        assert!(faces.iter().all(|face| mesh.has_line(2, *face)));
+        assert!(!plain.has_line(2, faces[1]));
+        for edges in mesh.lines[2].windows(3).map(|w| [w[1] - w[0], w[2] - w[1]]) {
+            assert!(edges.iter().all(|e| *e > 0.7 * 0.65e-3), "{edges:?}");
+            assert!(edges[0] / edges[1] < 2.0 && edges[1] / edges[0] < 2.0, "{edges:?}");
+        }
+        // Cells below the last face grow as before.
+        assert_eq!(mesh.lines[2][0], -16e-3);
+        assert!((mesh.lines[2][1] - plain.lines[2][1]).abs() < 0.5e-3);
+        // Lines that are there already stay, to the last bit.
+        let mut same = plain.clone();
+        same.lay_on_faces(2, &[plain.lines[2][10], plain.lines[2][12]]);
+        assert_eq!(same, plain);
+        // A face too close to one before it has no line.
+        let mut thin = plain.clone();
+        thin.lay_on_faces(2, &[-2e-3, -2.3e-3, -0.2e-3, -15.9e-3, -20e-3]);
+        assert_eq!(
+            [-2e-3, -2.3e-3, -0.2e-3, -15.9e-3, -20e-3].map(|z| thin.has_line(2, z)),
+            [true, false, false, false, true]
+        );
+        assert_eq!(thin.cells()[2], plain.cells()[2]);
     }
 
     #[test]

@@ -23,8 +23,10 @@ pub const END_TRAVEL: f64 = 0.25e-3;
 pub const MAJOR_DROP: f64 = 0.15;
 /// A drop smaller than this many standard deviations of the frame-to-frame noise is noise.
 const NOISE_FACTOR: f64 = 4.0;
-/// A peak below this fraction of the largest force is first contact, not puncture.
+/// A peak below this fraction of the largest force is first contact, not puncture, unless the tip begins to cut there.
 const LEAST_PEAK: f64 = 0.05;
+/// A tip that has cut less far has not entered the tissue, one that has cut twice as far has [m].
+const ENTERED: f64 = 0.05e-3;
 
 /// What the curve tells. `None` where the curve does not hold it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -53,7 +55,7 @@ impl CurveFigures {
     /// Reads the figures off the records of a run, in order of time.
     pub fn from_records(records: &[FrameRecord]) -> Self {
         let curve: Vec<Point> = frames_on_the_way_in(records)
-            .map(|r| Point { depth: r.depth, force: r.force.axial })
+            .map(|r| Point { depth: r.depth, force: r.force.axial, tip: r.tip_coordinate })
             .filter(|p| p.force.is_finite())
             .collect();
         let Some(end) = curve.last() else {
@@ -119,7 +121,7 @@ pub fn sudden_drops(curve: &[(f64, f64)], fraction: f64) -> Vec<ForceDrop> {
     for &(depth, force) in curve {
         if depth.is_finite() && depth > deepest && force.is_finite() {
             deepest = depth;
-            points.push(Point { depth, force });
+            points.push(Point { depth, force, tip: 0.0 });
         }
     }
     find_drops(&points, &points, fraction, 0.0, usize::MAX)
@@ -131,6 +133,8 @@ struct Point {
     depth: f64,
     /// Axial force [N].
     force: f64,
+    /// How far the tip has cut into the material [m].
+    tip: f64,
 }
 
 /// Value at `x` between the points of a curve with ascending abscissae; `None` outside.
@@ -190,7 +194,8 @@ pub fn major_drops(records: &[FrameRecord]) -> Vec<MajorDrop> {
             _ => {}
         }
         let turned = (force - before.force.axial).abs() >= needed && !further;
-        if turned && !falling && before.force.axial >= LEAST_PEAK * largest {
+        let enters = before.tip_coordinate < ENTERED && frame.tip_coordinate > 2.0 * ENTERED;
+        if turned && !falling && (enters || before.force.axial >= LEAST_PEAK * largest) {
             drops.push(MajorDrop {
                 depth_m: before.depth,
                 tip_coordinate_m: before.tip_coordinate,
@@ -221,7 +226,7 @@ fn median_of_three(curve: &[Point]) -> Vec<Point> {
                 _ => [curve[i - 1].force, curve[i].force, curve[i + 1].force],
             };
             force.sort_by(f64::total_cmp);
-            Point { depth: curve[i].depth, force: force[1] }
+            Point { force: force[1], ..curve[i] }
         })
         .collect()
 }
@@ -240,7 +245,8 @@ fn find_drops(curve: &[Point], smooth: &[Point], fraction: f64, least: f64, at_m
     while drops.len() < at_most {
         let falls_after = |&i: &usize| {
             let here = smooth[i];
-            if here.force <= 0.0 || here.force < LEAST_PEAK * largest {
+            let enters = || here.tip < ENTERED && window_after(smooth, i).iter().any(|p| p.tip > 2.0 * ENTERED);
+            if here.force <= 0.0 || here.force < LEAST_PEAK * largest && !enters() {
                 return false;
             }
             let before = smooth[from..i].iter().rev().take_while(|p| p.depth >= here.depth - DROP_TRAVEL);
@@ -385,6 +391,23 @@ mod tests {
         assert_eq!(figures.force_after_puncture, None);
         near(figures.slope_after_puncture, 100.0, 1e-9);
         near(figures.peak_force, 0.8, 1e-9);
+    }
+
+    /// Liver before a gallbladder that takes fifty times its force.
+    #[test]
+    fn a_soft_surface_before_tough_tissue_is_punctured() {
+        let mut records = insertion(12e-3, |d| if d < 8e-3 { 0.02 * punctured(d) } else { 60.0 * (d - 8e-3) });
+        let figures = CurveFigures::from_records(&records);
+        assert_eq!((figures.puncture_force, major_drops(&records)), (None, vec![]));
+        records
+            .iter_mut()
+            .for_each(|r| r.tip_coordinate = (r.depth - 2.95e-3).max(0.0) * if r.depth > 3.02e-3 { 1.0 } else { 0.0 });
+        let figures = CurveFigures::from_records(&records);
+        near(figures.puncture_force, 0.02, 1e-9);
+        near(figures.puncture_depth, 3e-3, 1e-9);
+        let drops = major_drops(&records);
+        assert_eq!(drops.len(), 1, "{drops:?}");
+        near(Some(drops[0].depth_m), 3e-3, 1e-9);
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 use glam::DVec3;
 
-use super::Scene;
+use super::{Region, Scene};
 use crate::mesh::block::{SLIT_HALF_WIDTH, lines_around};
 use crate::mesh::{BlockMesh, Bore, Mesh, Tissue};
+use crate::needle::Motion;
 
 /// Fewest cells along half of the slit.
 const SLIT_HALF_CELLS: usize = 2;
@@ -23,7 +24,7 @@ impl BlockMesh {
     /// The grid of a scene; fine around the path of its tool, uniform without a tool.
     pub fn for_scene(scene: &Scene) -> BlockMesh {
         let motion = scene.tool.as_ref().map(|_| &scene.motion);
-        let mut mesh = BlockMesh::for_tissue(&scene.tissue, motion);
+        let mut mesh = BlockMesh::layered(&scene.tissue, motion, &scene.regions);
         let Some(cohesive) = &scene.effects.cohesive else { return mesh };
         if let (true, Some(bore)) = (scene.has_bore(), scene.needle().and_then(|n| n.bore)) {
             mesh.follow_bore(&scene.tissue, scene.motion.entry, bore.edge);
@@ -34,7 +35,7 @@ impl BlockMesh {
             // creates up to a tenth of the work (cells of 0.6 mm).
             tissue.axis_offset_cells[slit] = 0.0;
             tissue.axis_offset_cells[1 - slit] = 0.5;
-            mesh = BlockMesh::for_tissue(&tissue, motion);
+            mesh = BlockMesh::layered(&tissue, motion, &scene.regions);
             let across = 1 - slit;
             if let (true, Some(needle)) = (scene.motion.direction[across] == 0.0, scene.needle()) {
                 // Before an upright needle the slit ends on lines, at the same place in every mesh: with ends wherever the
@@ -47,6 +48,15 @@ impl BlockMesh {
         for plane in &cohesive.planes {
             mesh.split(plane.axis, plane.at);
         }
+        mesh
+    }
+
+    /// The grid of a block, as [`BlockMesh::for_tissue`] makes it, with lines on the faces of layers: with layers as thick as whole cells happen
+    /// to be, a skin of 2 mm was 1.8 mm thick in cells of 0.6 mm and 2.4 mm in those of 0.8 mm, and the force before its puncture 5 % lower.
+    pub fn layered(tissue: &Tissue, motion: Option<&Motion>, regions: &[Region]) -> BlockMesh {
+        let mut mesh = BlockMesh::for_tissue(tissue, motion);
+        let faces: Vec<f64> = regions.iter().flat_map(|region| region.shape.layer_faces()).flatten().collect();
+        mesh.lay_on_faces(2, &faces);
         mesh
     }
 

@@ -254,6 +254,14 @@ pub enum RegionShape {
 }
 
 impl RegionShape {
+    /// Heights of the two faces of a layer [m]; `None` for other shapes.
+    pub fn layer_faces(&self) -> Option<[f64; 2]> {
+        match self {
+            RegionShape::Layer { top, bottom } => Some([-top, -bottom]),
+            _ => None,
+        }
+    }
+
     /// True where the point lies inside; a mesh tag has no shape.
     pub fn contains(&self, x: DVec3) -> bool {
         match self {

@@ -214,7 +214,7 @@ impl Check<'_> {
         self.problems.check()?;
         let cells = match &mesh {
             Some(tets) => Mesh::Tets(tets.clone()),
-            None => Mesh::Block(BlockMesh::for_tissue(&tissue, tool.as_ref().map(|_| &motion))),
+            None => Mesh::Block(BlockMesh::layered(&tissue, tool.as_ref().map(|_| &motion), &regions)),
         };
         self.cells(&cells, &material, &regions, &tissue, &effects);
         let scene = Scene {

@@ -14,7 +14,7 @@ use crate::anatomy::Case;
 use crate::effects::puncture::SchemeWord;
 use crate::effects::{EffectSet, TissueMaterial};
 use crate::material::ElasticLaw;
-use crate::mesh::{Mesh, TetMesh, Tissue};
+use crate::mesh::{BlockMesh, Mesh, TetMesh, Tissue};
 use crate::needle::Tool;
 use crate::units::four_digits;
 
@@ -266,15 +266,28 @@ impl Check<'_> {
                      forces act.",
                     region.name
                 ));
-            } else if let Some(thickness) = thickness(&region.shape)
-                && thickness < tissue.cell_size * (1.0 - 1e-9)
-            {
-                self.notices.push(format!(
-                    "Region `{}` is {} mm thick, less than one cell of {} mm: its stiffness is smeared.",
+                continue;
+            }
+            let off = |block: &BlockMesh| {
+                region.shape.layer_faces().and_then(|faces| faces.into_iter().find(|face| !block.has_line(2, *face)))
+            };
+            match (mesh.as_block().map(off), thickness(&region.shape)) {
+                // Too close to another face for a line of its own.
+                (Some(Some(face)), _) => self.notices.push(format!(
+                    "The face of region `{}` {} mm below the top lies within cells of {} mm, too close to another for a \
+                     grid line: the layer is as thick there as whole cells are.",
+                    region.name,
+                    four_digits(-face / MM),
+                    four_digits(tissue.cell_size / MM)
+                )),
+                (Some(None), _) if region.shape.layer_faces().is_some() => {}
+                (_, Some(thickness)) if thickness < tissue.cell_size * (1.0 - 1e-9) => self.notices.push(format!(
+                    "Region `{}` is {} mm thick, less than one cell of {} mm: it is as thick as whole cells are.",
                     region.name,
                     four_digits(thickness / MM),
                     four_digits(tissue.cell_size / MM)
-                ));
+                )),
+                _ => {}
             }
         }
         if effects.plasticity.is_none() || effects.damage.is_none() {
