@@ -174,6 +174,8 @@ impl Model {
                 hole: 0.0,
                 growth: Growth::default(),
                 shear_wave_speed: 0.0,
+                shear_modulus: self.scene.material.law.shear_modulus(),
+                p_wave_modulus: self.scene.material.law.p_wave_modulus(),
             }],
             exit: f64::INFINITY,
             anchors: Vec::new(),

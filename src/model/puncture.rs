@@ -78,6 +78,9 @@ pub struct PathSegment {
     pub growth: Growth,
     /// Speed of shear waves there, with the scaled mass [m/s].
     pub shear_wave_speed: f64,
+    /// Shear modulus and p-wave modulus there [Pa].
+    pub shear_modulus: f64,
+    pub p_wave_modulus: f64,
 }
 
 /// A way through the tissue.
@@ -291,7 +294,8 @@ impl Model {
         if self.composition.fill.is_empty() {
             return;
         }
-        let density = self.scaled_density();
+        let surface = self.path_line().point(SEGMENT_STEP);
+        let density = self.scene.material_at(surface).density * self.mass_scaling();
         for contact in &self.contact_nodes {
             let node = contact.node as usize;
             let least = LEAST_PART * density * self.mesh.block().node_volume(node);
@@ -312,8 +316,10 @@ impl Model {
                 exit: plan.exit,
                 cell_size: self.scene.tissue.cell_size,
                 tilt,
-                shear_modulus: self.scene.material.law.shear_modulus(),
-                p_wave_modulus: self.scene.material.law.p_wave_modulus(),
+                moduli: &|depth| {
+                    let segment = plan.segment(depth.max(0.0));
+                    [segment.shear_modulus, segment.p_wave_modulus]
+                },
                 node_way: self.speed_limit(1.0),
                 hole: &|depth| {
                     let segment = plan.segment(depth.max(0.0));
@@ -346,6 +352,12 @@ impl Model {
         if let Some(LaidPath { line: laid, .. }) = &mut model.laid {
             *laid = line;
             model.plan_puncture();
+        }
+        // What is stretched already keeps its energy.
+        let old = self.opening().map(|old| (old.guide, old.stick));
+        let new = model.puncture.as_mut().and_then(|plan| plan.opening.as_mut());
+        if let (Some(old), Some(new)) = (old, new) {
+            (new.guide, new.stick) = old;
         }
         model
     }
@@ -457,6 +469,8 @@ impl Model {
             hole: UNKNOWN_HOLE * needle.radius,
             growth: Growth::default(),
             shear_wave_speed: (material.law.shear_modulus() / (material.density * self.mass_scaling())).sqrt(),
+            shear_modulus: material.law.shear_modulus(),
+            p_wave_modulus: material.law.p_wave_modulus(),
         };
         let opening = params.scheme == SchemeWord::Opening;
         let steady = opening.then(|| material.steady(needle)).flatten().and_then(Result::ok);

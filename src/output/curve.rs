@@ -23,7 +23,8 @@ pub const END_TRAVEL: f64 = 0.25e-3;
 pub const MAJOR_DROP: f64 = 0.15;
 /// A drop smaller than this many standard deviations of the frame-to-frame noise is noise.
 const NOISE_FACTOR: f64 = 4.0;
-/// A peak below this fraction of the largest force is first contact, not puncture, unless the tip begins to cut there.
+/// A peak below this fraction of the largest force is first contact, not puncture, unless the tip begins to cut there. Where it has cut nothing
+/// by the end of the fall, and does so later, any peak is first contact.
 const LEAST_PEAK: f64 = 0.05;
 /// A tip that has cut less far has not entered the tissue, one that has cut twice as far has [m].
 const ENTERED: f64 = 0.05e-3;
@@ -180,6 +181,7 @@ pub fn major_drops(records: &[FrameRecord]) -> Vec<MajorDrop> {
     let largest = frames.iter().map(|r| r.force.axial).fold(0.0, f64::max);
     let mut drops: Vec<MajorDrop> = Vec::new();
     let (mut falling, mut running, mut extreme) = (false, 0.0_f64, None::<&FrameRecord>);
+    let enters_at_all = frames.iter().any(|r| r.tip_coordinate > 2.0 * ENTERED);
     for frame in frames {
         let force = frame.force.axial;
         running = running.max(force);
@@ -194,8 +196,10 @@ pub fn major_drops(records: &[FrameRecord]) -> Vec<MajorDrop> {
             _ => {}
         }
         let turned = (force - before.force.axial).abs() >= needed && !further;
-        let enters = before.tip_coordinate < ENTERED && frame.tip_coordinate > 2.0 * ENTERED;
-        if turned && !falling && (enters || before.force.axial >= LEAST_PEAK * largest) {
+        let has_entered = frame.tip_coordinate > 2.0 * ENTERED;
+        let enters = has_entered && before.tip_coordinate < ENTERED;
+        let is_high = before.force.axial >= LEAST_PEAK * largest && (has_entered || !enters_at_all);
+        if turned && !falling && (enters || is_high) {
             drops.push(MajorDrop {
                 depth_m: before.depth,
                 tip_coordinate_m: before.tip_coordinate,
@@ -240,13 +244,16 @@ fn find_drops(curve: &[Point], smooth: &[Point], fraction: f64, least: f64, at_m
         return drops;
     }
     let largest = curve.iter().map(|p| p.force).fold(f64::NEG_INFINITY, f64::max);
+    let enters_at_all = curve.iter().any(|p| p.tip > 2.0 * ENTERED);
     // The bottom of the last drop: what lies before it belongs to that drop.
     let mut from = 0;
     while drops.len() < at_most {
         let falls_after = |&i: &usize| {
             let here = smooth[i];
-            let enters = || here.tip < ENTERED && window_after(smooth, i).iter().any(|p| p.tip > 2.0 * ENTERED);
-            if here.force <= 0.0 || here.force < LEAST_PEAK * largest && !enters() {
+            let has_entered = || window_after(smooth, i).iter().any(|p| p.tip > 2.0 * ENTERED);
+            let enters = || here.tip < ENTERED && has_entered();
+            let is_high = || here.force >= LEAST_PEAK * largest && (!enters_at_all || has_entered());
+            if here.force <= 0.0 || !(is_high() || enters()) {
                 return false;
             }
             let before = smooth[from..i].iter().rev().take_while(|p| p.depth >= here.depth - DROP_TRAVEL);
@@ -408,6 +415,12 @@ mod tests {
         let drops = major_drops(&records);
         assert_eq!(drops.len(), 1, "{drops:?}");
         near(Some(drops[0].depth_m), 3e-3, 1e-9);
+        // The needle sets the surface moving at once: a peak of a third of the largest force, before anything is cut.
+        records.truncate(160);
+        records[1].force.axial = 0.01;
+        records[2].force.axial = 0.008;
+        near(CurveFigures::from_records(&records).puncture_depth, 3e-3, 1e-9);
+        assert_eq!(major_drops(&records).len(), 1);
     }
 
     #[test]
