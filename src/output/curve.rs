@@ -400,10 +400,10 @@ mod tests {
         near(figures.peak_force, 0.8, 1e-9);
     }
 
-    /// Liver before a gallbladder that takes fifty times its force.
+    /// Liver before a gallbladder that takes a hundred times its force.
     #[test]
     fn a_soft_surface_before_tough_tissue_is_punctured() {
-        let mut records = insertion(12e-3, |d| if d < 8e-3 { 0.02 * punctured(d) } else { 60.0 * (d - 8e-3) });
+        let mut records = insertion(12e-3, |d| if d < 8e-3 { 0.02 * punctured(d) } else { 0.02 + 600.0 * (d - 8e-3) });
         let figures = CurveFigures::from_records(&records);
         assert_eq!((figures.puncture_force, major_drops(&records)), (None, vec![]));
         records
@@ -415,7 +415,7 @@ mod tests {
         let drops = major_drops(&records);
         assert_eq!(drops.len(), 1, "{drops:?}");
         near(Some(drops[0].depth_m), 3e-3, 1e-9);
-        // The needle sets the surface moving at once: a peak of a third of the largest force, before anything is cut.
+        // The needle sets the surface moving at once: a peak of half the largest force, before anything is cut.
         records.truncate(160);
         records[1].force.axial = 0.01;
         records[2].force.axial = 0.008;
