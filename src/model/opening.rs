@@ -256,8 +256,10 @@ pub struct OpeningInput<'a> {
     pub cell_size: f64,
     /// How far the path leans over, against the surface: tangent of the angle with its normal.
     pub tilt: f64,
-    /// Shear modulus and p-wave modulus of the tissue at a material coordinate [m] [Pa].
-    pub moduli: &'a dyn Fn(f64) -> [f64; 2],
+    /// Shear modulus and p-wave modulus of the tissue at a material coordinate [m], `None` in what does not deform, and those of the scene's own
+    /// material [Pa].
+    pub moduli: &'a dyn Fn(f64) -> Option<[f64; 2]>,
+    pub own_moduli: [f64; 2],
     /// Largest way of a node in a step [m].
     pub node_way: f64,
     /// Rest radius of the hole at a material coordinate [m], and how the tissue around it changes its volume.
@@ -296,9 +298,13 @@ impl OpeningPlan {
             (first..count).map(|i| station((mesh, places), input, i, spacing, near)).collect();
         // A volume at the wall of the hole grows by R^2 s0/a^4: by a thousandth.
         let least = 0.03 * stations.iter().map(|s| s.hole).fold(f64::INFINITY, f64::min).powi(2) / shaft;
-        // Of the tissue that is met: with those of muscle in lung, a hundredth as stiff, 2.6 % of the work was lost while the crack ran.
-        let met: Vec<[f64; 2]> = stations.iter().map(|s| (input.moduli)(s.depth)).collect();
-        let mean = |i: usize| met[0][i] + met.iter().map(|m| m[i] - met[0][i]).sum::<f64>() / met.len() as f64;
+        // Of the tissue that is met: with those of muscle in lung, a hundredth as stiff, 2.6 % of the work was lost while the crack ran; with those
+        // of bone ahead the guard stopped the run.
+        let met: Vec<[f64; 2]> = stations.iter().filter_map(|s| (input.moduli)(s.depth)).collect();
+        let mean = |i: usize| {
+            let first = met.first().unwrap_or(&input.own_moduli)[i];
+            first + met.iter().map(|m| m[i] - first).sum::<f64>() / met.len().max(1) as f64
+        };
         let average = (1.45 * shaft).max(1.5 * input.cell_size);
         let mut plan = OpeningPlan {
             shaft,

@@ -78,9 +78,8 @@ pub struct PathSegment {
     pub growth: Growth,
     /// Speed of shear waves there, with the scaled mass [m/s].
     pub shear_wave_speed: f64,
-    /// Shear modulus and p-wave modulus there [Pa].
-    pub shear_modulus: f64,
-    pub p_wave_modulus: f64,
+    /// Shear modulus and p-wave modulus there [Pa]; `None` in what does not deform.
+    pub moduli: Option<[f64; 2]>,
 }
 
 /// A way through the tissue.
@@ -316,10 +315,8 @@ impl Model {
                 exit: plan.exit,
                 cell_size: self.scene.tissue.cell_size,
                 tilt,
-                moduli: &|depth| {
-                    let segment = plan.segment(depth.max(0.0));
-                    [segment.shear_modulus, segment.p_wave_modulus]
-                },
+                moduli: &|depth| plan.segment(depth.max(0.0)).moduli,
+                own_moduli: [self.scene.material.law.shear_modulus(), self.scene.material.law.p_wave_modulus()],
                 node_way: self.speed_limit(1.0),
                 hole: &|depth| {
                     let segment = plan.segment(depth.max(0.0));
@@ -469,8 +466,7 @@ impl Model {
             hole: UNKNOWN_HOLE * needle.radius,
             growth: Growth::default(),
             shear_wave_speed: (material.law.shear_modulus() / (material.density * self.mass_scaling())).sqrt(),
-            shear_modulus: material.law.shear_modulus(),
-            p_wave_modulus: material.law.p_wave_modulus(),
+            moduli: (!material.rigid).then(|| [material.law.shear_modulus(), material.law.p_wave_modulus()]),
         };
         let opening = params.scheme == SchemeWord::Opening;
         let steady = opening.then(|| material.steady(needle)).flatten().and_then(Result::ok);
