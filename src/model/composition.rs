@@ -1,7 +1,7 @@
 //! What cells are made of: one material, a mixture of several, a part of one at a surface, nothing, or what does not deform.
 //!
-//! In a label map every cell is sampled at a lattice of points; `f_m` is the part of them in the material m. A cell with a mixture has
-//! one material of its own, with the constants `sum f_m c_m` where its laws are one and linear in them, else the law of its largest part
+//! In a block every cell that the face of a region may cut is sampled at a lattice of points, and all cells of a label map are; `f_m` is
+//! the part of them in the material m. A cell with a mixture has one material of its own, with the constants `sum f_m c_m` where its laws are one and linear in them, else the law of its largest part
 //! scaled to the mean shear modulus. Where a part of the cell is nothing, the sum is less than the whole: stiffness and mass shrink
 //! alike, so that a surface is no staircase and the time step stays (finite cell method, Parvizian, Duester & Rank 2007). The mean of
 //! stiffnesses is the upper bound of Voigt.
@@ -20,10 +20,7 @@ use crate::material::law::{MOST_CONSTANTS, Search};
 use crate::material::{ElasticLaw, LAWS};
 use crate::material_point::Material;
 use crate::mesh::{BlockMesh, Mesh};
-use crate::scene::{RegionShape, Scene};
-
-/// Points per axis at which a cell is sampled.
-const SAMPLES: usize = 6;
+use crate::scene::{CELL_SAMPLES, RegionShape, Scene, sample_points};
 
 /// Cells that are filled less hold nothing.
 pub(super) const LEAST_FILL: f64 = 0.02;
@@ -60,15 +57,19 @@ type Parts = Vec<u16>;
 impl Composition {
     /// Of the cells of a mesh; `materials`: those of the scene, its own first.
     pub fn new(scene: &Scene, mesh: &Mesh, materials: &[Material]) -> Self {
+        let is_rigid = |m: u8| m > 0 && scene.regions[usize::from(m) - 1].material.rigid;
         let any_rigid = scene.regions.iter().any(|region| region.material.rigid);
         let mut composition = match (mesh, &scene.case) {
-            (Mesh::Block(block), Some(case)) => of_labels(scene, block, case, materials),
+            (Mesh::Block(block), Some(case)) => by_parts(scene, block, Some(case), materials),
             _ if scene.regions.is_empty() => return Composition::default(),
-            _ => {
+            (Mesh::Block(block), None) => {
+                let whole = by_parts(scene, block, None, materials);
+                if any_rigid { whole } else { whole.of_tissue_only() }
+            }
+            (Mesh::Tets(_), _) => {
                 let cell_material = by_centre(scene, mesh);
-                let is_rigid = |m: &u8| *m > 0 && scene.regions[usize::from(*m) - 1].material.rigid;
                 let rigid: Vec<bool> =
-                    if any_rigid { cell_material.iter().map(is_rigid).collect() } else { Vec::new() };
+                    if any_rigid { cell_material.iter().map(|m| is_rigid(*m)).collect() } else { Vec::new() };
                 let mixtures = if any_rigid { vec![mixture(&[(0.0, &materials[0])])] } else { Vec::new() };
                 Composition { cell_material, mixtures, empty: rigid.clone(), rigid, ..Composition::default() }
             }
@@ -104,6 +105,12 @@ impl Composition {
         self.skin = skin;
     }
 
+    /// The same without room for cells that hold nothing, where there is none.
+    fn of_tissue_only(mut self) -> Self {
+        self.mixtures.pop();
+        Composition { empty: Vec::new(), rigid: Vec::new(), ..self }
+    }
+
     /// Part of a cell that tissue fills.
     pub fn fill(&self, cell: usize) -> f64 {
         match self.empty.get(cell) {
@@ -131,7 +138,7 @@ impl Composition {
     }
 }
 
-/// Material of every cell: the last region that holds its centre, else the scene's own.
+/// Material of every tetrahedron: the last region that holds its centre, else the scene's own.
 fn by_centre(scene: &Scene, mesh: &Mesh) -> Vec<u8> {
     let holds = |shape: &RegionShape, cell: usize| match (shape, mesh) {
         (RegionShape::MeshTag(name), Mesh::Tets(tets)) => tets.regions[tets.tags[cell] as usize] == *name,
@@ -143,9 +150,9 @@ fn by_centre(scene: &Scene, mesh: &Mesh) -> Vec<u8> {
 }
 
 /// What a point is made of: the index of its material, or none where nothing is.
-fn material_at(scene: &Scene, by_label: &[Option<u8>], case: &Case, x: DVec3) -> Option<usize> {
+fn material_at(scene: &Scene, by_label: &[Option<u8>], case: Option<&Case>, x: DVec3) -> Option<usize> {
     // Regions with a shape of their own lie over the labels, as far as there is tissue.
-    let label = by_label[usize::from(case.label_at(x))]?;
+    let label = case.map_or(Some(0), |case| by_label[usize::from(case.label_at(x))])?;
     let shaped = scene.regions.iter().rposition(|region| match region.shape {
         RegionShape::Labels { .. } => false,
         _ => region.shape.contains(x),
@@ -153,8 +160,10 @@ fn material_at(scene: &Scene, by_label: &[Option<u8>], case: &Case, x: DVec3) ->
     Some(shaped.map_or(usize::from(label), |index| (index + 1).max(usize::from(label))))
 }
 
-fn of_labels(scene: &Scene, block: &BlockMesh, case: &Case, materials: &[Material]) -> Composition {
+/// The last entry of the mixtures is one of nothing; without a label map every cell is full.
+fn by_parts(scene: &Scene, block: &BlockMesh, case: Option<&Case>, materials: &[Material]) -> Composition {
     let by_label: Vec<Option<u8>> = (0..=u16::MAX)
+        .filter(|_| case.is_some())
         .map(|label| {
             let region = scene.regions.iter().rposition(|region| match &region.shape {
                 RegionShape::Labels { labels, .. } => labels.binary_search(&label).is_ok(),
@@ -172,19 +181,18 @@ fn of_labels(scene: &Scene, block: &BlockMesh, case: &Case, materials: &[Materia
         .map(|cell| {
             let size = block.cell_size(cell);
             let low = block.rest_position(block.cell_nodes(cell)[0]);
+            let is_cut = case.is_some() || scene.regions.iter().any(|region| region.shape.may_cut(low, low + size));
+            let samples = if is_cut { CELL_SAMPLES } else { 1 };
             let mut counts = vec![0u16; nothing + 1];
             let mut of_rigid = vec![0u16; nothing];
-            for point in 0..SAMPLES.pow(3) {
-                let part = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
-                let at =
-                    DVec3::new(part(point % SAMPLES), part(point / SAMPLES % SAMPLES), part(point / SAMPLES.pow(2)));
-                match material_at(scene, &by_label, case, low + at * size) {
+            for point in sample_points(low, size, samples) {
+                match material_at(scene, &by_label, case, point) {
                     Some(material) if is_rigid[material] => of_rigid[material] += 1,
                     Some(material) => counts[material] += 1,
                     None => counts[nothing] += 1,
                 }
             }
-            let rigid = 2 * usize::from(of_rigid.iter().sum::<u16>()) > SAMPLES.pow(3);
+            let rigid = 2 * usize::from(of_rigid.iter().sum::<u16>()) > samples.pow(3);
             let of = if rigid { &of_rigid } else { &counts };
             let main = (0..nothing).max_by_key(|m| (of[*m], std::cmp::Reverse(*m))).unwrap_or(0);
             (counts, rigid, main as u8)
@@ -236,7 +244,7 @@ fn of_labels(scene: &Scene, block: &BlockMesh, case: &Case, materials: &[Materia
         .collect();
     let levels = if mixtures.len() > 1 { levels } else { 0 };
     let main = sampled.iter().map(|(.., main)| *main).collect();
-    let fill = sampled.iter().map(|(counts, ..)| fill(counts) as f32).collect();
+    let fill = sampled.iter().filter(|_| case.is_some()).map(|(counts, ..)| fill(counts) as f32).collect();
     Composition { cell_material, main, mixtures, empty, rigid, fill, levels, ..Composition::default() }
 }
 

@@ -262,6 +262,31 @@ impl RegionShape {
         }
     }
 
+    /// False where an axis-parallel box lies inside as a whole, or outside. True may be said of a box that only comes near the face; a
+    /// label map is not looked at: its boxes are always cut, and a mesh tag cuts none.
+    pub fn may_cut(&self, low: DVec3, high: DVec3) -> bool {
+        let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let reach = half.length();
+        match self {
+            RegionShape::Layer { top, bottom } => [-top, -bottom].iter().any(|face| (centre.z - face).abs() <= half.z),
+            RegionShape::Box { low: from, high: to } => {
+                let overlaps = low.cmple(*to).all() && high.cmpge(*from).all();
+                overlaps && !(low.cmpge(*from).all() && high.cmple(*to).all())
+            }
+            RegionShape::Sphere { centre: middle, radius } => (centre.distance(*middle) - radius).abs() <= reach,
+            RegionShape::Cylinder { from, to, radius } => {
+                let axis = *to - *from;
+                let along = (centre - *from).dot(axis) / axis.length();
+                let across = (centre - *from - axis * (along / axis.length())).length();
+                let outside = along < -reach || along > axis.length() + reach || across > radius + reach;
+                let inside = along > reach && along < axis.length() - reach && across < radius - reach;
+                !outside && !inside
+            }
+            RegionShape::MeshTag(_) => false,
+            RegionShape::Labels { .. } => true,
+        }
+    }
+
     /// True where the point lies inside; a mesh tag has no shape.
     pub fn contains(&self, x: DVec3) -> bool {
         match self {
@@ -277,6 +302,18 @@ impl RegionShape {
             RegionShape::Labels { labels, case } => labels.binary_search(&case.label_at(x)).is_ok(),
         }
     }
+}
+
+/// Points per axis at which a cell is sampled that the face of a region may cut.
+pub const CELL_SAMPLES: usize = 6;
+
+/// A lattice of `per_axis`^3 points in an axis-parallel box, each in the middle of its part.
+pub fn sample_points(low: DVec3, size: DVec3, per_axis: usize) -> impl Iterator<Item = DVec3> {
+    let part = move |i: usize| (i as f64 + 0.5) / per_axis as f64;
+    (0..per_axis.pow(3)).map(move |point| {
+        let [i, j, k] = [point % per_axis, point / per_axis % per_axis, point / per_axis.pow(2)];
+        low + DVec3::new(part(i), part(j), part(k)) * size
+    })
 }
 
 /// A material point of the tissue that the insertion wants to reach; it moves with the tissue.

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::super::file::*;
 use super::super::tissue_preset::TissuePreset;
-use super::super::{Region, RegionShape};
+use super::super::{CELL_SAMPLES, Region, RegionShape, sample_points};
 use super::mesh::list_tags;
 use super::parameters::{all_materials, cutting, damage_limit, preset_cutting, written_cutting};
 use super::{Check, MM, Within};
@@ -260,33 +260,36 @@ impl Check<'_> {
         }
         for (index, region) in regions.iter().enumerate() {
             // What has a label may lie elsewhere in the patient, and what is thin has its part of the cells.
-            if count[index + 1] == 0 && !matches!(region.shape, RegionShape::Labels { .. }) {
-                self.notices.push(format!(
-                    "Region `{}` holds the centre of no cell (too thin, or covered by a later region): only its tip \
-                     forces act.",
-                    region.name
-                ));
+            if matches!(region.shape, RegionShape::Labels { .. }) {
                 continue;
             }
-            let off = |block: &BlockMesh| {
-                region.shape.layer_faces().and_then(|faces| faces.into_iter().find(|face| !block.has_line(2, *face)))
-            };
-            match (mesh.as_block().map(off), thickness(&region.shape)) {
+            let is_in_cells =
+                count[index + 1] > 0 || mesh.as_block().is_some_and(|b| has_part_of_cells(b, regions, index));
+            let no_line = mesh
+                .as_block()
+                .and_then(|block| region.shape.layer_faces()?.into_iter().find(|face| !block.has_line(2, *face)));
+            match (no_line, thickness(&region.shape)) {
+                _ if !is_in_cells => self.notices.push(format!(
+                    "Region `{}` holds {} (too thin, or covered by a later region): only its tip forces act.",
+                    region.name,
+                    if mesh.as_block().is_some() { "no sampled point of a cell" } else { "the centre of no cell" }
+                )),
                 // Too close to another face for a line of its own.
-                (Some(Some(face)), _) => self.notices.push(format!(
+                (Some(face), _) => self.notices.push(format!(
                     "The face of region `{}` {} mm below the top lies within cells of {} mm, too close to another for a \
-                     grid line: the layer is as thick there as whole cells are.",
+                     grid line: cells there are a mixture.",
                     region.name,
                     four_digits(-face / MM),
                     four_digits(tissue.cell_size / MM)
                 )),
-                (Some(None), _) if region.shape.layer_faces().is_some() => {}
-                (_, Some(thickness)) if thickness < tissue.cell_size * (1.0 - 1e-9) => self.notices.push(format!(
-                    "Region `{}` is {} mm thick, less than one cell of {} mm: it is as thick as whole cells are.",
-                    region.name,
-                    four_digits(thickness / MM),
-                    four_digits(tissue.cell_size / MM)
-                )),
+                (_, Some(thickness)) if mesh.as_block().is_none() && thickness < tissue.cell_size * (1.0 - 1e-9) => {
+                    self.notices.push(format!(
+                        "Region `{}` is {} mm thick, less than one cell of {} mm: it is as thick as whole cells are.",
+                        region.name,
+                        four_digits(thickness / MM),
+                        four_digits(tissue.cell_size / MM)
+                    ))
+                }
                 _ => {}
             }
         }
@@ -430,6 +433,16 @@ impl Check<'_> {
                 .push("Tip forces of materials have no effect: `puncture` is not in the list `effects`.".into());
         }
     }
+}
+
+/// True where a region has a part of some cell: it is the last that holds a point at which the cell is sampled.
+fn has_part_of_cells(block: &BlockMesh, regions: &[Region], index: usize) -> bool {
+    let shape = &regions[index].shape;
+    (0..block.cell_count()).any(|cell| {
+        let (low, size) = (block.rest_position(block.cell_nodes(cell)[0]), block.cell_size(cell));
+        let is_last = |x| regions.iter().rposition(|region| region.shape.contains(x)) == Some(index);
+        shape.may_cut(low, low + size) && sample_points(low, size, CELL_SAMPLES).any(is_last)
+    })
 }
 
 /// Bounding box of a shape [m]; `None` for a tag.
