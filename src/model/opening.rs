@@ -299,12 +299,11 @@ impl OpeningPlan {
         // A volume at the wall of the hole grows by R^2 s0/a^4: by a thousandth.
         let least = 0.03 * stations.iter().map(|s| s.hole).fold(f64::INFINITY, f64::min).powi(2) / shaft;
         // Of the tissue that is met: with those of muscle in lung, a hundredth as stiff, 2.6 % of the work was lost while the crack ran; with those
-        // of bone ahead the guard stopped the run. Springs that are stiff for the softest do harm: with the plain mean 24 of 200 attempts
-        // at a lumbar puncture (fat 3.4, ligament 69 kPa) were refused, with a third of it three.
+        // of bone ahead the guard stopped the run.
         let met: Vec<[f64; 2]> = stations.iter().filter_map(|s| (input.moduli)(s.depth)).collect();
-        let harmonic_mean = |i: usize| {
+        let mean = |i: usize| {
             let first = met.first().unwrap_or(&input.own_moduli)[i];
-            first / (1.0 + met.iter().map(|m| first / m[i] - 1.0).sum::<f64>() / met.len().max(1) as f64)
+            first + met.iter().map(|m| m[i] - first).sum::<f64>() / met.len().max(1) as f64
         };
         let average = (1.45 * shaft).max(1.5 * input.cell_size);
         let mut plan = OpeningPlan {
@@ -317,8 +316,8 @@ impl OpeningPlan {
             cells: Vec::new(),
             longest_span: 0,
             nodes: BTreeSet::new(),
-            guide: 50.0 * harmonic_mean(0) * spacing,
-            stick: 2.0 * harmonic_mean(1) * spacing,
+            guide: 50.0 * mean(0) * spacing,
+            stick: 2.0 * mean(1) * spacing,
             averaged: ((average / spacing).round() as usize).max(1) / 2,
             nodes_follow: NODES_FOLLOW * input.node_way,
         };

@@ -231,7 +231,7 @@ fn shapes_have_their_part_of_the_cells_that_they_cut() {
             "cylinder_mm = { from = [-3.2, 0.3, -5.2], to = [4.1, 0.3, -5.2], radius = 1.2 }",
             7.3 * 1.44 * std::f64::consts::PI,
         ),
-        ("box_mm = { low = [-3.0, -3.0, -4.8], high = [3.0, 3.0, -4.5] }", 36.0 * 0.3),
+        ("box_mm = { low = [-3.0, -3.0, -4.84], high = [3.0, 3.0, -4.505] }", 36.0 * 0.335),
     ];
     for (shape, volume) in shapes {
         let scene = scene(&format!(
