@@ -1258,7 +1258,10 @@ fn wrong_regions() {
     assert_eq!(notices("layer_mm = [0, 1.5]\nmaterial = { preset = \"fat\" }"), "");
     let flat = "box_mm = { low = [-4, -4, -1.5], high = [4, 4, 0] }\nmaterial = { preset = \"fat\" }";
     assert!(notices(flat).contains("less than one cell of 2 mm"), "{}", notices(flat));
-    assert!(notices("layer_mm = [0, 0.5]\nmaterial = { preset = \"fat\" }").contains("only its tip forces act"));
+    // A quarter of a cell has its part of it; what no sampled point of a cell meets has none.
+    let quarter = notices("layer_mm = [0, 0.5]\nmaterial = { preset = \"fat\" }");
+    assert!(quarter.contains("cells there are a mixture") && !quarter.contains("only its tip"), "{quarter}");
+    assert!(notices("layer_mm = [0, 0.1]\nmaterial = { preset = \"fat\" }").contains("only its tip forces act"));
     // The snap-back of a region stands at its own table.
     let text = region("layer_mm = [0, 2]\nmaterial = { preset = \"fat\" }\ndamage = { failure_displacement_mm = 0.5 }");
     assert_block_refused(

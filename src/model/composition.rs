@@ -1,8 +1,8 @@
 //! What cells are made of: one material, a mixture of several, a part of one at a surface, nothing, or what does not deform.
 //!
 //! In a block every cell that the face of a region may cut is sampled at a lattice of points, and all cells of a label map are; `f_m` is
-//! the part of them in the material m. A cell with a mixture has one material of its own, with the constants `sum f_m c_m` where its laws are one and linear in them, else the law of its largest part
-//! scaled to the mean shear modulus. Where a part of the cell is nothing, the sum is less than the whole: stiffness and mass shrink
+//! the part of them in the material m. A cell with a mixture has one material of its own, with the constants `sum f_m c_m` where its
+//! laws are one and linear in them, else the law of its largest part scaled to the mean shear modulus. Where a part of the cell is nothing, the sum is less than the whole: stiffness and mass shrink
 //! alike, so that a surface is no staircase and the time step stays (finite cell method, Parvizian, Duester & Rank 2007). The mean of
 //! stiffnesses is the upper bound of Voigt.
 //!
@@ -57,7 +57,6 @@ type Parts = Vec<u16>;
 impl Composition {
     /// Of the cells of a mesh; `materials`: those of the scene, its own first.
     pub fn new(scene: &Scene, mesh: &Mesh, materials: &[Material]) -> Self {
-        let is_rigid = |m: u8| m > 0 && scene.regions[usize::from(m) - 1].material.rigid;
         let any_rigid = scene.regions.iter().any(|region| region.material.rigid);
         let mut composition = match (mesh, &scene.case) {
             (Mesh::Block(block), Some(case)) => by_parts(scene, block, Some(case), materials),
@@ -68,8 +67,9 @@ impl Composition {
             }
             (Mesh::Tets(_), _) => {
                 let cell_material = by_centre(scene, mesh);
+                let is_rigid = |m: &u8| *m > 0 && scene.regions[usize::from(*m) - 1].material.rigid;
                 let rigid: Vec<bool> =
-                    if any_rigid { cell_material.iter().map(|m| is_rigid(*m)).collect() } else { Vec::new() };
+                    if any_rigid { cell_material.iter().map(is_rigid).collect() } else { Vec::new() };
                 let mixtures = if any_rigid { vec![mixture(&[(0.0, &materials[0])])] } else { Vec::new() };
                 Composition { cell_material, mixtures, empty: rigid.clone(), rigid, ..Composition::default() }
             }

@@ -282,14 +282,14 @@ impl Check<'_> {
                     four_digits(-face / MM),
                     four_digits(tissue.cell_size / MM)
                 )),
-                (_, Some(thickness)) if mesh.as_block().is_none() && thickness < tissue.cell_size * (1.0 - 1e-9) => {
-                    self.notices.push(format!(
-                        "Region `{}` is {} mm thick, less than one cell of {} mm: it is as thick as whole cells are.",
-                        region.name,
-                        four_digits(thickness / MM),
-                        four_digits(tissue.cell_size / MM)
-                    ))
-                }
+                _ if mesh.as_block().is_some() && region.shape.layer_faces().is_some() => {}
+                (_, Some(thickness)) if thickness < tissue.cell_size * (1.0 - 1e-9) => self.notices.push(format!(
+                    "Region `{}` is {} mm thick, less than one cell of {} mm: {}.",
+                    region.name,
+                    four_digits(thickness / MM),
+                    four_digits(tissue.cell_size / MM),
+                    if mesh.as_block().is_some() { "its cells are a mixture" } else { "it is as thick as whole cells are" }
+                )),
                 _ => {}
             }
         }
