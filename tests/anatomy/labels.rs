@@ -221,7 +221,7 @@ fn cut_cells_hold_the_mass_of_the_tissue() {
     assert!(model.materials.len() <= 256);
 }
 
-/// Shapes in a block on cells of 1 mm, twice as dense as what is around them: by whole cells the cylinder would have 5 % of its volume too much, and the
+/// Shapes in a block on cells of 1 mm, twice as dense as what is around them: by whole cells the cylinder would lack 15 % of its volume, and the
 /// thin box none of it.
 #[test]
 fn shapes_have_their_part_of_the_cells_that_they_cut() {
