@@ -213,7 +213,7 @@ impl CpuEngine {
         let tissue = match free.index(cell).map(|index| free.tissues[index]) {
             Some(AS_BEFORE) => tip.material,
             Some(tissue) => usize::from(tissue),
-            None => self.model.material_index(mesh.cell_index(cell[0], cell[1], cell[2])),
+            None => self.model.region_index(mesh.cell_index(cell[0], cell[1], cell[2])),
         };
         (tissue, open)
     }

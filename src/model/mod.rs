@@ -167,6 +167,11 @@ impl Model {
         self.cell_material.get(cell).map_or(0, |m| usize::from(*m))
     }
 
+    /// What fills most of a cell, 0: the scene's own material, else that of region `index - 1`; a mixture has no region of its own.
+    pub fn region_index(&self, cell: usize) -> usize {
+        self.composition.main.get(cell).map_or(0, |m| usize::from(*m))
+    }
+
     /// Material of a cell.
     pub fn material(&self, cell: usize) -> &Material {
         &self.materials[self.material_index(cell)]

@@ -161,10 +161,9 @@ fn locate(
     };
     let cell = worst.unwrap_or(0);
     let mut acting = Vec::new();
-    let region = model.material_index(cell);
-    let name = match region {
+    let name = match model.region_index(cell) {
         0 => "the tissue".to_string(),
-        n => model.scene.regions.get(n - 1).map_or(format!("region {n}"), |r| format!("region \"{}\"", r.name)),
+        n => format!("region \"{}\"", model.scene.regions[n - 1].name),
     };
     let law = model.material(cell).law.isochoric.key();
     let within: Vec<&str> =

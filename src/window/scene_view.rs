@@ -280,7 +280,7 @@ impl SceneView {
     /// Takes away what lies beyond a plane; `through` as in [`Look::through`].
     pub fn cut(&mut self, gpu: &Gpu, model: &Model, plane: Option<RestPlane>, through: u32) {
         if through != self.through {
-            self.outline = Outline::of(&model.mesh, |cell| through >> model.material_index(cell) & 1 == 1);
+            self.outline = Outline::of(&model.mesh, |cell| through >> model.region_index(cell) & 1 == 1);
             self.through = through;
         }
         let cut = self.outline.cut(&model.mesh, plane);

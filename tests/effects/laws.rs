@@ -139,8 +139,12 @@ fn everything() -> Scene {
 fn regions_and_all_effects_together() {
     let scene = everything();
     let model = graded(scene.clone());
-    let used: std::collections::BTreeSet<u8> = model.cell_material.iter().copied().collect();
-    assert_eq!(used.len(), 5, "regions without a cell: {used:?}");
+    let used: std::collections::BTreeSet<u8> = model.composition.main.iter().copied().collect();
+    assert_eq!(used.len(), 5, "regions that fill most of no cell: {used:?}");
+    let laws: std::collections::BTreeSet<&str> =
+        (0..model.mesh.cell_count()).map(|cell| model.material(cell).law.isochoric.key()).collect();
+    assert_eq!(laws.len(), 5, "laws in cells: {laws:?}");
+    assert!(model.materials.len() > 5, "cells that a face cuts are mixtures");
     let dt = 2e-6;
     let mut lanes = CpuEngine::in_lanes(model.clone(), dt);
     assert!(lanes.info().adapter.contains("lanes of f32"), "{}", lanes.info().adapter);
