@@ -11,10 +11,8 @@ struct OpeningParams {
     direction: vec4<f32>,
     // Where the path enters [m]; w: length of the tip [m].
     entry: vec4<f32>,
-    // Distance of stations [m], stiffness that holds the path on the needle per station [N/m], s0 in R^2; w unused.
+    // Distance of stations [m], s0 in R^2, coefficient of friction, length over which that grows [m].
     numbers: vec4<f32>,
-    // Coefficient of friction, stiffness of the stick spring per station [N/m], length over which the coefficient grows [m]; w unused.
-    friction: vec4<f32>,
     // Stations, clusters, cells, nodes.
     counts: vec4<u32>,
     // Half of the stations over which the normal force is averaged; runs of cells; first sum of the runs, and of the cells.
@@ -32,6 +30,8 @@ struct OpeningParams {
 struct OpeningStation {
     // Material coordinate Z [m], and that from which it counts as cut; rc over the radius of the needle; w: 1 + b of the growth.
     depth: vec4<f32>,
+    // Stiffness that holds its middle on the needle, per radius rc [N/m^2], and of the stick spring [N/m]; zw unused.
+    springs: vec4<f32>,
     // Entries of the means over nodes: first, end; entries of the slots that tell of it: first, end.
     lists: vec4<u32>,
     // Displacement of the middle of the path, across it [m], where the path is laid its place from the entry; w: radius rc [m].
@@ -227,7 +227,7 @@ fn grown(s: f32, w: vec3<f32>, growth: vec3<f32>) -> vec3<f32> {
 
 // v = w m/(s + s0) and its derivatives, of w m with these.
 fn fade_over_area(s: f32, w: vec3<f32>) -> vec3<f32> {
-    let a = 1.0 / (s + opening.numbers.z);
+    let a = 1.0 / (s + opening.numbers.y);
     let v = w.x * a;
     let v1 = (w.y - v) * a;
     return vec3<f32>(v, v1, (w.z - 2.0 * v1) * a);

@@ -136,7 +136,7 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         normal = select(0.0, normal / weight, weight > 0.0);
         // Where the middle is open it is held on the axis; sections of a bevel lie aside of the tip as far as they are wide. One that lies
         // beside the needle closes: `guide` in src/cpu/opening.rs.
-        let per_radius = opening.numbers.y / opening.direction.w;
+        let per_radius = now.springs.x;
         let beside = beside_needle(now.centre.xyz, now.place.x, now.rubbing.x, now.depth.z);
         let axis = beside.axis;
         let lever = beside.lever;
@@ -152,11 +152,11 @@ fn opening_reactions(@builtin(local_invocation_index) lane: u32) {
         var stick = now.rubbing.z;
         var rubbing = 0.0;
         var bound = 0.0;
-        let squeeze = max(normal, 0.0) * clamp((now.place.x - opening.entry.w) / opening.friction.z, 0.0, 1.0) * now.place.y;
+        let squeeze = max(normal, 0.0) * clamp((now.place.x - opening.entry.w) / opening.numbers.w, 0.0, 1.0) * now.place.y;
         squeezed += squeeze;
 #ifdef FRICTION
-        let limit = opening.friction.x * squeeze;
-        let kt = opening.friction.y;
+        let limit = opening.numbers.z * squeeze;
+        let kt = now.springs.y;
         // Speed of the section along the needle.
         var speed = 0.0;
         for (var e = now.lists.x; e < now.lists.y; e++) {

@@ -201,8 +201,10 @@ impl CpuEngine {
         }
         let (_, in_shape) = engine.opened_in_f64(model, (opening, &map), &sections);
         let elastic = in_shape + by_volume[1] - by_volume[0];
-        let stick = model.effects.friction.as_ref().map_or(0.0, |f| 0.5 * f.stiffness_ratio * opening.stick);
-        let springs = now.iter().zip(&state.stations).map(|(n, s)| guide(opening, n, 0.0).stored + stick * s * s);
+        let stick = model.effects.friction.as_ref().map_or(0.0, |f| 0.5 * f.stiffness_ratio);
+        let springs = now.iter().zip(&opening.stations).zip(&state.stations).map(|((n, station), stretch)| {
+            guide(opening, (station.guide, n), 0.0).stored + stick * station.stick * stretch * stretch
+        });
         elastic + springs.sum::<f64>()
     }
 

@@ -32,7 +32,12 @@ impl CpuEngine {
             rates[behind] += rate * by;
             rates[before] -= rate * by;
         }
-        let guides: Vec<Guide> = now.iter().zip(&radius).map(|(n, by_radius)| guide(opening, n, *by_radius)).collect();
+        let guides: Vec<Guide> = now
+            .iter()
+            .zip(&opening.stations)
+            .zip(&radius)
+            .map(|((n, station), by_radius)| guide(opening, (station.guide, n), *by_radius))
+            .collect();
         // Along the needle: by how rc and the axis change behind the tip.
         let spreads: Vec<f64> = guides.iter().map(|g| g.along).collect();
         let old = [self.state.opening_resistance, self.state.opening_spreading];
@@ -49,9 +54,9 @@ impl CpuEngine {
         let (mut booked, mut bend_work) = (ContactSums::default(), 0.0);
         let friction = model.effects.friction.unwrap_or_default();
         let rubs = model.effects.friction.is_some();
-        let kt = friction.stiffness_ratio * opening.stick;
         for (i, station) in opening.stations.iter().enumerate() {
             let n = &now[i];
+            let kt = friction.stiffness_ratio * station.stick;
             let Guide { force: guide, held, .. } = guides[i];
             stored += guides[i].stored;
             let spread = spreads[i];
@@ -107,16 +112,16 @@ impl CpuEngine {
 /// was raised where friction sets in would swing with another energy.
 pub(super) fn stick_bounds(model: &Model) -> Vec<(usize, f64)> {
     let (Some(opening), Some(friction)) = (model.opening(), &model.effects.friction) else { return Vec::new() };
-    let bound = 2.0 * friction.stiffness_ratio * opening.stick;
     let of_station = |station: &OpeningStation| -> Vec<(usize, f64)> {
+        let bound = 2.0 * friction.stiffness_ratio * station.stick;
         station.disc.iter().map(|(place, w)| (station.nodes[usize::from(*place)] as usize, bound * w)).collect()
     };
     opening.stations.iter().flat_map(of_station).collect()
 }
 
-/// What holds the middle of a station on the axis of the needle where it is open; `opened`: derivative of the energy of opening by rc [N].
-pub(super) fn guide(opening: &OpeningPlan, now: &Now, opened: f64) -> Guide {
-    let per_radius = opening.guide / opening.shaft;
+/// What holds the middle of a station on the axis of the needle where it is open, by its spring of that stiffness [N/m]; `opened`: derivative of the energy of opening by rc [N].
+pub(super) fn guide(opening: &OpeningPlan, (stiffness, now): (f64, &Now), opened: f64) -> Guide {
+    let per_radius = stiffness / opening.shaft;
     let square = now.aside.length_squared();
     let by_radius = opened + 0.5 * per_radius * square;
     let (rc, whole) = (now.section.radius, now.full * now.cut);
@@ -177,8 +182,6 @@ mod tests {
             cells: Vec::new(),
             longest_span: 0,
             nodes: BTreeSet::new(),
-            guide: 240.0,
-            stick: 0.0,
             averaged: 0,
             nodes_follow: 0.0,
         };
@@ -186,7 +189,11 @@ mod tests {
             let aside = DVec3::new(0.6, -0.8, 0.0) * aside;
             let (left, leaving) = plan.left_beside(aside.length_squared());
             let section = Station { radius: 0.7e-3 * left, ..Station::default() };
-            guide(&plan, &Now { section, full: 0.7e-3, cut: 1.0, aside, left, leaving, ..Now::default() }, opened)
+            guide(
+                &plan,
+                (240.0, &Now { section, full: 0.7e-3, cut: 1.0, aside, left, leaving, ..Now::default() }),
+                opened,
+            )
         };
         let stored = |aside: f64| at(aside).stored + opened * 0.7e-3 * plan.left_beside(aside * aside).0;
         let along = |aside: f64| -at(aside).force.dot(DVec3::new(0.6, -0.8, 0.0));

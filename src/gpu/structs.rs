@@ -240,7 +240,6 @@ shared_structs! {
         direction: [f32; 4],
         entry: [f32; 4],
         numbers: [f32; 4],
-        friction: [f32; 4],
         counts: [u32; 4],
         sums: [u32; 4],
         surface: [f32; 4],
@@ -250,6 +249,7 @@ shared_structs! {
     /// shaders/effects/opening.wgsl
     struct OpeningStation {
         depth: [f32; 4],
+        springs: [f32; 4],
         lists: [u32; 4],
         centre: [f32; 4],
         centre_rate: [f32; 4],

@@ -350,12 +350,6 @@ impl Model {
             *laid = line;
             model.plan_puncture();
         }
-        // What is stretched already keeps its energy.
-        let old = self.opening().map(|old| (old.guide, old.stick));
-        let new = model.puncture.as_mut().and_then(|plan| plan.opening.as_mut());
-        if let (Some(old), Some(new)) = (old, new) {
-            (new.guide, new.stick) = old;
-        }
         model
     }
 

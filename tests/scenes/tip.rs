@@ -1,6 +1,8 @@
 //! Parts of the force, membranes, exit.
 
 use super::*;
+use stylet::mesh::BlockMesh;
+use stylet::model::Model;
 use stylet::observables::ForceParts;
 use stylet::output::major_drops;
 
@@ -103,4 +105,23 @@ fn layers_are_as_thick_as_they_are_written_in_every_mesh() {
         assert_near("its depth [m]", d, depth, 0.04);
         assert_near("force behind it [N]", b, behind, 0.05);
     }
+}
+
+/// A section is held by springs of its own tissue: the mean along the path was four times too stiff for the fat of a lumbar puncture, and a
+/// needle that turned in a ligament beside soft fat felt a quarter of its force where it was that of fat.
+#[test]
+fn springs_of_a_section_are_those_of_its_tissue() {
+    let scene = Scene::load("scenes/layers.toml".as_ref(), &[]).unwrap();
+    let mesh = BlockMesh::for_scene(&scene);
+    let model = Model::new(scene, mesh);
+    let plan = model.opening().unwrap();
+    let mut softest = f64::INFINITY;
+    let mut stiffest: f64 = 0.0;
+    for station in plan.stations.iter().filter(|s| s.depth > 0.0) {
+        let law = model.scene.material_at(station.middle).law;
+        assert_near("guide [N/m]", station.guide, 50.0 * law.shear_modulus() * plan.spacing, 1e-9);
+        assert_near("stick [N/m]", station.stick, 2.0 * law.p_wave_modulus() * plan.spacing, 1e-9);
+        (softest, stiffest) = (softest.min(station.guide), stiffest.max(station.guide));
+    }
+    assert!(stiffest > 4.0 * softest, "{softest} to {stiffest} N/m");
 }

@@ -189,7 +189,6 @@ fn params(source: &Source) -> OpeningParams {
     let shaft = opening.shaft;
     let [x, y, z, _] = vec4(plan.path.direction);
     let [ex, ey, ez, _] = vec4(plan.path.entry);
-    let stick = friction.stiffness_ratio * opening.stick;
     let [clusters, cells, nodes] = opening_counts(model);
     let advance = |segment: usize| {
         let segment = plan.segments[segment.min(plan.segments.len() - 1)];
@@ -198,8 +197,12 @@ fn params(source: &Source) -> OpeningParams {
     OpeningParams {
         direction: [x, y, z, shaft as f32],
         entry: [ex, ey, ez, opening.tip_length as f32],
-        numbers: [opening.spacing as f32, opening.guide as f32, (opening.least / (shaft * shaft)) as f32, 0.0],
-        friction: [friction.coefficient as f32, stick as f32, friction.fade_length.max(1e-9) as f32, 0.0],
+        numbers: [
+            opening.spacing as f32,
+            (opening.least / (shaft * shaft)) as f32,
+            friction.coefficient as f32,
+            friction.fade_length.max(1e-9) as f32,
+        ],
         counts: [opening.stations.len() as u32, clusters, cells, nodes],
         sums: [
             opening.averaged as u32,
@@ -407,8 +410,15 @@ fn lists(tables: &mut Tables, model: &Model, opening: &OpeningPlan, layout: &Lay
         }));
         let end = tables.entries.len() as u32;
         let cut_from = opening.opens_at(station);
+        let friction = model.effects.friction.unwrap_or_default();
         let mut own = OpeningStation {
             depth: [station.depth as f32, cut_from as f32, station.opened(opening.shaft) as f32, 0.0],
+            springs: [
+                (station.guide / opening.shaft) as f32,
+                (friction.stiffness_ratio * station.stick) as f32,
+                0.0,
+                0.0,
+            ],
             lists: [first, middle, middle, end],
             rest: vec4(station.middle - entry),
             rest_direction: vec4(station.direction),

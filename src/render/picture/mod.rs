@@ -76,8 +76,9 @@ impl Picture {
     /// Composes the picture of one moment.
     pub fn compose(scene: &Scene, mesh: &Mesh, snapshot: &FieldSnapshot) -> Self {
         let plane = Plane::of_scene(scene, mesh, snapshot);
-        // Regions with shapes are drawn as cells see them: with a label map cells hold mixtures.
-        let anatomy = scene.case.as_ref().and_then(|_| Anatomy::of_scene(scene));
+        // With a label map or shapes of regions, cells of a block hold mixtures; tetrahedra are of one region each.
+        let has_mixtures = scene.case.is_some() || mesh.as_block().is_some();
+        let anatomy = has_mixtures.then(|| Anatomy::of_scene(scene)).flatten();
         let slice = match &anatomy {
             Some(anatomy) => labelled::cut(anatomy, mesh, snapshot, &plane, scene),
             None => slice::cut(mesh, snapshot, &plane, scene.tissue.cell_size),
