@@ -69,7 +69,7 @@ impl AnatomyPicture {
             canvas.triangle(at, if t.opened { opened } else { colour });
             areas.fill(part, at);
         };
-        let boundaries = paint_parts(&layout, &slice, &anatomy, &mut paint);
+        let boundaries = paint_parts(&layout, (&slice, &plane), &anatomy, &mut paint);
         for boundary in &boundaries {
             let of_air = boundary.parts.contains(&NOTHING);
             let (width, colour) = if of_air { (2.0, INK.linear(1.0)) } else { (1.2, INK.linear(0.55)) };

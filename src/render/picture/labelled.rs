@@ -15,6 +15,8 @@ use crate::scene::Scene;
 const STEP: f64 = 1.6;
 /// Bone and other parts that do not deform, beside colours of stress.
 const RIGID: Colour = Colour(232, 224, 200);
+/// So far beside a place, in lengths of an edge, it is asked which part is there.
+const BESIDE: f64 = 1e-3;
 /// Layers of cells of air that go along with the tissue.
 const LAYERS_OF_AIR: usize = 2;
 /// A triangle is asked at so many steps whether anything lies in it.
@@ -103,10 +105,11 @@ impl<F: FnMut(&SliceTriangle, usize, [Place; 3], [DVec2; 3])> Pieces for Painter
     }
 }
 
-/// Calls `paint` with every piece: its triangle of the cut, its part, its corners in that triangle and in the picture [px].
+/// Calls `paint` with every piece: its triangle of the cut, its part, its corners in that triangle and in the picture [px]. Returns the lines
+/// between parts, those on edges of cells, too.
 pub(super) fn paint_parts(
     layout: &Layout,
-    slice: &Slice,
+    (slice, plane): (&Slice, &Plane),
     anatomy: &Anatomy,
     paint: &mut impl FnMut(&SliceTriangle, usize, [Place; 3], [DVec2; 3]),
 ) -> Vec<Boundary> {
@@ -115,9 +118,23 @@ pub(super) fn paint_parts(
         let corners = triangle.points.map(|p| layout.place(p));
         let longest = (0..3).map(|n| corners[n].distance(corners[(n + 1) % 3])).fold(0.0, f64::max);
         let steps = (longest / (STEP * layout.unit)).ceil() as usize;
-        let part_at = |place: Place| anatomy.part_at(mixed(triangle.rest, place));
+        // A little towards its middle: faces of layers are faces of cells, and rounding would decide on which side a corner lies.
+        let part_at = |place: Place| anatomy.part_at(mixed(triangle.rest, place.lerp(Place::splat(1.0 / 3.0), BESIDE)));
         let mut painter = Painter { layout, triangle, paint: &mut *paint, boundaries: &mut boundaries };
         contour::split(steps, part_at, &mut painter);
+    }
+    for line in slice.lines.iter().filter(|line| line.kind == EdgeKind::Materials) {
+        let ends = line.points.map(|p| layout.place(p));
+        let steps = (ends[0].distance(ends[1]) / (2.0 * STEP * layout.unit)).ceil().clamp(1.0, 400.0) as usize;
+        let aside = plane.normal.cross(line.rest[1] - line.rest[0]) * BESIDE;
+        for n in 0..steps {
+            let middle = line.rest[0].lerp(line.rest[1], (n as f64 + 0.5) / steps as f64);
+            let parts = [middle + aside, middle - aside].map(|at| anatomy.part_at(at));
+            if parts[0] != parts[1] {
+                boundaries
+                    .push(Boundary { parts, ends: [n, n + 1].map(|n| ends[0].lerp(ends[1], n as f64 / steps as f64)) });
+            }
+        }
     }
     boundaries
 }
@@ -126,7 +143,7 @@ pub(super) fn paint_parts(
 pub(super) fn draw_stress(
     canvas: &mut Canvas,
     layout: &Layout,
-    slice: &Slice,
+    (slice, plane): (&Slice, &Plane),
     anatomy: &Anatomy,
     (scale, cell_size): (&StressScale, f64),
 ) {
@@ -142,7 +159,7 @@ pub(super) fn draw_stress(
             canvas.vertex(at, colour.linear(1.0), stress, weight);
         }
     };
-    let boundaries = paint_parts(layout, slice, anatomy, &mut paint);
+    let boundaries = paint_parts(layout, (slice, plane), anatomy, &mut paint);
     draw_edges(canvas, layout, slice, anatomy, WHITE.linear(cell_edge_alpha(layout, cell_size)));
     for boundary in &boundaries {
         let [a, b] = boundary.parts.map(|part| &parts[part]);

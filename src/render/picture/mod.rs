@@ -92,7 +92,7 @@ impl Picture {
         match &anatomy {
             Some(anatomy) => {
                 let scale = (&scale, scene.tissue.cell_size);
-                labelled::draw_stress(&mut canvas, &layout, &slice, anatomy, scale);
+                labelled::draw_stress(&mut canvas, &layout, (&slice, &plane), anatomy, scale);
             }
             None => draw_tissue(&mut canvas, &layout, &slice, &scale, scene.tissue.cell_size),
         }
