@@ -16,7 +16,8 @@ use crate::gpu::layout::Layout;
 use crate::mesh::{CORNERS, Mesh};
 use crate::model::Model;
 use crate::model::opening::{Cluster, NearCell, OpeningPlan};
-use crate::needle::opening::{Growth, GrowthIn, Station};
+use crate::needle::growth::{Growth, GrowthIn};
+use crate::needle::opening::Station;
 
 pub(super) const ARRAYS: &[Array] = &[
     Array::constant("opening", |s| bytes_of(&[params(s)])),
