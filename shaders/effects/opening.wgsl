@@ -241,8 +241,6 @@ fn across(v: vec3<f32>) -> vec3<f32> {
 // Radius up to which the hole is exact, and over which it fades from there, in needle radii.
 const EXACT: f32 = 2.0;
 const WIDTH: f32 = 2.0;
-// Least part of the path's length that is left of it along the needle, for n.
-const LEAST_ALONG: f32 = 0.25;
 
 // w and its first and second derivative by s.
 fn fade(s: f32) -> vec3<f32> {
