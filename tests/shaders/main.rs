@@ -340,6 +340,7 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "OpenedStress",
         "OpeningDerivatives",
         "PathSection",
+        "SeenGradient",
         "IsochoricFactors",
         "Measure",
         "AnchorPlace",
