@@ -7,7 +7,7 @@ use stylet::material::{Demiray, Isochoric, MooneyRivlin, NeoHookean, Ogden, Yeoh
 use stylet::penetration::cavity::{energy, equivalent_radius, normal_force, pressure, ring_crack};
 use stylet::penetration::law::{EnergyJet, PlaneStrainLaw};
 use stylet::penetration::neo_hooke_curve;
-use stylet::penetration::steady::{Indenter, Resistance};
+use stylet::penetration::steady::{Indenter, MOST_OPENED, Resistance};
 use stylet::penetration::wedge_curve::{CurveEnd, OutOfCurve, WedgeCurve, WedgeOptions};
 use stylet::penetration::wedged_crack::WedgedCrack;
 use stylet::penetration::{Ring, Steady, Unsolved};
@@ -357,4 +357,21 @@ fn what_has_no_answer_is_an_error_with_the_range() {
         assert_eq!(ask(neo_hooke(1.0), numbers), Unsolved::Numbers);
     }
     assert_eq!(ask(neo_hooke(-1.0), tough(1.0)), Unsolved::Numbers);
+}
+
+/// A path is opened 100 times at most; the tip takes what the tissue within would hold, pi mu R^2 ln(stretch/100) of neo-Hooke.
+#[test]
+fn a_narrow_slit_is_carried_as_a_wider_one_with_the_same_force() {
+    let law = neo_hooke(1.0);
+    let steady = |j: f64| Steady::new(&law, tough(j), 1.0, Indenter::Pointed).expect("in range");
+    let narrow = steady(264.0);
+    let carried = narrow.carried(&law).expect("a curve");
+    assert!((carried.wall_stretch() - MOST_OPENED).abs() < 1e-9, "{}", carried.wall_stretch());
+    assert_eq!((carried.tip_force, carried.normal_force), (narrow.tip_force, narrow.normal_force));
+    let more = PI * (narrow.wall_stretch() / MOST_OPENED).ln();
+    let found = carried.cutting_force - narrow.cutting_force;
+    assert!((found / more - 1.0).abs() < 1e-3, "{found} {more}");
+    let wide = steady(60.0);
+    assert!(wide.wall_stretch() < MOST_OPENED);
+    assert_eq!(wide.carried(&law).expect("a curve"), wide);
 }

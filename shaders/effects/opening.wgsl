@@ -172,42 +172,6 @@ fn section_of(station: OpeningStation) -> PathSection {
     );
 }
 
-// Which way Z is seen to grow, n, and what its derivative by F_h needs: src/needle/seen_gradient.rs.
-struct SeenGradient {
-    n: vec3<f32>,
-    // n - t0 for k = 1.
-    tilt: vec3<f32>,
-    part: f32,
-    over_stretch: f32,
-    // F_h t0; dk by t.dF t0, and by d.dF t0.
-    d: vec3<f32>,
-    by_stretch: f32,
-    by_length: f32,
-}
-
-// Squares of the cosine between path and needle between which k grows from 0 to 1; least stretch that is divided by.
-const ACROSS: f32 = 0.9;
-const ALONG: f32 = 0.99;
-const LEAST_ALONG: f32 = 0.05;
-
-fn seen_gradient(gradient: mat3x3<f32>, rest_direction: vec3<f32>) -> SeenGradient {
-    let along = transpose(gradient) * needle_direction();
-    let stretch = dot(along, rest_direction);
-    var out: SeenGradient;
-    out.d = gradient * rest_direction;
-    let over_square = 1.0 / max(dot(out.d, out.d), 1e-6);
-    let square = stretch * abs(stretch) * over_square;
-    let x = clamp((square - ACROSS) / (ALONG - ACROSS), 0.0, 1.0);
-    let slope = 6.0 * x * (1.0 - x) / (ALONG - ACROSS);
-    out.part = x * x * (3.0 - 2.0 * x);
-    out.over_stretch = 1.0 / max(stretch, LEAST_ALONG);
-    out.tilt = along * out.over_stretch - rest_direction;
-    out.n = rest_direction + out.tilt * out.part;
-    out.by_stretch = 2.0 * slope * abs(stretch) * over_square;
-    out.by_length = 2.0 * slope * square * over_square;
-    return out;
-}
-
 struct OpenedPlace {
     eta: vec3<f32>,
     // g, dg/ds, d^2g/ds^2; dg/drc, and its derivatives by s and rc.
@@ -218,9 +182,7 @@ struct OpenedPlace {
     gr1: f32,
     grr: f32,
     radius_rate: f32,
-    centre_rate: vec3<f32>,
     rest_direction: vec3<f32>,
-    seen: SeenGradient,
     H: mat3x3<f32>,
 }
 
@@ -286,14 +248,12 @@ fn opened_place(section: PathSection, eta: vec3<f32>, gradient: mat3x3<f32>) -> 
     out.gr1 = rc * v.y / g - out.gr * out.g1 / g;
     out.grr = v.x / g - out.gr * out.gr / g;
     out.radius_rate = section.radius_rate;
-    out.centre_rate = section.centre_rate;
-    out.rest_direction = section.rest_direction;
-    out.seen = seen_gradient(gradient, section.rest_direction);
-    let n = out.seen.n;
+    let t = section.rest_direction;
+    out.rest_direction = t;
     out.H = mat3x3<f32>(
-        across(gradient[0]) - section.centre_rate * n.x,
-        across(gradient[1]) - section.centre_rate * n.y,
-        across(gradient[2]) - section.centre_rate * n.z,
+        across(gradient[0]) - section.centre_rate * t.x,
+        across(gradient[1]) - section.centre_rate * t.y,
+        across(gradient[2]) - section.centre_rate * t.z,
     );
     return out;
 }
@@ -318,38 +278,30 @@ fn outer(a: vec3<f32>, b: vec3<f32>) -> mat3x3<f32> {
 // F = grad x.
 fn opened_gradient(place: OpenedPlace, gradient: mat3x3<f32>) -> mat3x3<f32> {
     let turned = transpose(place.H) * place.eta;
-    let row = turned * (2.0 * place.g1) + place.seen.n * (place.gr * place.radius_rate);
+    let row = turned * (2.0 * place.g1) + place.rest_direction * (place.gr * place.radius_rate);
     return gradient + place.H * (place.g - 1.0) + outer(place.eta, row);
 }
 
 // Derivatives of an energy, from its derivative P by F.
 fn pull_back(place: OpenedPlace, P: mat3x3<f32>) -> OpeningDerivatives {
     let eta = place.eta;
-    let n = place.seen.n;
+    let t = place.rest_direction;
     let h_eta = transpose(place.H) * eta;
     let p_eta = transpose(P) * eta;
     let h_p = double_dot(place.H, P);
     let stretched = dot(p_eta, h_eta);
-    let sheared = dot(p_eta, n);
+    let sheared = dot(p_eta, t);
     let by_H = P * (place.g - 1.0) + outer(eta, p_eta * (2.0 * place.g1));
     let lateral = mat3x3<f32>(across(by_H[0]), across(by_H[1]), across(by_H[2]));
     let rcz = place.radius_rate;
     let inverse = 1.0 / opening.direction.w;
-    // By n, and by F_h through that.
-    let by_n = p_eta * (place.gr * rcz) - transpose(lateral) * place.centre_rate;
-    let seen = place.seen;
-    let by_part = dot(by_n, seen.tilt);
-    let scale = seen.part * seen.over_stretch;
-    let by_stretch = seen.by_stretch * by_part - scale * (by_part + dot(by_n, place.rest_direction));
-    let along = by_n * scale + place.rest_direction * by_stretch;
-    let by_length = place.rest_direction * (-seen.by_length * by_part);
     var out: OpeningDerivatives;
-    out.gradient = P + lateral + outer(needle_direction(), along) + outer(seen.d, by_length);
+    out.gradient = P + lateral;
     out.place = across(
         eta * (2.0 * place.g1 * h_p + 4.0 * place.g2 * stretched + 2.0 * place.gr1 * rcz * sheared)
-            + (P * h_eta + place.H * p_eta) * (2.0 * place.g1) + (P * n) * (place.gr * rcz)
+            + (P * h_eta + place.H * p_eta) * (2.0 * place.g1) + (P * t) * (place.gr * rcz)
     ) * inverse;
-    out.centre_rate = -(lateral * n);
+    out.centre_rate = -(lateral * t);
     out.radius = (place.gr * h_p + 2.0 * place.gr1 * stretched + place.grr * rcz * sheared) * inverse;
     out.radius_rate = place.gr * sheared;
     return out;
@@ -370,13 +322,5 @@ fn amplification(place: OpenedPlace) -> vec2<f32> {
     let third = max(abs(6.0 * place.g1 * rho + 4.0 * place.g2 * rho * s), 2.0 * abs(place.g1) * rho);
     let by_place = sqrt(squared_norm_bound(place.H)) * third
         + abs(place.radius_rate) * (place.gr + 2.0 * abs(place.gr1) * s);
-    // Sections tilt across what the radius and the centre change along the needle.
-    let turns = sqrt(dot(place.centre_rate, place.centre_rate)) * (max(along, place.g) - 1.0);
-    let tilt = dot(place.seen.tilt, place.seen.tilt);
-    let fades = (place.seen.by_stretch + place.seen.by_length * length(place.seen.d)) * sqrt(tilt);
-    let tilts = (abs(place.radius_rate) * place.gr * rho + turns)
-        * (place.seen.part * place.seen.over_stretch * sqrt(1.0 + tilt) + fades);
-    let most = max(max(place.g, along), 1.0);
-    let by_gradient = sqrt(most * most + tilts * tilts);
-    return vec2<f32>(by_gradient, by_place / opening.direction.w);
+    return vec2<f32>(max(max(place.g, along), 1.0), by_place / opening.direction.w);
 }

@@ -5,6 +5,7 @@ use crate::effects::TissueMaterial;
 use crate::effects::puncture::{Cutting, Params, SchemeWord};
 use crate::material::{ElasticLaw, describe_constants};
 use crate::needle::{NeedleShape, TipShape, Tool};
+use crate::penetration::steady::MOST_OPENED;
 use crate::penetration::surface::Surface;
 use crate::penetration::{Ring, Steady};
 use crate::scene::Scene;
@@ -72,6 +73,8 @@ fn describe_one(
         Some(Err(error)) => return vec![format!("no prediction: {error} ({})", describe_constants(&material.law))],
         Some(Ok(steady)) => steady,
     };
+    let opened = (params.scheme == SchemeWord::Opening).then(|| steady.carried(&material.law.isochoric).ok()).flatten();
+    let carried = opened.unwrap_or(steady);
     let mm = |length: f64| four_digits(length * 1e3);
     let n = |force: f64| four_digits(force);
     let slope = friction * steady.normal_force * 1e-3;
@@ -103,13 +106,13 @@ fn describe_one(
             n(friction),
             n(slope)
         ),
-        change_of_volume(&steady, &material.law),
+        change_of_volume(&carried, &material.law),
         format!("puncture force (n + 1) F_tip = {} N, {exponent}; {puncture}", n(steady.puncture_force)),
         format!(
             "depth of the tip at that force, on a half space: sqrt(F pi (1 - nu^2)/(2 c E tan(alpha))) = {} mm",
             mm(Surface::new(&material.law, needle).depth(steady.puncture_force))
         ),
-        format!("cutting force of the tip springs F_tip - U of that hole = {} N; {cutting}", n(steady.cutting_force)),
+        format!("cutting force of the tip springs F_tip - U of that hole = {} N; {cutting}", n(carried.cutting_force)),
         format!(
             "at {} mm: F_tip + mu_f N (depth - tip of {} mm) = {} N",
             mm(depth),
@@ -123,6 +126,16 @@ fn describe_one(
             "slit a = pi R/(2 lambda_u) = {} mm; it presses like a round hole of radius {} mm",
             mm(steady.crack_half_length),
             mm(steady.hole_radius)
+        );
+    }
+    if carried.hole_radius > steady.hole_radius {
+        lines.insert(
+            4,
+            format!(
+                "the scheme opening opens the path from a hole of {} mm, whose wall is stretched {MOST_OPENED} times: what lies within is \
+                 left to the tip",
+                mm(carried.hole_radius)
+            ),
         );
     }
     if needle.bore.is_some()

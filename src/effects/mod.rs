@@ -150,6 +150,11 @@ impl TissueMaterial {
         let resistance = Resistance { toughness: self.toughness?, tear_stretch: self.tear_stretch };
         Some(Steady::new(&self.law.isochoric, resistance, needle.radius, needle.tip.into()))
     }
+
+    /// [`TissueMaterial::steady`] as the scheme `opening` carries it.
+    pub fn opened(&self, needle: &NeedleShape) -> Option<Result<Steady, Unsolved>> {
+        Some(self.steady(needle)?.and_then(|steady| steady.carried(&self.law.isochoric)))
+    }
 }
 
 /// Where [`parameter::Parameter`] finds its present value.

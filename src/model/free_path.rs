@@ -11,8 +11,8 @@ use crate::mesh::BlockMesh;
 use crate::mesh::material_place::within_block;
 use crate::needle::free_path::{AS_BEFORE, FreeTip, NO_SKIN};
 use crate::needle::gap::Profile;
-use crate::needle::growth::Growth;
 use crate::needle::motion::Placement;
+use crate::needle::opening::Growth;
 use crate::needle::{NeedleShape, PlannedPath, lateral_axes};
 
 /// Room around the planned motion for the nodes and cells of a free path: tissue moves before the tip comes [m].

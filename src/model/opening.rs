@@ -9,9 +9,8 @@ use super::opening_places::{Place, Places};
 use crate::effects::puncture::LEAST_TRAVELS;
 use crate::mesh::{CORNERS, Mesh};
 use crate::needle::NeedleShape;
-use crate::needle::growth::Growth;
 use crate::needle::lateral_axes;
-use crate::needle::opening::{FADED, OpeningMap};
+use crate::needle::opening::{FADED, Growth, OpeningMap};
 use crate::needle::path_line::PathLine;
 
 /// Distance between stations, in needle radii.

@@ -13,7 +13,7 @@ use crate::effects::{TissueMaterial, puncture};
 use crate::mesh::{BlockMesh, Bore};
 use crate::mesh::{Mesh, TetLine};
 use crate::needle::gap::Profile;
-use crate::needle::growth::Growth;
+use crate::needle::opening::Growth;
 use crate::needle::path_line::PathLine;
 use crate::needle::slit::REFERENCE_EDGE;
 use crate::needle::tip_contact::{DISC, TipContact};
@@ -463,7 +463,7 @@ impl Model {
             moduli: (!material.rigid).then(|| [material.law.shear_modulus(), material.law.p_wave_modulus()]),
         };
         let opening = params.scheme == SchemeWord::Opening;
-        let steady = opening.then(|| material.steady(needle)).flatten().and_then(Result::ok);
+        let steady = opening.then(|| material.opened(needle)).flatten().and_then(Result::ok);
         if let Some(steady) = &steady {
             segment.cutting = params.opening_cutting(material.cutting, steady);
             // An inner layer meets a crack that is there already and runs on: it is cut, not punctured.

@@ -10,16 +10,10 @@
 //! ```
 //! With `w m = 1` the map keeps every volume: a hole of no width becomes one of the radius rc. The growth m is what tissue that changes
 //! its volume does around such a hole ([`Growth`]), on a scale that no cell resolves; it is 1 where the hole begins. The path at the material coordinate Z has its
-//! centre in c(Z) and its radius in rc(Z), so with `H = P F_h - c_Z n^T` (P takes out the part along t, F_h = grad y)
+//! centre in c(Z) and its radius in rc(Z), so with `H = P F_h - c_Z t0^T` (P takes out the part along t, F_h = grad y)
 //! ```text
-//! F = grad x = F_h + (g - 1) H + 2 g' eta (H^T eta)^T + g_rc rc_Z eta n^T,   g' = dg/ds,  g_rc = dg/drc
-//! n = t0 + k (F_h^T t/(t.F_h t0) - t0),  k: 1 up to 6 degrees between path and needle, 0 from 18 on
+//! F = grad x = F_h + (g - 1) H + 2 g' eta (H^T eta)^T + g_rc rc_Z eta t0^T,   g' = dg/ds,  g_rc = dg/drc
 //! ```
-//! n is the gradient of Z, and t0 that at rest. Up to 6 degrees Z is taken for a place along the needle: centre and radius hang on where tissue is
-//! along it, and det F is that of the map times det F_h. With t0 for n a section that tilts by gamma had `det F = 1 + gamma rc_Z rc/rho` at the wall
-//! of a narrow hole beside the tip, on one side of it, and no volume at all where 1/300 R was opened to R by a cone of 18 degrees and gamma was
-//! 0.01: an energy like `mu rc^2 (R/a)^2 gamma^2`, which no tissue has, and which made runs unstable. Beside a needle that
-//! is turned against its path a section would be cut aslant, which holds more than tissue does that slides off: k is a choice.
 //! For an energy per volume with `P = dW/dF` the derivatives of W follow: with respect to F_h, eta, c_Z, rc and rc_Z ([`Opening::pull_back`]).
 //! `s0`: a few micrometres squared, since no direction leads away from the middle of the path. Source: this project (docs/opening.md).
 
@@ -28,14 +22,44 @@
 
 use glam::{DMat3, DVec3};
 
-use super::growth::{Growth, GrowthIn};
-use super::seen_gradient::SeenGradient;
 use crate::number::{Number, Tensor};
 
 /// Radius up to which the hole is exact, and radius beyond which nothing of it is left, in needle radii.
 pub const EXACT: f64 = 2.0;
 /// See [`EXACT`].
 pub const FADED: f64 = 4.0;
+
+/// How the tissue around the hole changes its volume: within s lies `m = 1 + b - f/(s + q)` times `rc^2` more area than at rest. Around a narrow
+/// hole tissue is stretched so far that it grows: by 5 % of the hole at Poisson's ratio 0.47, most of it within a third of a radius.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Growth {
+    /// b: far from the path.
+    pub gain: f64,
+    /// f and q [m^2].
+    pub fall: f64,
+    pub reach: f64,
+}
+
+impl Default for Growth {
+    fn default() -> Self {
+        Growth { gain: 0.0, fall: 0.0, reach: 1.0 }
+    }
+}
+
+impl Growth {
+    /// Around a hole of the rest radius `hole` [m], half of the gain within the distance `half` [m].
+    pub fn new(gain: f64, hole: f64, half: f64) -> Self {
+        let root = hole * hole;
+        let reach = (half * half - 2.0 * root).max(0.1 * root);
+        Growth { gain, fall: gain * (root + reach), reach }
+    }
+
+    /// dm/ds at the square s of the distance [1/m^2].
+    pub fn rate(&self, s: f64) -> f64 {
+        self.fall / (s + self.reach).powi(2)
+    }
+}
+
 /// The path at one material coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Station {
@@ -109,15 +133,51 @@ pub struct Beside<N> {
     pub growth: GrowthIn<N>,
 }
 
+/// [`Growth`] in the numbers that it is computed with.
+#[derive(Debug, Clone, Copy)]
+pub struct GrowthIn<N> {
+    pub most: N,
+    pub fall: N,
+    pub reach: N,
+}
+
+impl Growth {
+    /// In numbers of the kind of `n` and lengths of `unit` [m].
+    #[inline(always)]
+    pub fn in_lengths<N: Number>(&self, n: N, unit: f64) -> GrowthIn<N> {
+        let area = unit * unit;
+        GrowthIn { most: n.of(1.0 + self.gain), fall: n.of(self.fall / area), reach: n.of(self.reach / area) }
+    }
+}
+
+impl<N: Number> GrowthIn<N> {
+    /// w m with its derivatives by s, of w with these.
+    #[inline(always)]
+    fn times(&self, s: N, [w, w1, w2]: [N; 3]) -> [N; 3] {
+        let q = s.of(1.0).over(s + self.reach);
+        let fall = self.fall * q;
+        let (m, m1) = (self.most - fall, fall * q);
+        let two = s.of(2.0);
+        [w * m, w1.mul_add(m, w * m1), w2.mul_add(m, two * m1 * (w1 - w * q))]
+    }
+
+    /// w' m with its derivative by s, of w with its derivatives: what w m' does to a volume is known before.
+    #[inline(always)]
+    fn fading(&self, s: N, [_, w1, w2]: [N; 3]) -> [N; 2] {
+        let q = s.of(1.0).over(s + self.reach);
+        let fall = self.fall * q;
+        let m = self.most - fall;
+        [w1 * m, w2.mul_add(m, w1 * (fall * q))]
+    }
+}
+
 /// The map at one point: all that its gradient and the derivatives of an energy need.
 #[derive(Debug, Clone, Copy)]
 pub struct Opening<N> {
     map: MapIn<N>,
-    /// rc_Z, c_Z and t0 there.
+    /// rc_Z and t0 there.
     radius_rate: N,
-    centre_rate: [N; 3],
     rest_direction: [N; 3],
-    seen: SeenGradient<N>,
     eta: [N; 3],
     square: N,
     /// g - 1, g and its derivatives by s; g_rc and its derivatives by s and rc.
@@ -188,13 +248,13 @@ impl<N: Number> Derivatives<N> {
 
 /// Of two vectors.
 #[inline(always)]
-pub(super) fn dot<N: Number>(a: [N; 3], b: [N; 3]) -> N {
+fn dot<N: Number>(a: [N; 3], b: [N; 3]) -> N {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
 
 /// `m v`, of a tensor by its columns.
 #[inline(always)]
-pub(super) fn times<N: Number>(m: &Tensor<N>, v: [N; 3]) -> [N; 3] {
+fn times<N: Number>(m: &Tensor<N>, v: [N; 3]) -> [N; 3] {
     let mut product = [v[0]; 3];
     for b in 0..3 {
         product[b] = m[2][b].mul_add(v[2], m[1][b].mul_add(v[1], m[0][b] * v[0]));
@@ -321,24 +381,20 @@ impl<N: Number> MapIn<N> {
         let over_g = one.over(g);
         let g1 = rc.of(0.5) * area * v1 * over_g;
         let gr = rc * v * over_g;
-        let (mut gradient, mut lateral, mut along) = (*h, *h, eta);
+        let mut lateral = *h;
         for a in 0..3 {
-            gradient[a][a] = gradient[a][a] + one;
-            along[a] = dot(self.direction, gradient[a]);
-        }
-        let seen = SeenGradient::new(along, &gradient, beside.rest_direction);
-        for a in 0..3 {
+            let mut column = h[a];
+            column[a] = column[a] + one;
+            column = across(self.direction, column);
             for b in 0..3 {
-                let across = gradient[a][b] - self.direction[b] * along[a];
-                lateral[a][b] = across - beside.centre_rate[b] * seen.n[a];
+                column[b] = column[b] - beside.centre_rate[b] * beside.rest_direction[a];
             }
+            lateral[a] = column;
         }
         Opening {
             map: *self,
             radius_rate: beside.radius_rate,
-            centre_rate: beside.centre_rate,
             rest_direction: beside.rest_direction,
-            seen,
             eta,
             square: s,
             g_less: (area * v).over(g + one),
@@ -382,12 +438,12 @@ impl<N: Number> Opening<N> {
     /// F - I, of F = grad x, from the gradient of the displacement that the map was made with.
     #[inline(always)]
     pub fn gradient(&self, h: &Tensor<N>) -> Tensor<N> {
-        let Opening { eta, g_less, g1, gr, lateral, seen, .. } = *self;
+        let Opening { eta, g_less, g1, gr, lateral, rest_direction, .. } = *self;
         let ht_eta = transposed_times(&lateral, eta);
         let (twice, widening) = (self.g.of(2.0) * g1, gr * self.radius_rate);
         let mut f = *h;
         for a in 0..3 {
-            let by_eta = ht_eta[a].mul_add(twice, seen.n[a] * widening);
+            let by_eta = ht_eta[a].mul_add(twice, rest_direction[a] * widening);
             for b in 0..3 {
                 f[a][b] = eta[b].mul_add(by_eta, lateral[a][b].mul_add(g_less, f[a][b]));
             }
@@ -398,13 +454,14 @@ impl<N: Number> Opening<N> {
     /// Derivatives of an energy per volume, from its derivative P by F.
     #[inline(always)]
     pub fn pull_back(&self, p: &Tensor<N>) -> Derivatives<N> {
-        let Opening { eta, g_less, g1, g2, gr, gr1, grr, lateral: h, radius_rate: rcz, seen, map, .. } = *self;
-        let n = seen.n;
+        let Opening {
+            eta, g_less, g1, g2, gr, gr1, grr, lateral: h, radius_rate: rcz, rest_direction: t0, map, ..
+        } = *self;
         let two = g1.of(2.0);
         let twice = two * g1;
         let (ht_eta, pt_eta) = (transposed_times(&h, eta), transposed_times(p, eta));
         let h_p = dot(h[2], p[2]) + (dot(h[1], p[1]) + dot(h[0], p[0]));
-        let (stretched, sheared) = (dot(pt_eta, ht_eta), dot(pt_eta, n));
+        let (stretched, sheared) = (dot(pt_eta, ht_eta), dot(pt_eta, t0));
         let mut by_h = *p;
         for a in 0..3 {
             let by_eta = pt_eta[a] * twice;
@@ -416,30 +473,18 @@ impl<N: Number> Opening<N> {
             by_h[a] = across(map.direction, column);
         }
         let along_eta = twice * h_p + g1.of(4.0) * g2 * stretched + two * gr1 * rcz * sheared;
-        let (p_ht_eta, h_pt_eta, p_n) = (times(p, ht_eta), times(&h, pt_eta), times(p, n));
+        let (p_ht_eta, h_pt_eta, p_t0) = (times(p, ht_eta), times(&h, pt_eta), times(p, t0));
         let widening = gr * rcz;
         let mut place = eta;
         for b in 0..3 {
-            place[b] = p_n[b].mul_add(widening, (p_ht_eta[b] + h_pt_eta[b]).mul_add(twice, eta[b] * along_eta));
+            place[b] = p_t0[b].mul_add(widening, (p_ht_eta[b] + h_pt_eta[b]).mul_add(twice, eta[b] * along_eta));
         }
-        let rate = times(&by_h, n);
+        let rate = times(&by_h, t0);
         let none = g1.of(0.0);
-        // By n, and by F_h through that.
-        let mut by_n = pt_eta;
-        for a in 0..3 {
-            by_n[a] = widening * pt_eta[a] - dot(by_h[a], self.centre_rate);
-        }
-        let by_part = dot(by_n, seen.tilt);
-        let scale = seen.part * seen.over_stretch;
-        let by_stretch = seen.by_stretch.mul_add(by_part, none - scale * (by_part + dot(by_n, self.rest_direction)));
-        let by_length = none - seen.by_length * by_part;
         let mut gradient = by_h;
         for a in 0..3 {
-            let t0 = self.rest_direction[a];
-            let (along, stretched) = (by_stretch.mul_add(t0, scale * by_n[a]), by_length * t0);
             for b in 0..3 {
-                let added = map.direction[b].mul_add(along, seen.d[b] * stretched);
-                gradient[a][b] = p[a][b] + by_h[a][b] + added;
+                gradient[a][b] = p[a][b] + by_h[a][b];
             }
         }
         Derivatives {
@@ -462,14 +507,7 @@ impl<N: Number> Opening<N> {
         let third = (g.of(6.0) * g1 * eta + g.of(4.0) * g2 * square * eta).size().larger(two * g1.size() * eta);
         let by_place = squared_norm_bound(&self.lateral).root() * third
             + self.radius_rate.size() * (self.gr + two * self.gr1.size() * square);
-        // Sections tilt across what the radius and the centre change along the needle.
-        let turns = dot(self.centre_rate, self.centre_rate).root() * (along.size().larger(g) - one);
-        let SeenGradient { tilt, part, over_stretch, d, by_stretch, by_length, .. } = self.seen;
-        let fades = (by_stretch + by_length * dot(d, d).root()) * dot(tilt, tilt).root();
-        let tilts = (self.radius_rate.size() * self.gr * eta + turns)
-            * (part * over_stretch * (one + dot(tilt, tilt)).root() + fades);
-        let across = g.larger(along.size()).larger(one);
-        (across.mul_add(across, tilts * tilts).root(), by_place)
+        (g.larger(along.size()).larger(one), by_place)
     }
 }
 
@@ -539,19 +577,14 @@ mod tests {
     #[test]
     fn the_gradient_is_that_of_the_map() {
         // x(X) for fields y, c and rc that are linear near one material point.
-        // The path along the needle, its sections tilted.
-        let map = map();
-        let rest_direction = (GRADIENT.inverse() * map.direction).normalize();
-        let station = Station { rest_direction, ..station() };
+        let (map, station) = (map(), station());
         for y in places() {
             let opening = map.at(&station, y, GRADIENT - DMat3::IDENTITY);
             let f = full(opening.gradient(&less(GRADIENT)));
-            let (t, t0) = (map.direction, station.rest_direction);
-            let seen = GRADIENT.transpose() * t / t.dot(GRADIENT * t0);
             for (axis, column) in [(DVec3::X, f.x_axis), (DVec3::Y, f.y_axis), (DVec3::Z, f.z_axis)] {
                 let step = 1e-8;
                 let at = |h: f64| {
-                    let along = h * axis.dot(seen);
+                    let along = h * axis.dot(station.rest_direction);
                     let moved = Station {
                         centre: station.centre + station.centre_rate * along,
                         radius: station.radius + station.radius_rate * along,
@@ -568,15 +601,13 @@ mod tests {
     #[test]
     fn derivatives_of_an_energy_are_those_of_differences() {
         let (map, station) = (map(), station());
-        // Sections as they are, turned by so much that k falls, and across the path.
-        let turned = [0.0, 0.1, 0.2, 1.4].map(|angle| DMat3::from_rotation_x(angle) * GRADIENT);
-        for (y, gradient) in places().into_iter().flat_map(|y| turned.map(|gradient| (y, gradient))) {
+        for y in places() {
             let seen = |s: &Station, y: DVec3, g: DMat3| {
                 let opening = map.at(s, y, g - DMat3::IDENTITY);
                 (opening, full(opening.gradient(&less(g))))
             };
             let value = |s: &Station, y: DVec3, g: DMat3| energy(seen(s, y, g).1).0;
-            let (opening, f) = seen(&station, y, gradient);
+            let (opening, f) = seen(&station, y, GRADIENT);
             let (w, p) = energy(f);
             let got = opening.pull_back(&p.to_cols_array_2d());
             let close = |plus: f64, minus: f64, step: f64, exact: f64, what: &str| {
@@ -589,8 +620,8 @@ mod tests {
                 let e = DVec3::AXES[a];
                 let h = 1e-9;
                 close(
-                    value(&station, y + e * h, gradient),
-                    value(&station, y - e * h, gradient),
+                    value(&station, y + e * h, GRADIENT),
+                    value(&station, y - e * h, GRADIENT),
                     h,
                     got.place[a],
                     "place",
@@ -599,8 +630,8 @@ mod tests {
                 let rate = |h: f64| Station { centre_rate: station.centre_rate + lateral * h, ..station };
                 let h = 1e-6;
                 close(
-                    value(&rate(h), y, gradient),
-                    value(&rate(-h), y, gradient),
+                    value(&rate(h), y, GRADIENT),
+                    value(&rate(-h), y, GRADIENT),
                     h,
                     DVec3::from(got.centre_rate).dot(lateral),
                     "centre rate",
@@ -609,8 +640,8 @@ mod tests {
                     let mut change = DMat3::ZERO;
                     change.col_mut(a)[b] = h;
                     close(
-                        value(&station, y, gradient + change),
-                        value(&station, y, gradient - change),
+                        value(&station, y, GRADIENT + change),
+                        value(&station, y, GRADIENT - change),
                         h,
                         got.gradient[a][b],
                         "gradient",
@@ -619,10 +650,10 @@ mod tests {
             }
             let h = 1e-9;
             let radius = |h: f64| Station { radius: station.radius + h, ..station };
-            close(value(&radius(h), y, gradient), value(&radius(-h), y, gradient), h, got.radius, "radius");
+            close(value(&radius(h), y, GRADIENT), value(&radius(-h), y, GRADIENT), h, got.radius, "radius");
             let h = 1e-6;
             let rate = |h: f64| Station { radius_rate: station.radius_rate + h, ..station };
-            close(value(&rate(h), y, gradient), value(&rate(-h), y, gradient), h, got.radius_rate, "radius rate");
+            close(value(&rate(h), y, GRADIENT), value(&rate(-h), y, GRADIENT), h, got.radius_rate, "radius rate");
             // The volume.
             let dilation = |s: &Station, y: DVec3| 1.0 + map.dilation(s, y).less_one;
             let (by_place, by_radius) = map.dilation(&station, y).pull_back(1.0);

@@ -127,7 +127,7 @@ impl OpenedPath {
         for node in &opening.nodes {
             let (rest, u) = (model.mesh.rest_position(*node as usize), &mut path.displacement[*node as usize]);
             let y = rest + *u;
-            let section = path.section_at(rest, y);
+            let section = path.section_at(rest);
             if section.radius > 0.0 {
                 path.displacement[*node as usize] = path.map.place(&section, y) - rest;
             }
@@ -145,12 +145,11 @@ impl OpenedPath {
         let nodes = mesh.cell_nodes(cell);
         let middle = |of: &dyn Fn(usize) -> DVec3| nodes.iter().map(|n| of(*n)).sum::<DVec3>() / nodes.len() as f64;
         let rest = middle(&|n| mesh.rest_position(n));
-        let place = rest + middle(&|n| u[n]);
-        let section = self.section_at(rest, place);
+        let section = self.section_at(rest);
         if section.radius == 0.0 || mesh.is_empty(cell) {
             return closed;
         }
-        if self.offset(&section, place).length() < NEAR[0] * self.map.shaft {
+        if self.offset(&section, rest + middle(&|n| u[n])).length() < NEAR[0] * self.map.shaft {
             return f64::NAN;
         }
         let shape = CellShape::new(mesh, cell);
@@ -179,21 +178,9 @@ impl OpenedPath {
         self.map.shaft
     }
 
-    /// The path beside a place [m] that is at `rest` [m] at rest: radius and middle are those of where it is along the needle, which the map does
-    /// not change, so that a section may tilt.
-    fn section_at(&self, rest: DVec3, place: DVec3) -> Station {
-        let depth = self.line.coordinates(rest).1;
-        let own = self.section(depth);
-        if own.radius == 0.0 {
-            return own;
-        }
-        let ahead = (place - own.centre).dot(self.map.direction).clamp(-self.map.shaft, self.map.shaft);
-        self.section(depth + ahead)
-    }
-
-    /// The path at a material coordinate [m], between two sections.
-    fn section(&self, depth: f64) -> Station {
-        let along = (depth - self.first) / self.spacing;
+    /// The path at the material coordinate of a rest position, between two sections.
+    fn section_at(&self, rest: DVec3) -> Station {
+        let along = (self.line.coordinates(rest).1 - self.first) / self.spacing;
         let last = self.sections.len() - 1;
         let before = (along.floor().max(0.0) as usize).min(last);
         let (a, b) = (self.sections[before], self.sections[(before + 1).min(last)]);
@@ -226,21 +213,21 @@ impl OpenedPath {
     /// Where a place of the closed tissue lies from the middle of the path, across the needle [m]. `None` where it is
     /// hardly open.
     pub fn offset_at(&self, rest: DVec3, y: DVec3) -> Option<DVec3> {
-        let section = self.section_at(rest, y);
+        let section = self.section_at(rest);
         (section.radius > HARDLY_OPEN * self.map.shaft).then(|| self.offset(&section, y))
     }
 
     /// The place of the closed tissue beside `y` along `normal` [m] in which a cut with that normal holds the middle of the path, where it runs
     /// nearly through it: a little beside the middle the map leads out of the cut.
     pub fn level_with_middle(&self, rest: DVec3, y: DVec3, normal: DVec3) -> DVec3 {
-        let section = self.section_at(rest, y);
+        let section = self.section_at(rest);
         let aside = self.offset(&section, y).dot(normal);
         if section.radius > 0.0 && aside.abs() < NEARLY_THROUGH * self.map.shaft { y - normal * aside } else { y }
     }
 
     /// Where a place of the closed tissue lies from the middle of the path, in needle radii. `None` where the map does not reach.
     pub fn distance(&self, rest: DVec3, y: DVec3) -> Option<f64> {
-        let section = self.section_at(rest, y);
+        let section = self.section_at(rest);
         let distance = self.offset(&section, y).length() / self.map.shaft;
         (section.radius > 0.0 && distance < FADED).then_some(distance)
     }
@@ -277,7 +264,7 @@ impl OpenedPath {
 
     /// What opening does to the tissue that is at `rest` [m] at rest, and at `y` [m] with the closed path. `None` where it does nothing.
     pub fn at(&self, rest: DVec3, y: DVec3) -> Option<OpenedPlace> {
-        let section = self.section_at(rest, y);
+        let section = self.section_at(rest);
         let eta = self.offset(&section, y);
         if section.radius == 0.0 || eta.length() >= FADED * self.map.shaft {
             return None;
@@ -299,7 +286,7 @@ impl OpenedPath {
     /// Where tissue is with the closed path that rests at `rest` [m] and is seen at `seen` [m]; what would lie within the needle comes from the
     /// middle of the path.
     pub fn closed_place(&self, rest: DVec3, seen: DVec3) -> DVec3 {
-        let section = self.section_at(rest, seen);
+        let section = self.section_at(rest);
         let eta = self.offset(&section, seen);
         let distance = eta.length();
         if section.radius == 0.0 || distance == 0.0 || distance >= FADED * self.map.shaft {

@@ -54,7 +54,7 @@ pub struct RunCheckpoint {
 /// Raised by one wherever the same scene and hand give other forces than before: recordings of earlier builds are refused then, not
 /// continued or scored by another model. 2: contact of torn faces, tearing of a core, begin of a free path in a block. 3: advance
 /// of a tip some of whose springs are not stretched. 4: begin of plastic flow in 32 bits.
-const MODEL_EDITION: u32 = 18;
+const MODEL_EDITION: u32 = 17;
 
 /// A number that changes with anything that a scene says, its presets and meshes among it, and with the model, but not with its task or the
 /// place of the file.

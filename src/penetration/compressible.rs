@@ -9,7 +9,7 @@ use glam::DMat3;
 use std::f64::consts::PI;
 
 use crate::material::ElasticLaw;
-use crate::needle::growth::Growth;
+use crate::needle::opening::Growth;
 
 /// Elements, and the outer end over R.
 const ELEMENTS: usize = 300;

@@ -13,7 +13,6 @@ mod laid_path;
 mod laws;
 mod mass_scaling;
 mod mooney_rivlin;
-mod opened_bound;
 mod opening;
 mod plasticity;
 mod puncture;

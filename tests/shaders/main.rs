@@ -340,7 +340,6 @@ fn host_structs_lie_as_the_shaders_read_them() {
         "OpenedStress",
         "OpeningDerivatives",
         "PathSection",
-        "SeenGradient",
         "IsochoricFactors",
         "Measure",
         "AnchorPlace",

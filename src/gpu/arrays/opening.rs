@@ -16,8 +16,7 @@ use crate::gpu::layout::Layout;
 use crate::mesh::{CORNERS, Mesh};
 use crate::model::Model;
 use crate::model::opening::{Cluster, NearCell, OpeningPlan};
-use crate::needle::growth::{Growth, GrowthIn};
-use crate::needle::opening::Station;
+use crate::needle::opening::{Growth, GrowthIn, Station};
 
 pub(super) const ARRAYS: &[Array] = &[
     Array::constant("opening", |s| bytes_of(&[params(s)])),

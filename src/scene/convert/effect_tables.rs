@@ -15,6 +15,7 @@ use crate::material::demiray::LARGEST_EXPONENT;
 use crate::needle::beam::Section;
 use crate::needle::free_path::MOST_REGIONS;
 use crate::needle::{Motion, Tool};
+use crate::penetration::steady::MOST_OPENED;
 use crate::units::four_digits;
 
 /// What fibres at the wall of an opened path may store, over what the matrix does there, in a scene that names no scheme: no more than a
@@ -143,7 +144,7 @@ impl Check<'_> {
         };
         let stretched = || {
             all_materials(own, regions).filter(|(_, material)| !material.rigid).any(|(_, material)| {
-                let Some(Ok(steady)) = material.steady(needle) else { return false };
+                let Some(Ok(steady)) = material.opened(needle) else { return false };
                 WallFibres::of(effects, material, steady.wall_stretch()).is_some_and(|fibres| !fibres.are_carried())
             })
         };
@@ -233,8 +234,17 @@ impl Check<'_> {
                 Some(i) => (format!("region.{i}.material"), &file.region[i].material),
             };
             let whose = index.map_or("the tissue".into(), |i| format!("region `{}`", regions[i].name));
-            match material.steady(needle) {
-                Some(Ok(steady)) => self.opened_fibres(effects, material, &at, steady.radius / steady.hole_radius),
+            if let Some(Ok(steady)) = material.steady(needle)
+                && steady.wall_stretch() > MOST_OPENED
+            {
+                self.notices.push(format!(
+                    "{whose}: its toughness would stretch the wall of the path {} times; the scheme opening carries {MOST_OPENED}, and the \
+                     tip takes what the tissue within would hold. tear_stretch says where tissue tears.",
+                    four_digits(steady.wall_stretch())
+                ));
+            }
+            match material.opened(needle) {
+                Some(Ok(steady)) => self.opened_fibres(effects, material, &at, steady.wall_stretch()),
                 None => self.problems.report(
                     &at,
                     format!("the scheme opening takes its forces from the toughness, and {whose} has none"),

@@ -8,8 +8,7 @@ use pulp::Simd;
 
 use super::super::WIDEST;
 use super::super::number::Lanes;
-use crate::needle::growth::GrowthIn;
-use crate::needle::opening::{Beside, Station};
+use crate::needle::opening::{Beside, GrowthIn, Station};
 
 /// Rows of a lane: offset, rate of the middle, direction at rest, [`GrowthIn`], radius and its rate, part of the stress that is left, and 1
 /// where the path is open.
